@@ -1,0 +1,230 @@
+"""START, LOAD, BALL, GEN, GLINE, DEL, EXP: who is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.commands.properties import chosen
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io.files import write_sections
+from hpcdem.pre import packing
+from hpcdem.pre.rows import row
+from hpcdem.selection import Selection
+from hpcdem.simulation import Simulation
+
+NO_GROUP = "***"
+
+
+def start(sim: Simulation) -> None:
+    """START: a new, empty model."""
+    sim.clear()
+
+
+def load(
+    sim: Simulation,
+    path: Path | str,
+    scale: float = 1.0,
+    x: tuple[float, float] | None = None,
+    y: tuple[float, float] | None = None,
+) -> int:
+    """LOAD: a new model from rows "x y r [group]" [m]; returns the number of particles.
+
+    x, y: keep only centres in these ranges (of the file's numbers); then everything is multiplied by `scale`.
+    """
+    rows, groups = sim.comm.bcast(_read_xyr(sim, Path(path)))
+    keep = np.ones(len(rows), bool)
+    for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
+        if bounds is not None:
+            keep &= (column >= bounds[0]) & (column < bounds[1])
+    if scale <= 0.0:
+        raise CommandError(f"scale must be positive, got {scale:g}")
+    rows, names = rows[keep] * scale, [g for g, k in zip(groups, keep, strict=True) if k]
+    sim.clear()
+    numbers = {name: sim.group_number(name) for name in dict.fromkeys(names)}
+    return _add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
+
+
+def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, list[str]] | None:
+    error, rows, groups = None, [], []
+    if sim.comm.rank == 0:
+        try:
+            for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+                words = line.split("#")[0].split()
+                if not words:
+                    continue
+                try:
+                    x, y, r = map(float, words[:3])
+                    if len(words) > 4 or not np.isfinite([x, y, r]).all() or r <= 0.0:
+                        raise ValueError
+                except ValueError:
+                    error = f"{path}:{number}: read '{line.strip()[:60]}', expected x y r [group] with r > 0"
+                    break
+                rows.append((x, y, r))
+                groups.append(words[3] if len(words) == 4 else NO_GROUP)
+            if not rows and error is None:
+                error = f"{path}: holds no particles, expected rows x y r [group]"
+        except OSError as problem:
+            error = f"cannot read {path}: {problem.strerror}"
+    _agree(sim, error)
+    return (np.array(rows), groups) if sim.comm.rank == 0 else None
+
+
+def _agree(sim: Simulation, error: str | None) -> None:
+    """Raise as CommandError on all ranks, so that the script line is named."""
+    try:
+        sim.comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+
+
+def ball(
+    sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
+) -> None:
+    """BALL: one particle. gid None takes the next free id."""
+    if rad <= 0.0:
+        raise CommandError(f"rad must be positive, got {rad:g}")
+    if gid is not None:
+        if gid < 0:
+            raise CommandError(f"id must not be negative, got {gid}")
+        if sim.comm.any(bool((sim.particles["gid"] == gid).any())):
+            raise CommandError(f"there is a particle with id {gid} already")
+    _add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=gid)
+
+
+def gen(
+    sim: Simulation,
+    num: int,
+    radii: list[float],
+    x: tuple[float, float],
+    y: tuple[float, float],
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GEN num: random insertion without overlap into a rectangle; returns the number of particles made.
+
+    Gives up after SET gentry (2.25) attempts per particle asked for: scripts ask for far more than fit.
+    """
+    _check_radii(radii, x, y)
+    existing = _everyone(sim)
+    attempts = max(int(sim.settings.gentry * num), num)
+    rows, tried = packing.insert_randomly(
+        num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, attempts
+    )
+    sim.streams += 1
+    made = _add(sim, rows, sim.group_number(group), color)
+    if sim.log is not None:
+        cover = float(np.pi * (rows[:, 2] ** 2).sum() / ((x[1] - x[0]) * (y[1] - y[0])))
+        sim.log.info(f"GEN: {num} asked, {made} placed in {tried} attempts, {100.0 * cover:.1f} % of the area covered")
+    return made
+
+
+def gen_grid(
+    sim: Simulation,
+    radii: list[float],
+    x: tuple[float, float],
+    y: tuple[float, float],
+    idmin: int | None = None,
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GEN GRID: a particle of a random listed radius at each node of a square lattice of spacing 2 max(r)."""
+    _check_radii(radii, x, y)
+    rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams)
+    sim.streams += 1
+    if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
+        raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
+    return _add(sim, rows, sim.group_number(group), color, first_gid=idmin)
+
+
+def gline(
+    sim: Simulation,
+    p1: tuple[float, float],
+    p2: tuple[float, float],
+    rad: float,
+    cratio: float = 1.0,
+    kn: float | None = None,
+    ks: float | None = None,
+    fric: float | None = None,
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GLINE: a row of equal particles from p1 towards p2, spacing 2 rad cratio; overlaps are not looked at."""
+    if rad <= 0.0:
+        raise CommandError(f"rad must be positive, got {rad:g}")
+    if not 0.0 < cratio <= 1.0:
+        raise CommandError(f"cratio must lie in (0, 1], got {cratio:g}")
+    centres = row(p1, p2, rad, cratio)
+    material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
+    rows = np.column_stack([centres, np.full(len(centres), rad)])
+    return _add(sim, rows, sim.group_number(group), color, material=sim.materials.row(**material))
+
+
+def delete(sim: Simulation, where: Selection | None = None) -> int:
+    """DEL: remove particles with their contacts and bonds; returns how many. Their ids are not used again."""
+    which = chosen(sim, where)
+    if not sim.comm.any(bool(which.any())):
+        return 0
+    sim.open()
+    return sim.remove(chosen(sim, where))
+
+
+def export(sim: Simulation, path: Path | str, with_group: bool = False, where: Selection | None = None) -> None:
+    """EXP: rows "x y r [group]" in the order of ids, 13 significant digits."""
+    p = sim.particles
+    which = chosen(sim, where)
+    mine = np.column_stack([p["gid"][which], p["group"][which]]), np.column_stack(
+        [p["x"][which], p["y"][which], p["radius"][which]]
+    )
+    parts = sim.comm.gather(mine)
+    text = ""
+    if parts is not None:
+        ints, reals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        order = np.argsort(ints[:, 0])
+        lines = []
+        for (_, group), (x, y, r) in zip(ints[order], reals[order], strict=True):
+            lines.append(f"{x:.12e}   {y:.12e}   {r:.12e}" + (f"   {sim.groups[group]}" if with_group else ""))
+        text = "\n".join(lines) + "\n"
+    write_sections(path, sim.comm, lambda: [text.encode()])
+
+
+def _check_radii(radii: list[float], x: tuple[float, float], y: tuple[float, float]) -> None:
+    if not len(radii) or min(radii) <= 0.0:
+        raise CommandError(f"radii must be positive, got {' '.join(f'{r:g}' for r in radii) or 'none'}")
+    for name, (low, high) in (("x", x), ("y", y)):
+        if not high > low:
+            raise CommandError(f"{name} range is empty: {low:g} to {high:g}")
+
+
+def _everyone(sim: Simulation) -> np.ndarray:
+    """(n, 3) [x, y, r] of all particles on all ranks."""
+    p = sim.particles
+    mine = np.column_stack([p["x"], p["y"], p["radius"]])
+    return np.concatenate(sim.comm.allgather(mine))
+
+
+def _add(
+    sim: Simulation,
+    rows: np.ndarray,
+    group: np.ndarray | int,
+    color: int,
+    first_gid: int | None = None,
+    material: int = 0,
+) -> int:
+    """New particles from (n, 3) rows x, y, r, the same on all ranks; rank 0 takes them until the next cycle shares them out."""
+    sim.open()
+    first = sim.next_gid if first_gid is None else first_gid
+    sim.next_gid = max(sim.next_gid, first + len(rows))
+    mine = slice(None) if sim.comm.rank == 0 else slice(0)
+    count = len(rows[mine])
+    if count:
+        groups = np.broadcast_to(np.asarray(group, np.int64), (len(rows),))[mine]
+        sim.particles.append(
+            x=rows[mine, 0], y=rows[mine, 1], radius=rows[mine, 2], gid=first + np.arange(count), group=groups,
+            color=color, material=material, birth=sim.clock.step,
+        )  # fmt: skip
+        sim.hist = sim.hist.extended(count)
+    sim._wants_balance = True
+    sim.look_soon()
+    return len(rows)

@@ -1,0 +1,251 @@
+"""CYC and IMPLE: the loop over steps, and what is due between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem import observe, output
+from hpcdem.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.physics.dem.contacts import MODEL
+from hpcdem.physics.dem.laws import tangent_normal_stiffness
+from hpcdem.simulation import Simulation
+
+STEPBAR = 1000
+"""Steps between progress reports and rows of walls.csv when the script sets none."""
+KINDS = ("print", "vtk", "ps", "save")
+
+
+def cycle(sim: Simulation, n: int) -> None:
+    """CYC: n steps. Output at steps that are multiples of the SET intervals, and an `_ini` frame before the first."""
+    if n < 0:
+        raise CommandError(f"CYC needs a number of steps that is not negative, got {n}")
+    intervals = {kind: getattr(sim.settings, kind) for kind in KINDS}
+    _begin(sim, "CYC", n, 0, intervals, final_frame=False)
+
+
+def imple(
+    sim: Simulation,
+    wall: int,
+    xmove: float | None = None,
+    ymove: float | None = None,
+    save: float | None = None,
+    print: float | None = None,
+    ps: float | None = None,
+    vtk: float | None = None,
+) -> None:
+    """IMPLE: step until the wall has gone xmove or ymove [m]; intervals are ways of the wall [m] from the start of the command.
+
+    Kinds of output that are left out are off during the command; a frame is always written at its end.
+    """
+    if (xmove is None) == (ymove is None):
+        raise CommandError("IMPLE needs either xmove or ymove")
+    way, axis, name = (xmove, 0, "xv") if xmove is not None else (ymove, 1, "yv")
+    speed = float(sim.walls.v[sim.walls.row(wall), axis])
+    if speed == 0.0:
+        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never gets {way:g} m far")
+    if way * speed < 0.0 and sim.log is not None:
+        sim.log.warn(f"IMPLE: wall {wall} moves with {name} {speed:g}, against {way:g}; the distance is taken as positive")
+    prepare(sim)
+    per_step = abs(speed) * sim.clock.dt
+    given = {"save": save, "print": print, "ps": ps, "vtk": vtk}
+    for kind, distance in given.items():
+        if distance is not None and distance < 0.0:
+            raise CommandError(f"{kind} must not be negative, got {distance:g}")
+    intervals = {k: max(_nearest(d / per_step), 1) if d else 0 for k, d in given.items()}
+    _begin(sim, "IMPLE", _nearest(abs(way) / per_step), sim.clock.step, intervals, final_frame=True)
+
+
+def resume(sim: Simulation) -> None:
+    """Finish the CYC or IMPLE in which a checkpoint was written."""
+    if sim.progress is not None:
+        prepare(sim, dt_known=True)
+        _run(sim)
+
+
+def stop(sim: Simulation) -> None:
+    """STOP: the end of the script; histories are closed."""
+    output.finish(sim)
+
+
+def _nearest(steps: float) -> int:
+    return math.floor(steps + 0.5)
+
+
+def prepare(sim: Simulation, dt_known: bool = False) -> None:
+    """Closed, checked and with a time step: ready for the first cycle. Collective."""
+    _check_materials(sim)
+    sim.close()
+    _check_laws(sim)
+    dt = sim.clock.dt if dt_known else time_step(sim)
+    if dt != sim.clock.dt:
+        sim.clock.dt = dt
+        sim.tables_changed()
+        sim.look_soon()
+    sim.refresh_tables()
+
+
+def _check_materials(sim: Simulation) -> None:
+    p = sim.particles
+    light = (sim.materials.rows["density"][p["material"]] <= 0.0) & (p["fix"] != 7)
+    if sim.comm.any(bool(light.any())):
+        raise CommandError(f"{sim.count(int(light.sum()))} particles that are free to move have no density (PROP density)")
+
+
+def _check_laws(sim: Simulation) -> None:
+    """Pairs in the list of which one particle is Hertz and the other linear have no law."""
+    if not np.isnan(sim.pair_laws[:, MODEL]).any():
+        return
+    _, iout = observe.contact_rows(sim)
+    p = sim.particles
+    hertz = dict(zip(p.ihot[:, 7].tolist(), sim.materials.rows["hertz"][p.ihot[:, 6]].tolist(), strict=True))
+    mixed = [(a, b) for a, b, _ in iout.tolist() if hertz[a] != hertz[b]]
+    first = [pairs[0] for pairs in sim.comm.allgather(mixed[:1]) if pairs]
+    if first:
+        a, b = first[0]
+        raise CommandError(f"particles {a} and {b} touch, but one has the Hertz law and the other the linear one")
+
+
+def time_step(sim: Simulation) -> float:
+    """The time step [s]: SET DT, or SET frac f: f sqrt(m_min / k_max). Collective.
+
+    m_min: the smallest mass of a particle with a free degree of freedom; k_max: the largest pair stiffness, linear: of any
+    two materials or material and wall in use; Hertz: tangent at the largest overlap (1 % of R without contacts).
+    Source: step count published with Li et al. 2021.
+    """
+    s, p = sim.settings, sim.particles
+    if s.dt > 0.0:
+        return s.dt
+    if s.frac <= 0.0:
+        raise CommandError("no time step: SET DT or SET frac must come before the first cycle")
+    free = p["fix"] != 7
+    light = float(sim.comm.min_into(np.array([sim.body[free, 0].min() if free.any() else math.inf]))[0])
+    if not math.isfinite(light):
+        raise CommandError("SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT")
+    used = np.flatnonzero(sim.used(p["material"], sim.materials))
+    n = len(sim.materials)
+    pairs = sim.pair_laws.reshape(n, n, 4)[np.ix_(used, used)].reshape(-1, 4)
+    walls = sim.wall_laws.reshape(-1, n, 4)[:, used].reshape(-1, 4)
+    rows = np.concatenate([pairs, walls])
+    stiffest = float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0))
+    out, _ = observe.contact_rows(sim)
+    wout, _ = observe.wall_rows(sim)
+    now = np.concatenate([out[:, observe.STIFFNESS], wout[:, observe.STIFFNESS]])
+    hertz = rows[rows[:, 0] == 1.0]
+    largest = np.array([now.max() if len(now) and len(hertz) else 0.0])
+    touching = float(sim.comm.max_into(largest)[0])
+    if len(hertz) and touching == 0.0:
+        r = sim.largest_radius
+        touching = max(tangent_normal_stiffness(1, a, 2.0 * r, 0.01 * r) for a in hertz[:, 1])
+    stiffest = max(stiffest, touching)
+    if stiffest <= 0.0:
+        raise CommandError("SET frac: no stiffness is set (PROP kn, or shear with HERTZ); use SET DT")
+    return s.frac * math.sqrt(light / stiffest)
+
+
+def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str, int], final_frame: bool) -> None:
+    """Write the `_ini` frame and run n steps."""
+    prepare(sim)
+    sim.progress = {
+        "name": name, "first": sim.clock.step, "last": sim.clock.step + n, "origin": origin,
+        "intervals": intervals, "final_frame": final_frame, "position": sim.position,
+    }  # fmt: skip
+    output.Snapshot(sim, initial=True).write_print()
+    _run(sim)
+
+
+@dataclass
+class Task:
+    """Something to do at the steps origin + k * every, k > 0."""
+
+    every: int
+    origin: int
+    run: Callable[[output.Snapshot], None]
+
+    def next_after(self, step: int) -> int:
+        """The first step after `step` at which it is due."""
+        return self.origin + ((step - self.origin) // self.every + 1) * self.every
+
+
+def _tasks(sim: Simulation) -> list[Task]:
+    """What is due during the running command, checkpoints last, so that they know everything else was written."""
+    progress = sim.progress
+    assert progress is not None
+    origin, intervals = progress["origin"], progress["intervals"]
+    tasks = []
+    for ident, (every, _) in sorted(sim.history_wishes.items()):
+        tasks.append(Task(every, 0, lambda _, i=ident: output.write_history(sim, i)))
+    bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
+    tasks.append(Task(bar, progress["first"], lambda _: output.report(sim)))
+    shot = output.Snapshot
+    for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
+        if intervals[kind] > 0:
+            tasks.append(Task(intervals[kind], origin, write))
+    if intervals["save"] > 0:
+        tasks.append(Task(intervals["save"], origin, lambda _: output.write_checkpoint(sim)))
+    return tasks
+
+
+def _run(sim: Simulation) -> None:
+    """Steps up to the end of the running command (sim.progress)."""
+    progress = sim.progress
+    assert progress is not None
+    first, last = progress["first"], progress["last"]
+    if sim.log is not None:
+        sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step)
+    tasks = _tasks(sim)
+    clock, began = sim.clock, sim.clock.step
+    counted = began
+    try:
+        while clock.step < last:
+            event = min([last, *(task.next_after(clock.step) for task in tasks)])
+            request = 0
+            while clock.step < event:
+                request = sim.step()
+                if request:
+                    break
+            sim.timers.count(clock.step - counted, len(sim.particles))
+            counted = clock.step
+            moment = output.Snapshot(sim)
+            for task in tasks:
+                if task.next_after(clock.step - 1) == clock.step:
+                    task.run(moment)
+            if request:
+                _answer(sim, request)
+    except PhysicsError:
+        sim.timers.count(clock.step - counted, len(sim.particles))
+        output.write_last_words(sim)
+        raise
+    finally:
+        if sim.log is not None:
+            sim.log.command_finished()
+    if progress["final_frame"]:
+        output.Snapshot(sim).write_print()
+    sim.progress = None
+    _warn_about_late_lists(sim, first)
+
+
+def _answer(sim: Simulation, request: int) -> None:
+    """A signal or the time limit asked for a checkpoint, perhaps for the end."""
+    what = sim.stop.decide(request)
+    if what == "none":
+        return
+    path = output.write_checkpoint(sim)
+    if what == "stop":
+        raise StoppedWithCheckpoint(
+            f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, go on with --resume"
+        )
+    if sim.log is not None:
+        sim.log.info(f"step {sim.clock.step}: checkpoint {path} written on request")
+
+
+def _warn_about_late_lists(sim: Simulation, first: int) -> None:
+    if sim.lattice.late and sim.log is not None:
+        sim.log.warn_once(
+            "late lists",
+            f"between steps {first} and {sim.clock.step} particles outran the contact search {sim.lattice.late} times; "
+            "a contact may have begun a few steps late. A smaller time step avoids it",
+        )

@@ -1,0 +1,18 @@
+"""SAV and RES: the whole state to a file and back, bit for bit, on any number of ranks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hpcdem import saving
+from hpcdem.simulation import Simulation
+
+
+def save(sim: Simulation, path: Path | str) -> None:
+    """SAV: write the state to this name."""
+    saving.save(sim, path)
+
+
+def restore(sim: Simulation, path: Path | str) -> None:
+    """RES: go on from a file written by SAV; the place in the present script stays."""
+    saving.restore(sim, path)

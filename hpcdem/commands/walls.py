@@ -1,0 +1,76 @@
+"""WALL and BOX."""
+
+from __future__ import annotations
+
+from hpcdem.errors import CommandError
+from hpcdem.model.walls import BOX_IDS
+from hpcdem.simulation import Simulation
+
+
+def wall(
+    sim: Simulation,
+    id: int,
+    nodes: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    kn: float | None = None,
+    ks: float | None = None,
+    fric: float | None = None,
+    color: int | None = None,
+    xv: float | None = None,
+    yv: float | None = None,
+) -> None:
+    """Make a wall (with nodes) or change one. SI units; kn, ks act on particles of the linear law only."""
+    if id < 0:
+        raise CommandError(f"wall id must not be negative, got {id}")
+    if nodes is not None:
+        forget(sim, sim.walls.find(id))
+        sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
+    at = sim.walls.row(id)
+    for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
+        if value is not None and value < 0.0:
+            raise CommandError(f"{name} must not be negative, got {value:g}")
+    _set(sim, at, kn, ks, fric)
+    if color is not None:
+        sim.walls.color[at] = color
+    for axis, value in enumerate((xv, yv)):
+        if value is not None:
+            sim.walls.v[at, axis] = value
+    sim.look_soon()
+
+
+def box(
+    sim: Simulation,
+    left: float,
+    right: float,
+    bottom: float,
+    height: float,
+    kn: float = 0.0,
+    ks: float = 0.0,
+    fric: float = 0.0,
+) -> None:
+    """BOX: four walls that keep particles in; who leaves it is deleted. `height` is measured from `bottom`."""
+    if right <= left or height <= 0.0:
+        raise CommandError(f"BOX is empty: left {left:g}, right {right:g}, height {height:g}")
+    top = bottom + height
+    corners = {
+        "left": ((left, top), (left, bottom)),
+        "right": ((right, bottom), (right, top)),
+        "bottom": ((left, bottom), (right, bottom)),
+        "top": ((right, top), (left, top)),
+    }  # inside lies to the left of P1 -> P2
+    for side, (p1, p2) in corners.items():
+        forget(sim, sim.walls.find(BOX_IDS[side]))
+        _set(sim, sim.walls.put(BOX_IDS[side], p1, p2, one_sided=True), kn, ks, fric)
+
+
+def forget(sim: Simulation, row: int | None) -> None:
+    """Open the model for a new or replaced wall; contacts with the old one are forgotten."""
+    sim.open()
+    if row is not None:
+        sim.hist = sim.hist.keep(sim.hist.partner != -1 - row)
+
+
+def _set(sim: Simulation, at: int, kn: float | None, ks: float | None, fric: float | None) -> None:
+    for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
+        if value is not None:
+            getattr(sim.walls, name)[at] = value
+    sim.tables_changed()

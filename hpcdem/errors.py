@@ -1,0 +1,55 @@
+"""Errors a user can act on, and the exit codes of the programs.
+
+A message is one clear sentence (``file:line: what was read, what was expected``); the command line prints it
+without a traceback and stops every rank.
+"""
+
+from __future__ import annotations
+
+EXIT_OK = 0
+EXIT_ERROR = 1
+"""The run stopped on an error: physics (NaN, runaway particle), files, launch."""
+EXIT_USAGE = 2
+"""Command line or script not understood; nothing was run and nothing was written."""
+EXIT_CHECKPOINT = 85
+"""Stopped before the end on request (signal or time limit) after a checkpoint was written; run again with --resume.
+
+85 is what HTCondor uses for "checkpointed, please start me again"."""
+
+
+class HpcdemError(Exception):
+    """A failure that is explained by its message alone."""
+
+    exit_code = EXIT_ERROR
+
+
+class UsageError(HpcdemError):
+    """A wrong command line or launch."""
+
+    exit_code = EXIT_USAGE
+
+
+class ScriptError(HpcdemError):
+    """A script line that cannot be understood or carried out: ``file:line: message``."""
+
+    exit_code = EXIT_USAGE
+
+    def __init__(self, file: str, line: int, message: str) -> None:
+        super().__init__(f"{file}:{line}: {message}")
+        self.file, self.line, self.message = file, line, message
+
+
+class CommandError(HpcdemError):
+    """A verb was given values that make no sense; the script language adds file and line."""
+
+    exit_code = EXIT_USAGE
+
+
+class PhysicsError(HpcdemError):
+    """The state stopped making sense: a number is not finite, or a particle moves too far in one step."""
+
+
+class StoppedWithCheckpoint(HpcdemError):
+    """The run was asked to stop and left a checkpoint behind."""
+
+    exit_code = EXIT_CHECKPOINT

@@ -1,0 +1,55 @@
+"""Every quantity a particle carries: where it is stored, its unit, its meaning. Allocation, halo, checkpoint, frames
+and the Python API all read this table; a new field is one new row.
+
+A particle is two rows of eight 8-byte words, one cache line each. The *hot* row is what a contact needs of its
+partner, so it is what travels in the halo every step. The *cold* row stays with the owner.
+Integers are stored as int64 bits in the same rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+HOT, COLD = "hot", "cold"
+WIDTH = 8
+
+# Columns of the hot row, for kernels.
+X, Y, VX, VY, SPIN, RADIUS, MATERIAL, GID = range(8)
+# Columns of the cold row.
+ANGLE, FX, FY, TORQUE, FIX, GROUP, COLOR, BIRTH = range(8)
+
+FIX_X, FIX_Y, FIX_SPIN = 1, 2, 4
+FIX_BITS = {"x": FIX_X, "y": FIX_Y, "spin": FIX_SPIN}
+
+
+@dataclass(frozen=True)
+class Field:
+    """One column of the particle table."""
+
+    row: str
+    column: int
+    dtype: type
+    unit: str
+    doc: str
+
+
+FIELDS: dict[str, Field] = {
+    "x": Field(HOT, X, np.float64, "m", "centre"),
+    "y": Field(HOT, Y, np.float64, "m", "centre"),
+    "vx": Field(HOT, VX, np.float64, "m/s", "velocity at the last half step"),
+    "vy": Field(HOT, VY, np.float64, "m/s", "velocity at the last half step"),
+    "spin": Field(HOT, SPIN, np.float64, "rad/s", "angular velocity, anticlockwise, at the last half step"),
+    "radius": Field(HOT, RADIUS, np.float64, "m", "radius"),
+    "material": Field(HOT, MATERIAL, np.int64, "1", "row of the material table"),
+    "gid": Field(HOT, GID, np.int64, "1", "global id, never reused"),
+    "angle": Field(COLD, ANGLE, np.float64, "rad", "rotation since birth"),
+    "fx": Field(COLD, FX, np.float64, "N", "sum of contact and bond forces"),
+    "fy": Field(COLD, FY, np.float64, "N", "sum of contact and bond forces"),
+    "torque": Field(COLD, TORQUE, np.float64, "N m", "sum of contact and bond torques"),
+    "fix": Field(COLD, FIX, np.int64, "1", "bits of the fixed degrees of freedom: 1 x, 2 y, 4 spin"),
+    "group": Field(COLD, GROUP, np.int64, "1", "row of the group name table"),
+    "color": Field(COLD, COLOR, np.int64, "1", "colour number 0-9"),
+    "birth": Field(COLD, BIRTH, np.int64, "1", "step at which the particle was made"),
+}

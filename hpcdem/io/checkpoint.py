@@ -1,0 +1,79 @@
+"""`.sav` files: HDF5, in the order of ids, free of ranks and threads.
+
+Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table, one
+dataset per column, each with the attribute `sum` (its 64-bit words added up modulo 2^64), which is compared after
+writing, before the file gets its name, and again on reading.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io.files import atomic_path
+from hpcdem.io.frame import Table
+from hpcdem.io.h5 import Writer, reading
+
+FORMAT = "hpcdem checkpoint"
+VERSION = 1
+
+
+def word_sum(values: np.ndarray) -> int:
+    """Sum of the 64-bit words of an array modulo 2^64: does not depend on the order of rows."""
+    wide = np.ascontiguousarray(values)
+    wide = wide.view(np.uint64) if wide.dtype.itemsize == 8 else wide.astype(np.int64).view(np.uint64)
+    return int(np.add.reduce(wide.ravel(), dtype=np.uint64)) if wide.size else 0
+
+
+def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Any) -> None:
+    """Collective. Writes to a temporary name, reads it back, then renames. HpcdemError on all ranks if anything fails."""
+    with atomic_path(path, comm) as temporary:
+        sums = {}
+        writer = Writer(os.fspath(path), temporary, comm)
+        try:
+            for table_name, table in tables.items():
+                writer.group(table_name)
+                for name, values in table.columns.items():
+                    full = f"{table_name}/{name}"
+                    part = np.array([word_sum(values)], dtype=np.uint64)
+                    sums[full] = int(sum(comm.allgather(int(part[0]))) % (1 << 64))
+                    writer.slabs(full, values, table.offset, table.total)
+            header = {"format": FORMAT, "version": VERSION, "state": json.dumps(state), "sums": json.dumps(sums)}
+            writer.group("/", header)
+        finally:
+            writer.close()
+        error = None
+        if comm.rank == 0:
+            try:
+                read(temporary)
+            except HpcdemError as failure:
+                error = f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}"
+        comm.agree(error)
+
+
+def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]]]:
+    """State and tables of a checkpoint, on this process alone. HpcdemError says what is wrong with the file."""
+    with reading(path) as file:
+        try:
+            if file.attrs.get("format") != FORMAT:
+                raise HpcdemError(f"{os.fspath(path)} is not an hpcdem checkpoint")
+            if int(file.attrs["version"]) > VERSION:
+                raise HpcdemError(
+                    f"{os.fspath(path)} has checkpoint version {int(file.attrs['version'])}, this program reads up to {VERSION}"
+                )
+            state, sums = json.loads(file.attrs["state"]), json.loads(file.attrs["sums"])
+            tables: dict[str, dict[str, np.ndarray]] = {}
+            for full, expected in sums.items():
+                table, name = full.split("/")
+                values = file[full][...]
+                if word_sum(values) != expected:
+                    raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
+                tables.setdefault(table, {})[name] = values
+        except (KeyError, OSError, ValueError, RuntimeError) as problem:
+            raise HpcdemError(f"{os.fspath(path)} is damaged: {problem}") from None
+    return state, tables

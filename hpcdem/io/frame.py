@@ -1,0 +1,40 @@
+"""The frame: one output time of the model, as every writer gets it.
+
+Each rank holds a contiguous slab of every table in one global order (particles by gid, contacts by the pair of
+gids), so that files do not depend on the rank count. Walls are few and known to all ranks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass
+class Table:
+    """This rank's rows ``offset : offset + len`` of a table of `total` rows; columns are 1-d arrays by name."""
+
+    columns: dict[str, np.ndarray]
+    offset: int = 0
+    total: int = 0
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()))) if self.columns else 0
+
+
+@dataclass
+class Frame:
+    """All that is written at one output time.
+
+    tables: "particles", "contacts", "bonds", "wall_contacts"; walls: columns of the wall table (BOX walls first,
+    ids -1..-4); settings: left, right, bottom, height, gx, gy, disk, frac, lsm. SI units throughout.
+    """
+
+    step: int
+    time: float
+    dt: float
+    settings: dict[str, float | str]
+    walls: dict[str, np.ndarray]
+    tables: dict[str, Table]
+    group_names: list[str] = field(default_factory=list)

@@ -1,0 +1,1 @@
+"""What a model consists of: particles, materials, bond types, walls, settings. Data only; no MPI, no files, no loops."""

@@ -1,0 +1,26 @@
+"""What the SET command sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Settings:
+    """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0."""
+
+    dt: float = 0.0
+    frac: float = 0.0
+    gx: float = 0.0
+    gy: float = 0.0
+    disk: str = "on"
+    lsm: float = 0.0
+    stepbar: int = 0
+    save: int = 0
+    print: int = 0
+    ps: int = 0
+    vtk: int = 0
+    seed: int = 1
+    wallside: str = "both"
+    gentry: float = 2.25
+    outdir: str = "data"

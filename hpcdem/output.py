@@ -1,0 +1,184 @@
+"""What a run writes: frames, pictures, histories, wall forces, checkpoints, progress.
+
+All functions are collective and need a closed model. The folder is made when the first file is written, so a script
+that fails before leaves nothing behind.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem import observe, saving
+from hpcdem.errors import CommandError
+from hpcdem.io.columns import append_rows
+from hpcdem.io.dat import write_dat
+from hpcdem.io.files import make_folder, write_sections
+from hpcdem.io.frame import Frame
+from hpcdem.io.frames import frame_name
+from hpcdem.io.ps import write_ps
+from hpcdem.io.vtk import write_vtk
+from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.physics.exact_sum import exact_sum
+from hpcdem.runtime.progress import StepStatus
+from hpcdem.simulation import Simulation
+
+WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
+
+
+class Snapshot:
+    """The model at one moment, gathered once for all files that are due."""
+
+    def __init__(self, sim: Simulation, initial: bool = False) -> None:
+        self.sim, self.initial = sim, initial
+        self._frame: Frame | None = None
+
+    @property
+    def frame(self) -> Frame:
+        """The frame, made when first asked for."""
+        if self._frame is None:
+            self._frame = observe.frame(self.sim)
+        return self._frame
+
+    def _path(self, suffix: str) -> str:
+        return str(folder(self.sim) / frame_name(self.sim.clock.step, suffix, self.initial))
+
+    def write_print(self) -> None:
+        """`all_<step>[_ini].vtkhdf` and `.dat`."""
+        key = (self.sim.clock.step, self.initial)
+        if self.sim.last_frame == key:
+            return
+        with self.sim.timers("output"):
+            write_vtkhdf(self._path(".vtkhdf"), self.frame, self.sim.comm)
+            write_dat(self._path(".dat"), self.frame, self.sim.comm)
+        self.sim.last_frame = key
+
+    def write_vtk(self) -> None:
+        """`all_<step>.vtk` and `wall_<step>.vtk`."""
+        with self.sim.timers("output"):
+            write_vtk(self._path(".vtk"), self.frame, self.sim.comm)
+
+    def write_ps(self) -> None:
+        """`all_<step>.ps`."""
+        with self.sim.timers("output"):
+            write_ps(self._path(".ps"), self.frame, self.sim.comm)
+
+
+def folder(sim: Simulation) -> Path:
+    """The output folder, made on the first call."""
+    path = Path(sim.outdir)
+    if not sim.folder_made:
+        make_folder(path, sim.comm)
+        sim.folder_made = True
+    return path
+
+
+def write_checkpoint(sim: Simulation) -> Path:
+    """`<step>.sav`; returns its path."""
+    path = folder(sim) / f"{sim.clock.step:010d}.sav"
+    saving.save(sim, path)
+    return path
+
+
+def write_last_words(sim: Simulation) -> None:
+    """A frame of a state that makes no sense any more, for the user to look at."""
+    with np.errstate(all="ignore"):
+        Snapshot(sim).write_print()
+
+
+# ---- time series -------------------------------------------------------------------------------------------------
+
+
+def unbalanced(sim: Simulation) -> float:
+    """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts. Collective."""
+    p, s = sim.particles, sim.settings
+    force = sim.lists.owned_forces()
+    free = p["fix"] & 3
+    fx = np.where(free & 1, 0.0, force[:, 0] + sim.body[:, 0] * s.gx)
+    fy = np.where(free & 2, 0.0, force[:, 1] + sim.body[:, 0] * s.gy)
+    largest = float(sim.comm.max_into(np.array([np.hypot(fx, fy).max() if len(p) else 0.0]))[0])
+    out, _ = observe.contact_rows(sim)
+    total = exact_sum(np.abs(out[:, observe.FN]), sim.comm)
+    return largest / (total / max(sim.count(len(out)), 1)) if total > 0.0 else 0.0
+
+
+HISTORIES = {
+    "kinetic": ("J", observe.kinetic_energy),
+    "step": ("1", lambda sim: float(sim.clock.step)),
+    "time": ("s", lambda sim: sim.clock.time),
+    "unbalanced": ("1", unbalanced),
+    "contacts": ("1", lambda sim: float(sim.count(len(observe.contact_rows(sim)[1])))),
+    "bonds": ("1", lambda sim: float(sim.bonds_left())),
+}
+"""What HIST can follow: unit and function of the simulation."""
+
+
+def write_history(sim: Simulation, ident: int) -> None:
+    """Append (step, time, value) to `hist_<id>.dat`."""
+    _, what = sim.history_wishes[ident]
+    unit, measure = HISTORIES[what]
+    with sim.timers("output"):
+        value = measure(sim)
+        header = f"# step time[s] {what}[{unit}]"
+        row = f"{sim.clock.step} {sim.clock.time!r} {value!r}"
+        _append(sim, f"hist_{ident}.dat", header, [row])
+
+
+def report(sim: Simulation) -> None:
+    """A row per wall in `walls.csv`, and the progress line where one is due."""
+    with sim.timers("output"):
+        force = observe.wall_forces(sim)
+        w, clock = sim.walls, sim.clock
+        rows = [
+            ",".join([str(clock.step), repr(clock.time), str(w.id[k]), *(repr(float(v)) for v in (*w.p1[k], *w.p2[k], *force[k]))])
+            for k in w.in_output_order()
+        ]  # fmt: skip
+        if rows:
+            _append(sim, "walls.csv", WALL_COLUMNS, rows)
+        wanted = sim.log is not None and sim.log.wants(clock.step)
+        if sim.comm.bcast(wanted):
+            walls = [(int(i), float(fx), float(fy)) for i, (fx, fy) in zip(w.id, force, strict=True) if i >= 0]
+            sim.log.step(status(sim, walls))
+
+
+def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
+    """What a progress line tells. Collective."""
+    clock = sim.clock
+    critical = observe.critical_dt(sim)
+    tension, shear = sim.broken()
+    return StepStatus(
+        step=clock.step, time=clock.time, dt=clock.dt, dt_critical=critical if math.isfinite(critical) else 0.0,
+        kinetic=observe.kinetic_energy(sim), unbalanced_ratio=unbalanced(sim), particles=sim.count(len(sim.particles)),
+        contacts=sim.count(len(observe.contact_rows(sim)[1])), bonds=sim.bonds_left(), broken_tension=tension,
+        broken_shear=shear, walls=walls,
+    )  # fmt: skip
+
+
+def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
+    """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
+    restarted one cuts what lies after its step."""
+    path = folder(sim) / name
+    since = None if name in sim.series_open else sim.clock.step if sim.restarted else 0
+    append_rows(path, header, rows, since, sim.comm)
+    sim.series_open.add(name)
+
+
+def finish(sim: Simulation) -> None:
+    """At STOP: the curves asked for by PLOT, `hist_<y>_vs_<x>.txt`."""
+    for y, x in sim.plots:
+        missing = [i for i in (y, x) if i not in sim.history_wishes]
+        if missing:
+            raise CommandError(f"PLOT {y} {x}: there is no HIST {missing[0]}")
+        text = None
+        if sim.comm.rank == 0:
+            columns = []
+            for ident in (x, y):
+                path = Path(sim.outdir) / f"hist_{ident}.dat"
+                lines = path.read_text().splitlines()[1:] if path.exists() else []
+                columns.append({line.split()[0]: line.split()[2] for line in lines})
+            names = [sim.history_wishes[i][1] for i in (x, y)]
+            rows = [f"{columns[0][s]} {columns[1][s]}" for s in columns[0] if s in columns[1]]
+            text = "\n".join([f"# {names[0]} {names[1]}", *rows]) + "\n"
+        write_sections(folder(sim) / f"hist_{y}_vs_{x}.txt", sim.comm, lambda t=text: [(t or "").encode()])

@@ -1,0 +1,261 @@
+"""Particle-particle contacts and bonds: the loops over the pair list.
+
+The list is cut into blocks of consecutive rows, one per thread (neighbours.py). A block owns the rows
+``cut[t] : cut[t+1]`` of the particle storage and adds to a force array of its own, which also takes what falls on
+rows outside the block; those entries are never read. Every owned particle therefore receives the same terms in the
+same order whatever the number of blocks and ranks, and no result depends on them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+from hpcdem.fields import GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.physics.dem import laws
+
+# Columns of the pair law table (row = material_i * n_materials + material_j).
+MODEL, A, B, MU = range(4)
+# Columns of the bond type table; row 0 is "no bond".
+KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
+# Columns of a block's tally (float64): longest bonded distance squared, breaks in tension, breaks in shear.
+LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
+
+
+@njit(cache=True, nogil=True)
+def _block(
+    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+):  # fmt: skip
+    """Forces of block t at the current positions; shear histories move on by dt, bonds may break.
+
+    hot (n, 8) f8 and ihot, the same memory as int64; cut .. foff: neighbours.Blocks; partner (m,) i4, fs (m,)
+    f8 [N], bond (m,) i4 (row of `bonds`), u_made (m,) f8 [m]; force (k, 4) f8: fx, fy, torque.
+    """
+    first, begin, end, shift = lo[t], cut[t], cut[t + 1], foff[t] - lo[t]
+    for r in range(shift + first, shift + hi[t]):
+        force[r, 0] = 0.0
+        force[r, 1] = 0.0
+        force[r, 2] = 0.0
+    longest2 = 0.0
+    in_tension = 0
+    in_shear = 0
+    p = poff[t] - first
+    for i in range(first, end):
+        xi, yi, vxi, vyi = hot[i, X], hot[i, Y], hot[i, VX], hot[i, VY]
+        wi, ri = hot[i, SPIN], hot[i, RADIUS]
+        row = ihot[i, MATERIAL] * n_mat
+        fx = 0.0
+        fy = 0.0
+        torque = 0.0
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx = hot[j, X] - xi
+            dy = hot[j, Y] - yi
+            rj = hot[j, RADIUS]
+            reach = ri + rj
+            d2 = dx * dx + dy * dy
+            kind = bond[k]
+            if kind == 0 and d2 > reach * reach:
+                fs[k] = 0.0
+                continue
+            d = math.sqrt(d2)
+            nx = dx / d
+            ny = dy / d
+            u = reach - d
+            la = ri - 0.5 * u
+            lb = rj - 0.5 * u
+            vs = ny * (vxi - hot[j, VX]) + nx * (hot[j, VY] - vyi) - wi * la - hot[j, SPIN] * lb
+            two_rt = 4.0 * ri * rj / reach
+            q = row + ihot[j, MATERIAL]
+            if u >= 0.0:
+                fn, ks = laws.contact(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u)
+            elif bonds[kind, KIND] == laws.ELASTIC_BOND:
+                area = laws.bond_area(two_rt, spheres)
+                fn, ks = laws.elastic_bond(bonds[kind, E_MOD], bonds[kind, G_MOD], area, reach, u)
+            else:
+                fn, ks = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
+            s = fs[k] + ks * vs * dt
+            if kind != 0:
+                longest2 = max(longest2, d2)
+                failure = laws.bond_failure(
+                    bonds[kind, KIND], fn, s, bonds[kind, TENSILE], bonds[kind, SHEAR], pairs[q, MU],
+                    laws.bond_area(two_rt, spheres),
+                )  # fmt: skip
+                if failure != laws.HOLDS:
+                    bond[k] = 0
+                    kind = 0
+                    if fn < 0.0:
+                        fn = 0.0
+                    if i >= begin:  # the block of the earlier partner counts, so each break counts once
+                        if failure == laws.BREAKS_IN_TENSION:
+                            in_tension += 1
+                        else:
+                            in_shear += 1
+            if kind == 0:
+                s = laws.coulomb(s, pairs[q, MU] * fn)
+            else:
+                s = s + 0.0
+            fs[k] = s
+            ax = s * -ny - fn * nx
+            ay = s * nx - fn * ny
+            fx += ax
+            fy += ay
+            torque += s * la
+            r = shift + j
+            force[r, 0] -= ax
+            force[r, 1] -= ay
+            force[r, 2] += s * lb
+        r = shift + i
+        force[r, 0] += fx
+        force[r, 1] += fy
+        force[r, 2] += torque
+    tally[t, LONGEST2] = longest2
+    tally[t, TENSION_BREAKS] += in_tension
+    tally[t, SHEAR_BREAKS] += in_shear
+
+
+@njit(cache=True, nogil=True)
+def forces(n_blocks, *args):
+    """All blocks, one after the other."""
+    for t in range(n_blocks):
+        _block(t, *args)
+
+
+@njit(cache=True, parallel=True)
+def forces_threaded(
+    n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+):  # fmt: skip
+    """All blocks, one thread each (numba's threads take no tuples, hence the list of names)."""
+    for t in prange(n_blocks):
+        _block(
+            t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n_mat, spheres, out, iout):
+    """Touching or bonded pairs of block t as rows, each pair once in the whole model; returns the number of rows.
+
+    out (m, 8) f8: Fn, Fs, Fx, Fy (on the first), x, y, overlap, tangent stiffness; iout (m, 3) i8: gid, gid, bond type;
+    pairs are turned so that the lower gid comes first. Nothing of the state changes.
+    """
+    cut, lo, _, poff, _ = blocks
+    n = 0
+    p = poff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx = hot[j, X] - hot[i, X]
+            dy = hot[j, Y] - hot[i, Y]
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            reach = ri + rj
+            d2 = dx * dx + dy * dy
+            kind = bond[k]
+            if kind == 0 and d2 > reach * reach:
+                continue
+            d = math.sqrt(d2)
+            nx = dx / d
+            ny = dy / d
+            u = reach - d
+            two_rt = 4.0 * ri * rj / reach
+            q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
+            if u >= 0.0:
+                fn, _ = laws.contact(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u)
+                stiffness = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u)
+            elif bonds[kind, KIND] == laws.ELASTIC_BOND:
+                area = laws.bond_area(two_rt, spheres)
+                fn, _ = laws.elastic_bond(bonds[kind, E_MOD], bonds[kind, G_MOD], area, reach, u)
+                stiffness = bonds[kind, E_MOD] * area / reach
+            else:
+                fn, _ = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
+                stiffness = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u_made[k])
+            s = fs[k]
+            ax = s * -ny - fn * nx
+            ay = s * nx - fn * ny
+            la = ri - 0.5 * u
+            swap = ihot[i, GID] > ihot[j, GID]
+            out[n, 0] = fn
+            out[n, 1] = s
+            out[n, 2] = -ax if swap else ax
+            out[n, 3] = -ay if swap else ay
+            out[n, 4] = hot[i, X] + la * nx
+            out[n, 5] = hot[i, Y] + la * ny
+            out[n, 6] = u
+            out[n, 7] = stiffness
+            iout[n, 0] = ihot[j, GID] if swap else ihot[i, GID]
+            iout[n, 1] = ihot[i, GID] if swap else ihot[j, GID]
+            iout[n, 2] = kind
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, chosen, renewed, fresh, tolerate, rext):
+    """Bond the pairs of block t with both ends chosen: d - (Ra + Rb) rext <= tolerate, or renew the bond they have.
+
+    chosen (n,) bool per storage row; renewed (types,) i4: new type of each existing type; fresh: type of a new bond.
+    Returns bonds made, counted where the block owns the earlier partner, and the longest bonded distance squared.
+    """
+    cut, lo, _, poff, _ = blocks
+    made = 0
+    longest2 = 0.0
+    p = poff[t] - lo[t]
+    for i in range(lo[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx = hot[j, X] - hot[i, X]
+            dy = hot[j, Y] - hot[i, Y]
+            d2 = dx * dx + dy * dy
+            if chosen[i] and chosen[j]:
+                reach = hot[i, RADIUS] + hot[j, RADIUS]
+                d = math.sqrt(d2)
+                if bond[k] != 0:
+                    bond[k] = renewed[bond[k]]
+                elif d - reach * rext <= tolerate:
+                    bond[k] = fresh
+                    two_rt = 4.0 * hot[i, RADIUS] * hot[j, RADIUS] / reach
+                    u_made[k] = max(reach - d, 0.5e-3 * two_rt)
+                    if i >= cut[t]:
+                        made += 1
+            if bond[k] != 0:
+                longest2 = max(longest2, d2)
+    return made, longest2
+
+
+@njit(cache=True, nogil=True)
+def break_bonds(t, blocks, ptr, partner, bond, chosen):
+    """Remove the bonds of block t with both ends chosen; returns how many (of pairs whose earlier end the block owns)."""
+    cut, lo, _, poff, _ = blocks
+    gone = 0
+    p = poff[t] - lo[t]
+    for i in range(lo[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            if bond[k] != 0 and chosen[i] and chosen[partner[k]]:
+                bond[k] = 0
+                if i >= cut[t]:
+                    gone += 1
+    return gone
+
+
+def pair_table(materials: np.ndarray) -> np.ndarray:
+    """Pair laws of all material pairs: (n*n, 4) f8 [MODEL, A, B, MU].
+
+    materials: structured columns as a dict-like record array with hertz, kn, ks, shear, poiss, fric.
+    Hertz pairs use mean moduli, linear pairs springs in series, friction is the smaller of the two (PFC).
+    A mixed pair gets NaN: the caller refuses it when it can occur.
+    """
+    n = len(materials)
+    table = np.full((n, n, 4), np.nan)
+    for i in range(n):
+        for j in range(n):
+            a, b = materials[i], materials[j]
+            mu = min(a["fric"], b["fric"])
+            if a["hertz"] and b["hertz"]:
+                g, nu = 0.5 * (a["shear"] + b["shear"]), 0.5 * (a["poiss"] + b["poiss"])
+                table[i, j] = laws.HERTZ, laws.hertz_normal_factor(g, nu), laws.mindlin_shear_factor(g, nu), mu
+            elif not a["hertz"] and not b["hertz"]:
+                kn, ks = laws.series_stiffness(a["kn"], b["kn"]), laws.series_stiffness(a["ks"], b["ks"])
+                table[i, j] = laws.LINEAR, kn, ks, mu
+    return table.reshape(n * n, 4)

@@ -1,0 +1,191 @@
+"""The whole state to a file and back, bit for bit, on any number of ranks and threads."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.clock import Clock
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.fields import FIELDS, FX, TORQUE
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import to_slabs
+from hpcdem.model.materials import PropertyTable
+from hpcdem.model.settings import Settings
+from hpcdem.model.walls import Walls
+from hpcdem.physics.dem.contacts import LONGEST2
+from hpcdem.physics.dem.neighbours import Histories
+from hpcdem.simulation import Lattice, Simulation
+
+
+def save(sim: Simulation, path: Path | str) -> None:
+    """SAV: write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    began = time.perf_counter()
+    with sim.timers("checkpoint"):
+        checkpoint.write(path, _state(sim), _tables(sim), sim.comm)
+    if sim.stop is not None:
+        sim.stop.saved(time.perf_counter() - began)
+
+
+def _state(sim: Simulation) -> dict[str, Any]:
+    """Everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
+    closed = sim.lists is not None
+    longest2 = np.array([sim.lists.longest_bond2() if closed else sim._longest2])
+    breaks = sim.breaks.copy()
+    if closed:
+        breaks = breaks + sim.uncollected_breaks()
+    walls = {name: getattr(sim.walls, name).tolist() for name in Walls.COLUMNS}
+    return {
+        "clock": dataclasses.asdict(sim.clock),
+        "settings": dataclasses.asdict(sim.settings),
+        "lattice": dataclasses.asdict(sim.lattice),
+        "closed": closed,
+        "longest2": float(sim.comm.max_into(longest2)[0]),
+        "walls": walls,
+        "materials": sim.materials.as_floats().tolist(),
+        "bond_types": sim.bond_types.as_floats().tolist(),
+        "groups": sim.groups,
+        "next_gid": sim.next_gid,
+        "streams": sim.streams,
+        "breaks": sim.comm.sum_into(breaks).tolist(),
+        "bonds": sim.bonds_left(),
+        "rebuilds": sim.rebuilds,
+        "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
+        "progress": sim.progress,
+        "position": sim.position,
+        "script": sim.script,
+        "plots": sim.plots,
+    }
+
+
+def _tables(sim: Simulation) -> dict[str, Table]:
+    p = sim.particles
+    columns = {name: p[name].copy() for name in FIELDS}
+    if sim.lists is not None:
+        force = sim.lists.owned_forces()
+        for k, name in enumerate(("fx", "fy", "torque")):
+            columns[name] = force[:, k].copy()
+        hist, origin = sim.lists.histories(p.ihot), sim.origin
+    else:
+        hist, origin = sim.hist, p.positions()
+    columns["x0"], columns["y0"] = origin[:, 0].copy(), origin[:, 1].copy()
+    owner = np.repeat(p["gid"], hist.counts())
+    once, walls = hist.partner > owner, hist.partner < 0
+    pairs = {
+        "gid": owner[once], "partner": hist.partner[once], "fs": hist.fs[once], "extra": hist.extra[once],
+        "bond": hist.bond[once].astype(np.int64),
+    }  # fmt: skip
+    wall_contacts = {
+        "gid": owner[walls], "wall": -1 - hist.partner[walls], "fs": hist.fs[walls], "extra": hist.extra[walls],
+    }  # fmt: skip
+    return {
+        "particles": to_slabs(sim.comm, ("gid",), columns),
+        # A pair whose partners live on two ranks is remembered by both; the lower gid's owner writes it.
+        "pairs": to_slabs(sim.comm, ("gid", "partner"), pairs),
+        "wall_contacts": to_slabs(sim.comm, ("gid", "wall"), wall_contacts),
+    }
+
+
+def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
+    """Take the state of a file written by `save`, on any number of ranks and threads. Collective.
+
+    Returns where the run that saved was: "script" (its text), "position" (index of the statement), "progress" (of the
+    CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is missing, foreign or damaged; the simulation is then as it was.
+    """
+    found = None
+    error = None
+    if sim.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+        except HpcdemError as problem:
+            error = str(problem)
+    try:
+        sim.comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    state = sim.comm.bcast(None if found is None else json.dumps(found[0]))
+    state = json.loads(state)
+    _apply(sim, state, found[1] if found is not None else None)
+    return {name: state[name] for name in ("script", "position", "progress")}
+
+
+def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+    sim.clear()
+    sim.clock = Clock(**state["clock"])
+    sim.settings = Settings(**state["settings"])
+    sim.lattice = Lattice(**state["lattice"])
+    for name in Walls.COLUMNS:
+        like = getattr(sim.walls, name)
+        values = np.array(state["walls"][name], dtype=like.dtype)
+        setattr(sim.walls, name, values.reshape(len(state["walls"]["id"]), *like.shape[1:]))
+    for name in ("materials", "bond_types"):
+        dtype = getattr(sim, name).rows.dtype
+        rows = np.array(state[name], dtype=np.float64)
+        setattr(sim, name, PropertyTable(dtype, rows.view(dtype).reshape(-1)))
+    for name in ("groups", "next_gid", "streams"):
+        setattr(sim, name, state[name])
+    sim.history_wishes = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
+    sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
+    sim.bonds = state["bonds"]
+    sim._longest2 = state["longest2"]
+    sim.restarted = True
+    if sim.comm.rank == 0:
+        sim.breaks[:] = state["breaks"]
+    if tables is not None:
+        _take_particles(sim, tables)
+    if state["closed"]:
+        _close_as_it_was(sim, state)
+    sim.rebuilds = state["rebuilds"]
+
+
+def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -> None:
+    """All particles and histories, on this rank; the first close shares them out."""
+    columns = dict(tables["particles"])
+    sim.particles.append(**{name: columns[name] for name in FIELDS})
+    sim.saved_origin = np.column_stack([columns["x0"], columns["y0"]])
+    pairs, walls = tables["pairs"], tables["wall_contacts"]
+    none = np.zeros(len(walls["gid"]), np.int64)
+    owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
+    partner = np.concatenate([pairs["partner"], pairs["gid"], -1 - walls["wall"]])
+    fs = np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]])
+    extra = np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]])
+    bond = np.concatenate([pairs["bond"], pairs["bond"], none]).astype(np.int32)
+    gid = columns["gid"]
+    order = np.argsort(owner, kind="stable")
+    ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
+    sim.hist = Histories(ptr, partner[order], fs[order], extra[order], bond[order])
+
+
+def _close_as_it_was(sim: Simulation, state: dict[str, Any]) -> None:
+    """Lists as they were when the state was saved: built from the positions and walls of that rebuild, then the present
+    positions put in. Order, ownership and lists depend on the former alone."""
+    p, walls = sim.particles, sim.walls
+    saved_lattice = dataclasses.replace(sim.lattice)
+    travel = walls.travel.copy()
+    now = walls.p1.copy(), walls.p2.copy()
+    if len(p):
+        present = p.positions()
+        p["x"][:], p["y"][:] = sim.saved_origin.T
+        # The present positions travel with their particles in columns that the close does not read.
+        p.cold[:, FX : FX + 2], forces = present, p.cold[:, FX : TORQUE + 1].copy()
+    else:
+        forces = np.empty((0, 3))
+    gid = p["gid"].copy()
+    walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
+    sim._close(frozen=True)
+    walls.p1, walls.p2, walls.travel = now[0], now[1], travel
+    sim.lattice = saved_lattice
+    p["x"][:], p["y"][:] = p.cold[:, FX], p.cold[:, FX + 1]
+    all_gid, all_forces = sim.comm.bcast((gid, forces))
+    sim.lists.set_owned_forces(all_forces[np.searchsorted(all_gid, p["gid"])])
+    sim.lists.tally[:, LONGEST2] = state["longest2"]
+    sim._longest2 = state["longest2"]
+    sim.halo.refresh()
+    sim.tables_changed()
+    sim.refresh_tables()

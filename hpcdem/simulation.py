@@ -1,0 +1,494 @@
+"""The simulation: state, one step, and the rebuild of the contact lists. The page on which the method can be read.
+
+State is either *closed* (sorted, ghosts in place, lists built: ready to step) or *open* (owned particles and their
+contact histories only: free to be added to or thinned out). Commands that change who is there open it; the next cycle
+closes it again. Everything that decides the order of arithmetic comes from global values and is part of the state:
+see `Lattice`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.clock import Clock
+from hpcdem.decomp import balance, strips
+from hpcdem.errors import CommandError, PhysicsError, UsageError
+from hpcdem.fields import FX, RADIUS, TORQUE, X, Y
+from hpcdem.halo.comm import SerialComm
+from hpcdem.halo.exchange import connect
+from hpcdem.halo.migrate import migrate, migrate_ragged
+from hpcdem.model.materials import BOND_TYPE, MATERIAL, PropertyTable
+from hpcdem.model.particles import Particles
+from hpcdem.model.settings import Settings
+from hpcdem.model.walls import Walls
+from hpcdem.physics.dem import contacts, mass, motion, neighbours
+from hpcdem.physics.dem import walls as wall_kernels
+from hpcdem.physics.dem.neighbours import Histories
+from hpcdem.timers import Timers
+
+NARROW, WIDE = 0.2, 0.4
+"""Skin over the largest radius, at rest and in fast motion."""
+LONGEST_WATCH = 64
+"""Most steps between two looks at how far particles have moved."""
+LARGEST_STRIDE = 0.5
+"""A particle that moves more than this fraction of its radius in one step stops the run."""
+
+
+@dataclass
+class Lattice:
+    """What the order of particles and the moment of the next rebuild depend on; global, saved in checkpoints.
+
+    side h of the cells [m], skin [m], longest bond [m] as last seen, steps since the lists were built, steps to the next
+    look at the motion, steps between the last two looks, lists that came late.
+    """
+
+    side: float = 0.0
+    skin: float = 0.0
+    skin_factor: float = NARROW
+    bond_reach: float = 0.0
+    age: int = 0
+    countdown: int = 1
+    pace: int = 1
+    late: int = 0
+
+
+class Simulation:
+    """One model on one communicator.
+
+    comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never stopped).
+    """
+
+    def __init__(
+        self,
+        comm: Any = None,
+        threads: int = 1,
+        outdir: Path | str = "data",
+        log: Any = None,
+        stop: Any = None,
+        balance_on: bool = True,
+    ) -> None:
+        self.comm = comm if comm is not None else SerialComm()
+        self.threads = threads
+        self.outdir = Path(outdir)
+        self.run_folder = self.outdir.parent
+        self.folder_made = False
+        self.log, self.stop = log, stop
+        self.balance_on = balance_on
+        self.timers = Timers()
+        self.script = ""
+        self.position = 0
+        self.line = 0
+        self.clear()
+
+    def clear(self) -> None:
+        """Start a new model: no particles, no walls, default settings, step 0."""
+        self.clock = Clock()
+        self.settings = Settings()
+        self.particles = Particles()
+        self.materials = PropertyTable(MATERIAL)
+        self.bond_types = PropertyTable(BOND_TYPE)
+        self.walls = Walls()
+        self.groups: list[str] = ["***"]
+        self.next_gid = 0
+        self.streams = 0
+        self.breaks = np.zeros(2, np.int64)
+        self.bonds = 0
+        self.history_wishes: dict[int, tuple[int, str]] = {}
+        self.plots: list[tuple[int, int]] = []
+        self.progress: dict | None = None
+        self.last_frame: tuple[int, bool] | None = None
+        self.series_open: set[str] = set()
+        self.restarted = False
+        self.lattice = Lattice()
+        self.hist: Histories | None = Histories.empty(0)
+        self.lists: neighbours.ContactLists | None = None
+        self.halo: Any = None
+        self.borders: np.ndarray | None = None
+        self.origin = np.empty((0, 2))
+        self.rebuilds = 0
+        self._wants_balance = True
+        self._busy_mark, self._balance_step = 0.0, 0
+        self._longest2 = 0.0
+        self._border_side = 1.0
+        self._tables_stale = True
+
+    def release(self) -> None:
+        """Give back what MPI holds for this simulation."""
+        if self.halo is not None:
+            self.halo.close()
+
+    # ---- one step ------------------------------------------------------------------------------------------------
+
+    def step(self) -> int:
+        """Advance everything by one dt. The same text on one rank and on a thousand.
+
+        Returns what the outside asked for (0 nothing, 1 save, 2 save and stop), agreed by all ranks.
+        """
+        timers, request = self.timers, 0
+        with timers("move"):
+            self._move(self.lists.n_blocks, *self._move_args)
+            self.walls.move(self.clock.dt)
+        self.lattice.age += 1
+        self.lattice.countdown -= 1
+        stale = False
+        if self.lattice.countdown == 0:
+            with timers("reduce"):
+                stale, request = self._look()
+        if stale:
+            self.rebuild()
+        else:
+            with timers("halo"):
+                self.halo.refresh()
+        with timers("force"):
+            self._forces()
+        self.clock.tick()
+        return request
+
+    def _forces(self) -> None:
+        """Contact, bond and wall forces at the present positions."""
+        lists = self.lists
+        self._pair_forces(lists.n_blocks, *self._pair_args)
+        if len(lists.slot_row):
+            self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
+            self._wall_forces(lists.n_blocks, *self._wall_args)
+
+    def _look(self) -> tuple[bool, int]:
+        """How far has anyone gone since the lists were built? Sets the step of the next look.
+
+        Returns (lists must be rebuilt now, request from outside). One reduction; only global maxima enter.
+        """
+        lattice, dt = self.lattice, self.clock.dt
+        found = np.zeros(5)
+        p = self.particles
+        motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, found)
+        found[4] = self.stop.local_request() if self.stop is not None else 0
+        self.comm.max_into(found)
+        if found[motion.BROKEN] or found[motion.STRIDE] > LARGEST_STRIDE:
+            self._stop_on_runaway(bool(found[motion.BROKEN]))
+        wall_speed = float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
+        path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
+        stride = max(math.sqrt(found[motion.SPEED2]), wall_speed) * dt
+        room = 0.5 * lattice.skin - path
+        if room < 0.0:
+            lattice.late += 1
+        stale = room < stride
+        if stale:
+            room = 0.5 * lattice.skin
+        # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
+        fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
+        wait = min(LONGEST_WATCH, 2 * lattice.pace)
+        if stride > 0.0:
+            wait = min(wait, int(0.5 * room / stride))
+        if fall > 0.0:
+            wait = min(wait, int(math.sqrt(0.5 * room / fall)))
+        lattice.pace = lattice.countdown = max(1, wait)
+        return stale, int(found[4])
+
+    def look_soon(self) -> None:
+        """Speeds or the time step were changed by a command: look at the motion at the next step."""
+        self.lattice.countdown = self.lattice.pace = 1
+
+    # ---- lists, ghosts, ownership --------------------------------------------------------------------------------
+
+    def rebuild(self) -> None:
+        """New ownership, order, ghosts and lists at the present positions. Forces are not kept."""
+        with self.timers("neighbour"):
+            self._open_lists()
+        self._close()
+
+    def open(self) -> None:
+        """Make the model free to be changed: owned particles, their histories and forces only."""
+        if self.lists is None:
+            return
+        self.particles.cold[:, FX : TORQUE + 1] = self.lists.owned_forces()
+        self._open_lists()
+
+    def _open_lists(self) -> None:
+        p = self.particles
+        self._harvest()
+        self._longest2 = self.lists.longest_bond2()
+        self.hist = self.lists.histories(p.ihot)
+        self.halo.close()
+        p.set_owned(p.hot[p.owned].copy(), p.cold)
+        self.lists = None
+
+    def _harvest(self) -> None:
+        """Take over what the force loops counted."""
+        self.breaks += self.uncollected_breaks()
+        self.lists.tally[:, [contacts.TENSION_BREAKS, contacts.SHEAR_BREAKS]] = 0.0
+
+    def close(self, least_skin: float = 0.0) -> None:
+        """Make the model ready to step: lists and ghosts at the present positions, stored forces in place.
+
+        least_skin [m]: pairs up to this gap will be in the lists, if the model was open.
+        """
+        if self.lists is None:
+            self._close(least_skin=least_skin)
+            self.lists.set_owned_forces(self.particles.cold[:, FX : TORQUE + 1])
+        self.refresh_tables()
+        self.halo.refresh()
+
+    def _close(self, frozen: bool = False, least_skin: float = 0.0) -> None:
+        """From open to closed. frozen: keep the lattice as it is (restart); least_skin [m]: bond search."""
+        with self.timers("neighbour"):
+            self._choose_lattice(frozen, least_skin)
+            self._drop_outside_box()
+        self._share_out()
+        with self.timers("neighbour"):
+            p, lattice = self.particles, self.lattice
+            cx, cy = strips.cells(p["x"], p["y"], lattice.side)
+            order = strips.global_order(cx, cy, p["gid"])
+            hot, cold = p.hot[order], p.cold[order]
+            hist = self.hist.take(order)
+        with self.timers("halo"):
+            storage, self.halo = connect(self.comm, hot, cx[order], self.borders)
+        with self.timers("neighbour"):
+            p.place(storage, cold, self.halo.n_left)
+            cx, cy = strips.cells(storage[:, X], storage[:, Y], lattice.side)
+            self.origin = p.positions()
+            self.walls.travel[:] = 0.0
+            self._wall_table = self.walls.table()
+            self.lists = neighbours.build(
+                storage, cx, cy, p.n_left, p.n_own, hist, self._wall_table, lattice.skin,
+                min(lattice.side, lattice.bond_reach + lattice.skin), self.threads,
+            )  # fmt: skip
+            self._count_bonds(hist)
+            self.hist = None
+            lattice.age = 0
+            self.rebuilds += 1
+            self._tables_stale = True
+            self.refresh_tables()
+
+    def _count_bonds(self, hist: Histories) -> None:
+        """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
+        found = np.array([np.count_nonzero(hist.bond), self.lists.bonds_placed], np.int64)
+        self.comm.sum_into(found)
+        if found[0] != 2 * found[1]:
+            raise PhysicsError(
+                f"step {self.clock.step}: {found[0] // 2 - found[1]} bonds were lost when the lists were rebuilt; "
+                f"longest bond {self.lattice.bond_reach:g} m, column {self.lattice.side:g} m"
+            )
+        self.bonds = int(found[1])
+
+    def _choose_lattice(self, frozen: bool, least_skin: float) -> None:
+        """Skin and cell side for the next lists, from global values only."""
+        lattice, p = self.lattice, self.particles
+        seen = np.array([p["radius"].max() if len(p) else 0.0, self._longest2])
+        self.comm.max_into(seen)
+        self.largest_radius = float(seen[0])
+        if frozen:
+            return
+        lattice.bond_reach = math.sqrt(seen[1])
+        if 0 < lattice.age < 15:
+            lattice.skin_factor = WIDE
+        elif lattice.age > 60:
+            lattice.skin_factor = NARROW
+        lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
+        side = 2.0 * self.largest_radius + lattice.skin
+        while side < lattice.bond_reach + lattice.skin:
+            side *= 1.05  # in steps, so that the lattice seldom changes
+        lattice.side = side if side > 0.0 else 1.0
+
+    def _drop_outside_box(self) -> None:
+        """Particles whose centre has left the BOX are deleted, with a line in the log."""
+        box = self.walls.box()
+        if box is None:
+            return
+        left, right, bottom, top = box
+        x, y = self.particles["x"], self.particles["y"]
+        inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+        if not self.comm.any(not inside.all()):
+            return
+        p = self.particles
+        gone = [(int(g), float(a), float(b)) for g, a, b in zip(p["gid"][~inside], x[~inside], y[~inside], strict=True)]
+        everyone = sorted(row for part in self.comm.allgather(gone) for row in part)
+        self.remove(~inside)
+        if self.log is not None:
+            some = "; ".join(f"{g} at ({a:g}, {b:g})" for g, a, b in everyone[:10])
+            self.log.info(f"step {self.clock.step}: {len(everyone)} particles left the BOX and were deleted: {some}")
+
+    def remove(self, which: np.ndarray) -> int:
+        """Delete the flagged owned particles (n_own,) bool and all memory of them. The model must be open. Collective.
+
+        Returns how many went, over all ranks.
+        """
+        gone = np.concatenate(self.comm.allgather(self.particles["gid"][which].copy()))
+        if not len(gone):
+            return 0
+        self.hist = self.hist.take(np.flatnonzero(~which))
+        self.hist = self.hist.keep(~np.isin(self.hist.partner, gone))
+        self.particles.keep(~which)
+        self._wants_balance = True
+        return len(gone)
+
+    def _share_out(self) -> None:
+        """Move borders if it pays, then send every particle and its histories to the owner of its column."""
+        p, side = self.particles, self.lattice.side
+        cx, _ = strips.cells(p["x"], p["y"], side)
+        with self.timers("balance"):
+            self._move_borders(cx)
+        with self.timers("migrate"):
+            owner = strips.owner_of(cx, self.borders)
+            rows = np.concatenate([p.hot[p.owned], p.cold], axis=1)
+            counts, entries = migrate_ragged(self.comm, owner, self.hist.counts(), self.hist.rows())
+            (rows,) = migrate(self.comm, owner, rows)
+            p.set_owned(np.ascontiguousarray(rows[:, :8]), np.ascontiguousarray(rows[:, 8:]))
+            self.hist = Histories.from_rows(counts, entries)
+
+    def _move_borders(self, cx: np.ndarray) -> None:
+        """Choose strip borders. Wall-clock timings enter here and only here: borders never change a result."""
+        comm, side, now = self.comm, self.lattice.side, self.clock.step
+        if comm.size == 1:
+            self.borders, self._border_side = np.array([0, 1]), side
+            return
+        if self.borders is None:
+            self._wants_balance = True
+        elif self._border_side != side:
+            self.borders = strips.separate(np.rint(self.borders * (self._border_side / side)).astype(np.int64))
+        self._border_side = side
+        weight = 1.0
+        if not self._wants_balance:
+            if not self.balance_on or now - self._balance_step < balance.PATIENCE:
+                return
+            busy = self.timers.seconds() - self._busy_mark
+            measured = np.array(comm.allgather((busy, len(cx))))
+            self._busy_mark, self._balance_step = self.timers.seconds(), now
+            if balance.imbalance(measured[:, 0]) < balance.TOLERANCE:
+                return
+            weight = float(balance.cost_per_particle(measured[:, 0], measured[:, 1])[comm.rank])
+        ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
+        comm.max_into(ends)
+        first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
+        if columns < 1:
+            first, columns = 0, 1
+        self._refuse_too_many_ranks(first, columns)
+        cost = np.zeros(min(columns, 1 << 24))
+        np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)
+        comm.sum_into(cost)
+        self.borders = strips.cut(comm.bcast(cost), first, comm.size)
+        self._wants_balance = False
+        self._busy_mark, self._balance_step = self.timers.seconds(), now
+
+    def _refuse_too_many_ranks(self, first: int, columns: int) -> None:
+        """A rank without a column of its own in the whole model is a mistake of the launch."""
+        if self.rebuilds:
+            return
+        box, side = self.walls.box(), self.lattice.side
+        if box is not None:
+            columns = max(columns, math.ceil(box[1] / side) - math.floor(box[0] / side))
+        if columns < self.comm.size:
+            raise UsageError(
+                f"{self.comm.size} ranks are too many for this model: it is {columns} columns of {side:g} m wide "
+                f"(largest contact or bond plus skin), so at most {columns} ranks fit; start it with fewer"
+            )
+
+    def broken(self) -> tuple[int, int]:
+        """Bonds broken so far in tension and in shear. Collective."""
+        total = self.breaks.copy()
+        if self.lists is not None:
+            total += self.uncollected_breaks()
+        self.comm.sum_into(total)
+        return int(total[0]), int(total[1])
+
+    def uncollected_breaks(self) -> np.ndarray:
+        """Breaks counted by the force loops of this rank since the lists were built (tension, shear)."""
+        return self.lists.tally[:, [contacts.TENSION_BREAKS, contacts.SHEAR_BREAKS]].sum(axis=0).astype(np.int64)
+
+    def bonds_left(self) -> int:
+        """Bonds that hold. Collective."""
+        if self.lists is None:
+            return self.bonds
+        return self.bonds - int(self.comm.sum_into(self.uncollected_breaks().sum(keepdims=True))[0])
+
+    # ---- tables and parameters of the kernels --------------------------------------------------------------------
+
+    def tables_changed(self) -> None:
+        """Materials, bond types, walls or the mass rule were changed by a command."""
+        self._tables_stale = True
+
+    def refresh_tables(self) -> None:
+        """Masses, law tables and argument lists of the kernels, from materials, walls and settings."""
+        if not self._tables_stale or self.lists is None:
+            return
+        p, s, lists = self.particles, self.settings, self.lists
+        rows, n_mat = self.materials.rows, len(self.materials)
+        r, mat = p["radius"], p["material"]
+        body = np.zeros((p.n_own, 4))
+        body[:, 0] = rows["density"][mat] * mass.volume(r, s.disk)
+        body[:, 1] = mass.inertia(body[:, 0], r, s.disk)
+        body[:, 2] = rows["damp"][mat]
+        self.body = body
+        self.pair_laws = contacts.pair_table(rows)
+        self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
+        self.bond_laws = self.bond_types.as_floats()
+        self._wall_table = self.walls.table()
+        threaded = lists.n_blocks > 1
+        self._move = motion.move_threaded if threaded else motion.move
+        self._pair_forces = contacts.forces_threaded if threaded else contacts.forces
+        self._wall_forces = wall_kernels.forces_threaded if threaded else wall_kernels.forces
+        dt, b = self.clock.dt, lists.blocks
+        self._move_args = (
+            p.hot, p.cold, p.icold, p.n_left, b.cut, b.lo, b.foff, lists.force, body, s.gx, s.gy, s.lsm, dt,
+        )  # fmt: skip
+        self._pair_args = (
+            p.hot, p.ihot, *b, lists.ptr, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
+            self.pair_laws, self.bond_laws, n_mat, dt, mass.SPHERES[s.disk], lists.tally,
+        )  # fmt: skip
+        self._wall_args = (
+            p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, self._wall_table, lists.slot_row, lists.slot_wall,
+            lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,
+        )  # fmt: skip
+        self._tables_stale = False
+
+    def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
+        """Which rows of a property table occur among these owned row numbers, on any rank; (rows,) bool. Collective."""
+        flags = np.zeros(len(table), np.int64)
+        flags[column] = 1
+        return self.comm.max_into(flags).astype(bool)
+
+    def count(self, n: int) -> int:
+        """Sum of an integer over the ranks. Collective."""
+        return int(self.comm.sum_into(np.array([n], dtype=np.int64))[0])
+
+    def extents(self) -> dict[str, float]:
+        """{left} {right} {bottom} {top} of the particles that are not fixed in both x and y [m]. Collective."""
+        p = self.particles
+        free = (p["fix"] & 3) != 3
+        x, y, r = p["x"][free], p["y"][free], p["radius"][free]
+        ends = np.full(4, -np.inf)
+        if len(x):
+            ends[:] = -(x - r).min(), (x + r).max(), -(y - r).min(), (y + r).max()
+        self.comm.max_into(ends)
+        if not np.isfinite(ends).all():
+            raise CommandError("{left}, {right}, {bottom}, {top} need at least one free particle")
+        return {"left": -ends[0], "right": ends[1], "bottom": -ends[2], "top": ends[3]}
+
+    def group_number(self, name: str) -> int:
+        """Row of a group name, made if need be (on all ranks alike)."""
+        if name not in self.groups:
+            self.groups.append(name)
+        return self.groups.index(name)
+
+    def _stop_on_runaway(self, broken: bool) -> None:
+        """Name the particles that cannot be right, and stop on all ranks."""
+        p, dt = self.particles, self.clock.dt
+        hot = p.hot[p.owned]
+        speed = np.hypot(p["vx"], p["vy"])
+        with np.errstate(invalid="ignore"):
+            bad = ~np.isfinite(hot[:, :5]).all(axis=1) | ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
+        mine = [(int(p["gid"][c]), *map(float, hot[c, :4]), self.comm.rank) for c in np.flatnonzero(bad)[:10]]
+        rows = sorted(row for part in self.comm.allgather(mine) for row in part)[:10]
+        total = self.count(int(bad.sum()))
+        what = "a number is not finite" if broken else "a particle moves over half its radius per step"
+        places = "\n".join(
+            f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}" for g, x, y, vx, vy, rank in rows
+        )
+        raise PhysicsError(
+            f"step {self.clock.step}: {what} ({total} particles); the time step {dt:g} s is probably too large, "
+            f"or particles were made overlapping\n{places}"
+        )
