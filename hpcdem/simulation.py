@@ -83,10 +83,12 @@ class Simulation:
         self.script = ""
         self.position = 0
         self.line = 0
+        self.halo: Any = None
         self.clear()
 
     def clear(self) -> None:
         """Start a new model: no particles, no walls, default settings, step 0."""
+        self.release()
         self.clock = Clock()
         self.settings = Settings()
         self.particles = Particles()
@@ -107,7 +109,6 @@ class Simulation:
         self.lattice = Lattice()
         self.hist: Histories | None = Histories.empty(0)
         self.lists: neighbours.ContactLists | None = None
-        self.halo: Any = None
         self.borders: np.ndarray | None = None
         self.origin = np.empty((0, 2))
         self.rebuilds = 0
@@ -121,6 +122,7 @@ class Simulation:
         """Give back what MPI holds for this simulation."""
         if self.halo is not None:
             self.halo.close()
+        self.halo = None
 
     # ---- one step ------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,30 @@
+"""A tiny run that calls every kernel once, so that they are compiled before anyone waits for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hpcdem.commands import bonds, particles, properties, running, settings, walls
+from hpcdem.halo.comm import SerialComm
+from hpcdem.selection import Ids
+from hpcdem.simulation import Simulation
+
+
+def rehearse(threads: int = 1) -> None:
+    """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = Simulation(SerialComm(), threads=threads, outdir=Path("."))
+    particles.start(sim)
+    settings.set_option(sim, "dt", 1e-4)
+    walls.box(sim, -10.0, 10.0, -10.0, 20.0)
+    walls.wall(sim, 0, ((-5.0, 0.0), (5.0, 0.0)), fric=0.3)
+    particles.gen_grid(sim, [0.5], (-2.0, 2.0), (-0.1, 2.0))
+    particles.gen(sim, 2, [0.5], (3.0, 6.0), (1.0, 6.0))
+    properties.prop(sim, density=1.0, shear=1e3, poiss=0.2, hertz=True)
+    running.prepare(sim)
+    sim.step()
+    bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
+    bonds.break_bonds(sim, Ids(0, 1))
+    settings.set_option(sim, "frac", 0.1)
+    running.prepare(sim)
+    sim.rebuild()
+    sim.step()
