@@ -21,7 +21,7 @@ from hpcdem.errors import CommandError, PhysicsError, UsageError
 from hpcdem.fields import FX, RADIUS, TORQUE, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
-from hpcdem.halo.migrate import migrate, migrate_ragged
+from hpcdem.halo.migrate import Migration
 from hpcdem.model.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.model.particles import Particles
 from hpcdem.model.settings import Settings
@@ -335,12 +335,11 @@ class Simulation:
         with self.timers("balance"):
             self._move_borders(cx)
         with self.timers("migrate"):
-            owner = strips.owner_of(cx, self.borders)
-            rows = np.concatenate([p.hot[p.owned], p.cold], axis=1)
-            counts, entries = migrate_ragged(self.comm, owner, self.hist.counts(), self.hist.rows())
-            (rows,) = migrate(self.comm, owner, rows)
-            p.set_owned(np.ascontiguousarray(rows[:, :8]), np.ascontiguousarray(rows[:, 8:]))
-            self.hist = Histories.from_rows(counts, entries)
+            migration = Migration(self.comm, strips.owner_of(cx, self.borders))
+            if migration.nobody:
+                return
+            self.hist = Histories.from_rows(*migration.move_ragged(self.hist.counts(), self.hist.rows()))
+            p.set_owned(migration.move(p.hot[p.owned]), migration.move(p.cold))
 
     def _move_borders(self, cx: np.ndarray) -> None:
         """Choose strip borders. Wall-clock timings enter here and only here: borders never change a result."""

@@ -7,21 +7,38 @@ from typing import Any
 import numpy as np
 
 
-def migrate(comm: Any, owner: np.ndarray, *tables: np.ndarray) -> list[np.ndarray]:
-    """Hand row i of each table (n, ...) to rank owner[i]; returns this rank's new rows of each table, in no fixed order
-    (but the same order in all). Collective."""
-    if comm.size == 1:
-        return list(tables)
-    order = np.argsort(owner, kind="stable")
-    cuts = np.searchsorted(owner[order], np.arange(1, comm.size))
-    return [np.concatenate(comm.alltoallv(np.split(table[order], cuts))) for table in tables]
+class Migration:
+    """One change of ownership: row i of any per-particle table goes to rank owner[i].
 
+    Rows that stay are not copied through MPI. The new rows are [stayed | arrived from rank 0, 1, ...], the same order in
+    every table.
+    """
 
-def migrate_ragged(comm: Any, owner: np.ndarray, counts: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same for rows of which particle i has counts[i] (CSR order), in the order `migrate` uses."""
-    if comm.size == 1:
-        return counts, rows
-    return (
-        migrate(comm, owner, counts)[0],
-        migrate(comm, np.repeat(owner, counts), rows)[0],
-    )
+    def __init__(self, comm: Any, owner: np.ndarray) -> None:
+        self.comm = comm
+        self.stay = np.flatnonzero(owner == comm.rank)
+        leave = np.flatnonzero(owner != comm.rank)
+        self.leave = leave[np.argsort(owner[leave], kind="stable")]
+        self.cuts = np.searchsorted(owner[self.leave], np.arange(1, comm.size))
+        self.nobody = not comm.any(len(leave) > 0)
+
+    def move(self, table: np.ndarray) -> np.ndarray:
+        """This rank's new rows of a table (n, ...). Collective."""
+        if self.nobody:
+            return table
+        arrived = self.comm.alltoallv(np.split(table[self.leave], self.cuts))
+        return np.concatenate([table[self.stay], *arrived])
+
+    def move_ragged(self, counts: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same for rows of which particle i has counts[i], one particle after the other. Collective."""
+        if self.nobody:
+            return counts, rows
+        first = np.cumsum(counts) - counts
+
+        def entries(of: np.ndarray) -> np.ndarray:
+            n = counts[of]
+            return rows[np.repeat(first[of] - (np.cumsum(n) - n), n) + np.arange(n.sum())]
+
+        cuts = np.concatenate(([0], np.cumsum(counts[self.leave])))[self.cuts]
+        arrived = self.comm.alltoallv(np.split(entries(self.leave), cuts))
+        return self.move(counts), np.concatenate([entries(self.stay), *arrived])

@@ -323,11 +323,12 @@ def build(
 
 def _wall_slots(lists: ContactLists, hot: np.ndarray, hist: Histories, walls: np.ndarray, skin: float) -> None:
     """Slots of particles near walls, with their histories."""
-    none = np.empty(0, np.int64)
-    args = (hot, lists.n_left, lists.n_own, walls, skin, hist.ptr, hist.partner)
-    n = wall_kernels.near(*args, none, none, True)
-    lists.slot_row, lists.slot_wall = np.empty(n, np.int64), np.empty(n, np.int64)
-    wall_kernels.near(*args, lists.slot_row, lists.slot_wall, False)
+    n = room = lists.n_own // 4 + 64
+    while n >= room:
+        room = n + 64
+        rows, which = np.empty(room, np.int64), np.empty(room, np.int64)
+        n = wall_kernels.near(hot, lists.n_left, lists.n_own, walls, skin, hist.ptr, hist.partner, rows, which)
+    lists.slot_row, lists.slot_wall = rows[:n].copy(), which[:n].copy()
     lists.slot_fs, lists.slot_side, lists.new_side = np.zeros(n), np.zeros(n), np.zeros(n)
     old = np.flatnonzero(hist.partner < 0)
     if len(old):
