@@ -31,8 +31,10 @@ from hpcdem.physics.dem import walls as wall_kernels
 from hpcdem.physics.dem.neighbours import Histories
 from hpcdem.timers import Timers
 
-NARROW, WIDE = 0.2, 0.4
+NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
+SHORT_LIVED, LONG_LIVED = 60, 200
+"""Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
 LONGEST_WATCH = 64
 """Most steps between two looks at how far particles have moved."""
 LARGEST_STRIDE = 0.5
@@ -286,9 +288,9 @@ class Simulation:
         if frozen:
             return
         lattice.bond_reach = math.sqrt(seen[1])
-        if 0 < lattice.age < 15:
+        if 0 < lattice.age < SHORT_LIVED:
             lattice.skin_factor = WIDE
-        elif lattice.age > 60:
+        elif lattice.age > LONG_LIVED:
             lattice.skin_factor = NARROW
         lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
         side = 2.0 * self.largest_radius + lattice.skin

@@ -104,7 +104,7 @@ def gen(
 ) -> int:
     """GEN num: random insertion without overlap into a rectangle; returns the number of particles made.
 
-    Gives up after SET gentry (2.25) attempts per particle asked for: scripts ask for far more than fit.
+    Gives up after SET gentry (2.75) attempts per particle asked for: scripts ask for far more than fit.
     """
     _check_radii(radii, x, y)
     existing = _everyone(sim)

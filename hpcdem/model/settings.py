@@ -22,5 +22,5 @@ class Settings:
     vtk: int = 0
     seed: int = 1
     wallside: str = "both"
-    gentry: float = 2.25
+    gentry: float = 2.75
     outdir: str = "data"

@@ -1,0 +1,22 @@
+"""The clock of a model: which step, what time, how long a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Clock:
+    """Step number, model time [s] and time step [s].
+
+    The time is the sum of the steps taken: a script may change dt on its way, so it is not ``step * dt``.
+    """
+
+    step: int = 0
+    time: float = 0.0
+    dt: float = 0.0
+
+    def tick(self) -> None:
+        """One step of length dt has been done."""
+        self.step += 1
+        self.time += self.dt

@@ -1,0 +1,133 @@
+"""What every picture of a frame needs to know: the part of the plane to show, its unit, and where the ticks go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.io.frame import Frame
+
+UNITS = ((1000.0, 1000.0, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (0.0, 0.001, "mm"))
+"""Smallest longer side [m], length of the unit [m], its name."""
+
+
+@dataclass(frozen=True)
+class Ticks:
+    """Places of major and minor ticks along one axis, in its unit."""
+
+    major: list[float]
+    minor: list[float]
+
+    @property
+    def labels(self) -> list[str]:
+        """The numbers at the major ticks."""
+        return [number(v) for v in self.major]
+
+
+@dataclass(frozen=True)
+class View:
+    """The rectangle shown [m], and the unit of its axes."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @property
+    def width(self) -> float:
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        return self.top - self.bottom
+
+    @property
+    def unit(self) -> tuple[float, str]:
+        """Length in metres and name of the axes' unit."""
+        longer = max(self.width, self.height)
+        return next((size, name) for least, size, name in UNITS if longer >= least)
+
+    def ticks(self) -> tuple[Ticks, Ticks]:
+        """The ticks of the x and the y axis.
+
+        Both go in the same steps, three to eight of them along the longer side; the other axis takes smaller steps
+        where it would have a single number.
+        """
+        size = self.unit[0]
+        sides = (self.left / size, self.right / size), (self.bottom / size, self.top / size)
+        longer = max(self.width, self.height) / size
+        common = next(step for step in _round_steps(longer) if longer / step <= 7.0)
+        x, y = (_ticks(low, high, common) for low, high in sides)
+        return x, y
+
+
+def view(frame: Frame, extent: tuple[float, float, float, float] | None = None) -> View:
+    """The view of a frame whose tables are whole, or whose particles have the given extent.
+
+    With a BOX: the BOX and all walls (no particle leaves them). Otherwise the walls and the particles.
+    extent: left, right, bottom, top of all particles [m], for a frame of which this rank holds a part.
+    """
+    points = [np.asarray(frame.walls[p], dtype=float).reshape(-1, 2) for p in ("p1", "p2") if p in frame.walls]
+    box = [float(frame.settings.get(k, "nan")) for k in ("left", "right", "bottom", "height")]
+    boxed = all(map(math.isfinite, box)) and box[1] > box[0] and box[3] > box[2]
+    if boxed:
+        points.append(np.array([[box[0], box[2]], [box[1], box[3]]]))
+    else:
+        extent = particle_extent(frame) if extent is None else extent
+        points.append(np.array([extent[0::2], extent[1::2]]))
+    corners = np.concatenate(points)
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if len(corners) == 0:
+        return View(0.0, 1.0, 0.0, 1.0)
+    left, bottom = (float(v) for v in corners.min(axis=0))
+    right, top = (float(v) for v in corners.max(axis=0))
+    if len(points[0]) == 0 and not boxed:  # nothing that bounds the particles: give them air
+        air = 0.02 * max(right - left, top - bottom)
+        left, right, bottom, top = left - air, right + air, bottom - air, top + air
+    pad = 0.05 * max(right - left, top - bottom) or 1.0
+    if right - left < pad:
+        left, right = left - pad, right + pad
+    if top - bottom < pad:
+        top = top + pad
+    return View(left, right, bottom, top)
+
+
+def particle_extent(frame: Frame) -> tuple[float, float, float, float]:
+    """Left, right, bottom, top of this rank's particles [m]; infinite the wrong way round if it has none."""
+    columns = frame.tables["particles"].columns
+    x, y, r = (np.asarray(columns.get(k, np.zeros(0))) for k in ("x", "y", "radius"))
+    return (
+        float(np.min(x - r, initial=np.inf)),
+        float(np.max(x + r, initial=-np.inf)),
+        float(np.min(y - r, initial=np.inf)),
+        float(np.max(y + r, initial=-np.inf)),
+    )
+
+
+def _round_steps(length: float) -> Iterator[float]:
+    """1, 2 and 5 times powers of ten, from small against `length` to twice as long."""
+    power = 10.0 ** (math.floor(math.log10(length)) - 2)
+    for _ in range(4):
+        yield from (power, 2.0 * power, 5.0 * power)
+        power *= 10.0
+
+
+def _ticks(low: float, high: float, major: float) -> Ticks:
+    if len(_multiples(low, high, major)) < 2:
+        major = max((s for s in _round_steps(high - low) if len(_multiples(low, high, s)) >= 2), default=major)
+    minor = major / {"1": 10.0, "2": 4.0, "5": 5.0}[f"{major:e}"[0]]
+    return Ticks(_multiples(low, high, major), _multiples(low, high, minor))
+
+
+def _multiples(low: float, high: float, step: float) -> list[float]:
+    """Multiples of `step` from low to high, ends included."""
+    first, last = math.ceil(low / step - 1e-6), math.floor(high / step + 1e-6)
+    return [k * step for k in range(first, last + 1)]
+
+
+def number(value: float) -> str:
+    """A tick's number as short as it is."""
+    return f"{value:.6g}" if abs(value) > 1e-9 else "0"

@@ -1,0 +1,417 @@
+"""Frames as the text files ``all_<step>.dat`` of ZDEM, written and read.
+
+The layout is that of ZDEM 2.2 as far as a public file of that version (`data/all_0000007000.dat` in the GitHub
+repository Phoenix0531-sudo/ZDEM_Area_Conservation) and the public readers show it: the same section lines, table
+headers, order of sections, and the same column names where a quantity is the same. What differs or is worth
+knowing:
+
+- Columns of ZDEM that hpcdem has no quantity for are left out; columns of hpcdem follow at the end of a row.
+- ``globalFx globalFy`` is the force of particle id1 on id2, and of the particle on the wall, as in ZDEM; in a Frame
+  (and in VTKHDF) fx, fy is the force on id1, the opposite.
+- ``wall contact data`` stands before ``ball data``: a public reader takes every line after the last table for bonds.
+- The third ball table has ten columns, no more: the same reader takes column 10 of a longer row for a group name.
+- x and y have 13 significant digits, all else 9. Each table ends with one blank line; header words need not stand
+  over their columns, since some headers must begin with fixed text.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io.files import Section, explain, write_sections
+from hpcdem.io.frame import Frame, Table
+from hpcdem.io.textnum import INT, WORD, Column, TextTable, format_floats, sci
+
+WALL_HEAD = "     index         id      P1[0]"
+WALL_FORCE_HEAD = "     index         id         xF"
+BALL_HEAD = "     index         id                    x"
+BALL_DATA_HEAD = "     index         id            m"
+LINK_HEAD = "       id1        id2"
+
+_SETTINGS = ("left", "right", "bottom", "height", "gx", "gy", "disk", "frac", "lsm")
+_TABLES = ("particles", "contacts", "bonds", "wall_contacts")
+
+# --- writing ---------------------------------------------------------------------------------------------------
+
+
+def write_dat(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+    """Collective: write the frame to `path`, the same bytes for any number of ranks.
+
+    Columns a table does not have are written as nan (numbers) or 0 (flags, colours). Raises HpcdemError on all ranks.
+    """
+    write_sections(path, comm, lambda: _sections(frame, comm))
+
+
+def _sections(frame: Frame, comm: Any) -> list[Section]:
+    walls, particles = frame.walls, frame.tables["particles"]
+    n_walls = len(walls["id"])
+    index = np.arange(n_walls)
+    mine = slice(0, n_walls if comm.rank == 0 else 0)  # the wall table is the same on all ranks: rank 0 writes it
+    wall_words = {f"P{p}[{k}]": walls[f"p{p}"][:, k] for p in (1, 2) for k in (0, 1)}
+    wall_state = {
+        "xF": walls["force"][:, 0],
+        "yF": walls["force"][:, 1],
+        "kn": walls["kn"],
+        "ks": walls["ks"],
+        "fric": walls["fric"],
+        "xv": walls["v"][:, 0],
+        "yv": walls["v"][:, 1],
+    }
+
+    def wall_columns(floats: Mapping[str, np.ndarray], digits: int) -> list[tuple[Column, np.ndarray]]:
+        columns = [(Column("index", INT, 10), index[mine]), (Column("id", INT, 11), walls["id"][mine])]
+        return columns + [(sci(name, digits), np.asarray(v, dtype=float)[mine]) for name, v in floats.items()]
+
+    wall_state_columns = [*wall_columns(wall_state, 9), (Column("color", INT, 6), walls["color"][mine])]
+
+    get = _getter(particles)
+    rows = particles.offset + np.arange(len(particles))
+    ids = [(Column("index", INT, 10), rows), (Column("id", INT, 11), get("gid", int))]
+    fix = get("fix", int)
+    ball = [
+        *ids,
+        (sci("x", 13), get("x")),
+        (sci("y", 13), get("y")),
+        (sci("rad"), get("radius")),
+        (Column("color", INT, 7), get("color", int)),
+        (Column("fix_x", INT, 7), fix & 1),
+        (Column("fix_y", INT, 7), fix >> 1 & 1),
+        (Column("fix_w", INT, 7), fix >> 2 & 1),
+        (Column("hertz", INT, 7), get("hertz", int)),
+    ]
+    words = {"m": "mass", "fric": "fric", "damp": "damp", "kn": "kn", "ks": "ks", "poiss": "poiss", "shear": "shear"}
+    names = ["_".join(name.split()) or "***" for name in frame.group_names] or ["***"]
+    group = Column("group", WORD, max(13, 2 + max(len(name.encode()) for name in names)))
+    ball_data = [
+        *ids,
+        *[(sci(word), get(name)) for word, name in words.items()],
+        (sci("I"), get("inertia")),
+        (group, get("group", int)),
+    ]
+    words = {"V[0]": "vx", "V[1]": "vy", "spin": "spin", "Fx": "fx", "Fy": "fy", "M": "torque"}
+    words |= {"angle": "angle", "density": "density"}
+    ball_motion = [*ids, *[(sci(word), get(name)) for word, name in words.items()]]
+
+    get = _getter(frame.tables["wall_contacts"])
+    wall_row = get("wall", int)
+    wall_contact = [
+        (Column("wall_id", INT, 10), np.asarray(walls["id"])[wall_row] if n_walls else wall_row),
+        (Column("ball_id", INT, 11), get("id1", int)),
+        *_link_columns(get),
+    ]
+
+    def table(
+        columns: list[tuple[Column, np.ndarray]], head: str = "", words: list[str] | None = None
+    ) -> list[Section]:
+        columns = _wide_enough(columns, comm)
+        return [_header([c for c, _ in columns], head), TextTable(columns, words or ()), b"\n"]
+
+    sections: list[Section] = [_parameters(frame), f"wall data ...\nwall num : {n_walls}\n".encode()]
+    sections += table(wall_columns(wall_words, 13), WALL_HEAD)
+    sections += table(wall_state_columns, WALL_FORCE_HEAD)
+    sections += [b"wall contact data ...\n", *table(wall_contact)]
+    sections += [f"ball data ...\nball num : {particles.total}\n".encode(), *table(ball, BALL_HEAD)]
+    sections += table(ball_data, BALL_DATA_HEAD, names)
+    sections += table(ball_motion)
+    for name in ("contacts", "bonds"):
+        get = _getter(frame.tables[name])
+        columns = [(Column("id1", INT, 10), get("id1", int)), (Column("id2", INT, 11), get("id2", int))]
+        columns += _link_columns(get)
+        if name == "bonds":
+            columns += [(Column("kind", INT, 6), get("kind", int))]
+            columns += [(sci(w), get(c)) for w, c in _BOND_WORDS.items()]
+        sections += [f"{name[:-1]} data ...\n".encode(), *table(columns, LINK_HEAD)]
+    return sections
+
+
+_BOND_WORDS = {"ebmod": "ebmod", "gbmod": "gbmod", "tstr": "tstrength", "sstr": "sstrength"}
+
+
+def _link_columns(get: Callable[..., np.ndarray]) -> list[tuple[Column, np.ndarray]]:
+    values = {"Fn": get("fn"), "Fs": get("fs"), "globalFx": 0.0 - get("fx"), "globalFy": 0.0 - get("fy")}
+    values |= {"x": get("x"), "y": get("y"), "Un": get("overlap")}
+    return [(sci(word), v) for word, v in values.items()]
+
+
+def _getter(table: Table) -> Callable[..., np.ndarray]:
+    def get(name: str, kind: type = float) -> np.ndarray:
+        if name in table.columns:
+            return table.columns[name].astype(np.int64 if kind is int else np.float64, copy=False)
+        return np.full(len(table), np.nan) if kind is float else np.zeros(len(table), dtype=np.int64)
+
+    return get
+
+
+def _wide_enough(columns: list[tuple[Column, np.ndarray]], comm: Any) -> list[tuple[Column, np.ndarray]]:
+    """The integer columns widened to their largest number on any rank, with a blank in front."""
+    whole = [np.max(np.abs(v), initial=0) * (-10 if np.any(v < 0) else 1) for c, v in columns if c.kind == INT]
+    largest = comm.max_into(np.array([abs(w) for w in whole], dtype=np.int64))
+    widths = iter(len(str(w)) + 1 for w in largest)
+    return [(Column(c.name, INT, max(c.width, next(widths))), v) if c.kind == INT else (c, v) for c, v in columns]
+
+
+def _header(columns: list[Column], head: str) -> bytes:
+    """The names, right-aligned over their columns, after a beginning that must be exactly `head`."""
+    line, end = head, 0
+    skip = len(head.split())
+    for k, column in enumerate(columns):
+        end += column.width
+        if k >= skip:
+            line += column.name.rjust(max(end - len(line), len(column.name) + 1))
+    return line.encode() + b"\n"
+
+
+def _parameters(frame: Frame) -> bytes:
+    values: dict[str, Any] = {"program": "hpcdem", "current_step": int(frame.step), "current_time": float(frame.time)}
+    values |= {"dt": float(frame.dt), "ball_num": frame.tables["particles"].total}
+    values |= {name: frame.settings.get(name, np.nan) for name in _SETTINGS}
+    lines = ["parameter data ..."]
+    for name, value in values.items():
+        text = str(value) if isinstance(value, (str, int)) else format_floats(np.array([value]), 13)[0]
+        lines.append(f"{name}: {text}")
+    return ("\n".join(lines) + "\n\n").encode()
+
+
+# --- reading ---------------------------------------------------------------------------------------------------
+
+# Words of table headers, ours and ZDEM's of several versions, and the columns of a Frame they fill.
+_BALL_WORDS = {
+    "x": "x",
+    "y": "y",
+    "rad": "radius",
+    "r": "radius",
+    "color": "color",
+    "hertz": "hertz",
+    "m": "mass",
+    "fric": "fric",
+    "damp": "damp",
+    "kn": "kn",
+    "ks": "ks",
+    "poiss": "poiss",
+    "shear": "shear",
+    "I": "inertia",
+    "V[0]": "vx",
+    "V[1]": "vy",
+    "spin": "spin",
+    "Fx": "fx",
+    "Fy": "fy",
+    "M": "torque",
+    "angle": "angle",
+    "density": "density",
+}
+_LINK_WORDS = {"Fn": "fn", "Fs": "fs", "globalFx": "fx", "globalFy": "fy", "x": "x", "y": "y", "Un": "overlap"}
+_LINK_WORDS |= {"kind": "kind"} | _BOND_WORDS
+_TYPES = {
+    "gid": np.int64,
+    "id1": np.int64,
+    "id2": np.int64,
+    "wall": np.int32,
+    "color": np.int32,
+    "group": np.int32,
+    "hertz": np.int8,
+    "kind": np.int8,
+    "fix": np.uint8,
+}
+
+_RawTable = dict[str, np.ndarray]
+
+
+def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:
+    """The frame in a .dat file of hpcdem or ZDEM. Serial.
+
+    tables: names of the tables to read (all by default); the others come back empty, which saves most of the time.
+    Columns that the file does not have are absent from the table; columns not known here are passed over. Groups
+    are numbered in order of first appearance. Raises HpcdemError if the file is no such file or is cut off.
+    """
+    path = os.fspath(path)
+    try:
+        with open(path, "rb") as file:
+            data = file.read()
+    except OSError as failure:
+        if isinstance(failure, FileNotFoundError):
+            raise HpcdemError(f"cannot read {path}: there is no such file") from None
+        raise HpcdemError(explain(path, failure, "read")) from None
+    wanted = set(_TABLES if tables is None else tables)
+    parameters, raw, counts = _split(path, data.replace(b"\r\n", b"\n"), wanted)
+    if "current_step" not in parameters:
+        raise HpcdemError(f"cannot read {path}: it has no line current_step, so it is no frame of ZDEM or hpcdem")
+    try:
+        walls = _walls(raw.get("wall data", []))
+        particles, groups = _particles(raw.get("ball data", []))
+        columns = {
+            "particles": particles,
+            "contacts": _links(raw.get("contact data", [])),
+            "bonds": _links(raw.get("bond data", [])),
+            "wall_contacts": _wall_contacts(raw.get("wall contact data", []), walls["id"]),
+        }
+        frame = _frame(parameters, walls, groups, columns)
+    except (ValueError, KeyError, IndexError) as failure:
+        raise HpcdemError(f"cannot read {path}: {failure}") from None
+    for section, found in (("wall", len(walls["id"])), ("ball", len(particles.get("gid", ())))):
+        if counts.get(section, found) != found and (section != "ball" or "particles" in wanted):
+            raise HpcdemError(
+                f"cannot read {path}: {counts[section]} {section}s announced, {found} found; is it cut off?"
+            )
+    return frame
+
+
+def _frame(
+    parameters: dict[str, str], walls: dict[str, np.ndarray], groups: list[str], columns: dict[str, _RawTable]
+) -> Frame:
+    def number(key: str) -> float:
+        return float(parameters.get(key, "nan").split()[0])
+
+    gravity = parameters.get("gravity", "").split()
+    settings: dict[str, float | str] = {}
+    for name in _SETTINGS:
+        settings[name] = parameters[name].split("=")[0] if name == "disk" and name in parameters else number(name)
+    if gravity:
+        settings["gx"], settings["gy"] = ([0.0, *map(float, gravity)])[-2:]
+    if "damp LSM" in parameters:
+        settings["lsm"] = number("damp LSM")
+    if not isinstance(settings["disk"], str):
+        settings["disk"] = "off"
+    step, dt, time = int(number("current_step")), number("dt"), number("current_time")
+    tables = {name: Table(c, 0, len(next(iter(c.values()))) if c else 0) for name, c in columns.items()}
+    return Frame(step, step * dt if np.isnan(time) else time, dt, settings, walls, tables, groups)
+
+
+def _split(
+    path: str, data: bytes, wanted: set[str]
+) -> tuple[dict[str, str], dict[str, list[_RawTable]], dict[str, int]]:
+    """Parameters by key, raw tables by section, and the numbers of walls and balls announced."""
+    parameters: dict[str, str] = {}
+    raw: dict[str, list[_RawTable]] = {}
+    counts: dict[str, int] = {}
+    needed_by = {"ball": "particles", "contact": "contacts", "bond": "bonds", "wall contact": "wall_contacts"}
+    section, at = "", 0
+    while at < len(data):
+        end = data.find(b"\n", at)
+        end = len(data) if end < 0 else end
+        line = data[at:end].decode("utf-8", "replace").strip()
+        at = end + 1
+        if line.endswith(" data ..."):
+            section = line.removesuffix(" ...")
+        elif line.split()[:1] in (["index"], ["id1"], ["wall_id"]):
+            end = data.find(b"\n\n", at - 1)
+            end = len(data) if end < 0 else end
+            if section.startswith("wall data") or needed_by.get(section.removesuffix(" data")) in wanted:
+                raw.setdefault(section, []).append(_table(path, section, line.split(), data[at:end]))
+            at = end + 1
+        elif ":" in line:
+            key, _, value = line.partition(":")
+            if section == "parameter data":
+                parameters[key.strip()] = value.strip()
+            elif key.strip() in ("wall num", "ball num"):
+                counts[key.split()[0]] = int(value)
+    return parameters, raw, counts
+
+
+def _table(path: str, section: str, names: list[str], text: bytes) -> _RawTable:
+    """Columns by header word: float64, or bytes where they are not numbers."""
+    end = text.find(b"\n")
+    width = len(text[: end if end >= 0 else None].split())
+    if width == 0:
+        return {name: np.zeros(0) for name in names}
+    if "group" in names or "name" in names:
+        words = np.array(text.split())
+        if words.size % width == 0:
+            return {
+                name: w if name in ("group", "name") else w.astype(np.float64)
+                for name, w in zip(names, words.reshape(-1, width).T)
+            }
+        size = words.size
+    else:
+        numbers = np.fromstring(text.decode("ascii", "replace"), sep=" ")
+        size = numbers.size
+        if size % width == 0 and size >= width * text.rstrip().count(b"\n"):
+            return dict(zip(names, numbers.reshape(-1, width).T))
+    raise HpcdemError(f"cannot read {path}: a table of the section '{section}' has rows of unequal length")
+
+
+def _walls(raw: list[_RawTable]) -> dict[str, np.ndarray]:
+    words: _RawTable = {}
+    for table in raw:
+        words |= table
+    n = len(words.get("P1[0]", ()))
+
+    def get(*names: str) -> np.ndarray:
+        values = [words[name] if len(words.get(name, ())) == n else np.full(n, np.nan) for name in names]
+        return np.stack(values, axis=1) if len(values) > 1 else values[0]
+
+    color = get("color")
+    return {
+        "id": words["id"].astype(np.int64) if n else np.zeros(0, dtype=np.int64),
+        "p1": get("P1[0]", "P1[1]"),
+        "p2": get("P2[0]", "P2[1]"),
+        "kn": get("kn"),
+        "ks": get("ks"),
+        "fric": get("fric"),
+        "color": np.where(np.isnan(color), 5, color).astype(np.int32),
+        "v": get("xv", "yv"),
+        "force": get("xF", "yF"),
+    }
+
+
+def _particles(raw: list[_RawTable]) -> tuple[_RawTable, list[str]]:
+    if not raw:
+        return {}, ["***"]
+    gid = raw[0]["id"].astype(np.int64)
+    order = np.argsort(gid, kind="stable")
+    columns: _RawTable = {"gid": gid[order]}
+    names = np.full(len(gid), b"***", dtype="S3")
+    for table in raw:
+        own = table["id"].astype(np.int64)
+        if len(own) == 0 and len(gid):  # a header without rows
+            continue
+        rows = np.argsort(own, kind="stable")
+        if not np.array_equal(own[rows], columns["gid"]):
+            raise ValueError("the tables of 'ball data' do not list the same ids")
+        for word, name in _BALL_WORDS.items():
+            if word in table:
+                columns[name] = table[word][rows].astype(_TYPES.get(name, np.float64))
+        if "fix_x" in table:
+            fix = table["fix_x"] + 2 * table["fix_y"] + 4 * table["fix_w"]
+            columns["fix"] = fix[rows].astype(np.uint8)
+        if "group" in table:
+            names = table["group"][rows]
+    unique, first, inverse = np.unique(names, return_index=True, return_inverse=True)
+    rank = np.empty(len(unique), dtype=np.int32)
+    by_appearance = np.argsort(first)
+    rank[by_appearance] = np.arange(len(unique))
+    columns["group"] = rank[inverse.reshape(-1)]
+    return columns, [bytes(unique[k]).decode("utf-8", "replace") for k in by_appearance]
+
+
+def _links(raw: list[_RawTable]) -> _RawTable:
+    if not raw:
+        return {}
+    table = raw[0]
+    order = np.lexsort((table["id2"], table["id1"]))
+    columns = {name: table[name][order].astype(np.int64) for name in ("id1", "id2")}
+    return columns | _link_values(table, order)
+
+
+def _wall_contacts(raw: list[_RawTable], wall_ids: np.ndarray) -> _RawTable:
+    if not raw:
+        return {}
+    table = raw[0]
+    rows = {int(i): k for k, i in enumerate(wall_ids)}
+    wall = np.array([rows[int(i)] for i in table["wall_id"]], dtype=np.int32)
+    order = np.lexsort((wall, table["ball_id"]))
+    columns: _RawTable = {"id1": table["ball_id"][order].astype(np.int64), "wall": wall[order]}
+    return columns | _link_values(table, order)
+
+
+def _link_values(table: _RawTable, order: np.ndarray) -> _RawTable:
+    values = {
+        name: table[word][order].astype(_TYPES.get(name, np.float64))
+        for word, name in _LINK_WORDS.items()
+        if word in table
+    }
+    return values | {name: 0.0 - values[name] for name in ("fx", "fy") if name in values}

@@ -1,0 +1,75 @@
+"""What kind of script is it? All kinds end in .py, so the content decides."""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+
+from hpcdem.errors import ScriptError
+from hpcdem.lang.zdem.lexer import COMMENT, LINE_END, SEPARATORS
+from hpcdem.lang.zdem.table import ZDEM
+
+_PCDC_LINE = re.compile(rb"^[ \t]*pcdc[ \t]+[A-Za-z]", re.MULTILINE)
+_PYTHON_LINE = re.compile(
+    rb"""^[ \t]*( import[ \t]+\w | from[ \t]+\S+[ \t]+import\b | (def|class)[ \t] | (for|while|if|with)\b.*:
+                 | print[ \t]*\( | \w+[ \t]*=[^=] )""",
+    re.MULTILINE | re.VERBOSE,
+)
+
+
+def kind(source: bytes | str, file: str = "script") -> str:
+    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python) or "python" (Python that imports something).
+
+    ScriptError, with the line that gave it away, for what is none of these. That a script is of a kind does not mean
+    that it is correct.
+    """
+    if isinstance(source, str):
+        source = source.encode("utf-8", errors="surrogatepass")
+    source = source.removeprefix(b"\xef\xbb\xbf")
+    tree, trouble = _python(source)
+    if tree is not None and any(isinstance(node, (ast.Import, ast.ImportFrom)) for node in ast.walk(tree)):
+        return "python"
+    if _PCDC_LINE.search(source):
+        return "pcdc"
+    firsts = _first_words(source)
+    if not firsts:
+        raise ScriptError(file, 1, "there is no command in the script")
+    commands = sum(ZDEM.command(word) is not None for _, word in firsts)
+    if ZDEM.command(firsts[0][1]) is not None or 2 * commands > len(firsts):
+        return "zdem"
+    line, word = firsts[0]
+    if _PYTHON_LINE.search(source):
+        if trouble is not None:
+            line = trouble.lineno or line
+            raise ScriptError(file, line, f"this looks like Python, but is not correct: {trouble.msg}")
+        raise ScriptError(file, line, "this is Python that imports nothing; a Python script must import hpcdem")
+    raise ScriptError(
+        file,
+        line,
+        f"'{word[:40]}' begins no script that hpcdem knows: neither a ZDEM command{ZDEM.hint(word)}, "
+        "nor a pcdc command, nor Python",
+    )
+
+
+def _python(source: bytes) -> tuple[ast.Module | None, SyntaxError | None]:
+    """The syntax tree, or what is wrong with it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return ast.parse(source), None
+        except SyntaxError as error:
+            return None, error
+        except (ValueError, RecursionError, MemoryError):
+            return None, None
+
+
+def _first_words(source: bytes) -> list[tuple[int, str]]:
+    """Line number and first word of every line that has any, in lower case, read as ZDEM reads them."""
+    blanks = bytes.maketrans(SEPARATORS.encode(), b" " * len(SEPARATORS))
+    firsts = []
+    for number, raw in enumerate(LINE_END.split(source), start=1):
+        words = COMMENT.split(raw, maxsplit=1)[0].translate(blanks).split(maxsplit=1)
+        if words:
+            firsts.append((number, words[0].decode("utf-8", errors="replace").lower()))
+    return firsts

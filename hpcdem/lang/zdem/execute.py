@@ -1,0 +1,293 @@
+"""Carries out a script: binds every statement to the verb of `hpcdem.commands` that does it.
+
+The verbs know nothing of lines and files; an error of theirs leaves here with the file and line of the statement.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from hpcdem.errors import CommandError, ScriptError, UsageError
+from hpcdem.lang.zdem.parser import Script, parse_text
+from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2
+from hpcdem.lang.zdem.statement import Statement
+from hpcdem.selection import Selection, has_expressions, number
+
+
+class Verbs:
+    """The modules of `hpcdem.commands` by name, each imported when it is first needed."""
+
+    def __getattr__(self, name: str) -> Any:
+        return importlib.import_module(f"hpcdem.commands.{name}")
+
+
+def refuse_unexecuted(statements: Sequence[Statement]) -> None:
+    """ScriptError at the first line that asks for something the solver cannot do, before anything has run."""
+    for statement in statements:
+        if statement.unexecuted:
+            raise ScriptError(
+                statement.file,
+                statement.line,
+                f"hpcdem does not carry out {', '.join(statement.unexecuted)} yet",
+            )
+
+
+class Interpreter:
+    """Runs a script on a simulation.
+
+    `sim` is handed to the verbs. What a checkpoint and the log must know is set here: ``sim.script`` (the text),
+    ``sim.position`` (index of the statement being carried out) and ``sim.line`` (its line). Asked are only
+    ``sim.extents()`` and, where there are ranks, ``sim.comm``.
+    `verbs` replaces the modules of hpcdem.commands in tests.
+    """
+
+    def __init__(self, script: Script, verbs: Any = None) -> None:
+        self.script = script
+        self.verbs = verbs if verbs is not None else Verbs()
+
+    def run(self, sim: Any, start_at: int = 0, resume: int | None = None, saved_script: str = "") -> None:
+        """Carry out the statements from index `start_at` to the end, or go on after a checkpoint.
+
+        resume: ``position`` of the checkpoint that `sim` was restored from. A CYC or IMPLE at that place is taken
+        up where it was interrupted; anything else there was done before the checkpoint was written.
+        saved_script: text of the script that wrote it; UsageError if the two differ in what was done so far.
+        """
+        refuse_unexecuted(self.script.statements)
+        sim.script = self.script.text
+        if resume is not None:
+            if saved_script:
+                check_same_beginning(self.script, saved_script, resume)
+            self._take_up(sim, resume)
+            start_at = resume + 1
+        for index in range(start_at, len(self.script.statements)):
+            self._carry_out(sim, index)
+        if self.script.statements[-1].command != "STOP":
+            self.verbs.running.stop(sim)
+
+    def _take_up(self, sim: Any, index: int) -> None:
+        if not 0 <= index < len(self.script.statements):
+            raise UsageError(
+                f"the checkpoint was written at statement {index + 1} of its script, {self.script.file} has only "
+                f"{len(self.script.statements)}; it is not the same script"
+            )
+        statement = self.script.statements[index]
+        sim.position, sim.line = index, statement.line
+        if statement.command in ("CYC", "IMPLE"):
+            self._guarded(statement, lambda: self.verbs.running.resume(sim))
+
+    def _carry_out(self, sim: Any, index: int) -> None:
+        statement = self.script.statements[index]
+        sim.position, sim.line = index, statement.line
+        self._guarded(statement, lambda: _VERBS[statement.command](_Call(self, sim, statement)))
+
+    @staticmethod
+    def _guarded(statement: Statement, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except CommandError as error:
+            raise statement.error(str(error)) from error
+
+
+def check_same_beginning(script: Script, saved_text: str, position: int) -> None:
+    """UsageError unless the script that wrote a checkpoint says the same as `script` up to index `position`; comments
+    and blanks do not count, and what comes after may have been changed."""
+    saved = parse_text(saved_text, f"{script.file} (as it was when the checkpoint was written)").statements
+    for index, statement in enumerate(script.statements[: position + 1]):
+        before = saved[index] if index < len(saved) else None
+        if before is None or before.same_as(statement):
+            continue
+        raise UsageError(
+            f"{script.file}:{statement.line}: '{statement.text}' was '{before.text}' when the checkpoint was written; "
+            "lines that were carried out already must not be changed"
+        )
+
+
+class _Call:
+    """One statement on its way to a verb: its arguments with expressions resolved and file names made complete."""
+
+    def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
+        self.sim, self.verbs, self.statement = sim, interpreter.verbs, statement
+        self.directory = interpreter.script.directory
+        self.arguments = dict(statement.arguments)
+        self.where: Selection | None = statement.selection
+        if has_expressions(self.where) or has_expressions(tuple(self.arguments.values())):
+            self._resolve(sim.extents())
+
+    def _resolve(self, extents: dict[str, float]) -> None:
+        if self.where is not None:
+            self.where = self.where.resolve(extents)
+        for name, value in self.arguments.items():
+            if has_expressions(value):
+                self.arguments[name] = tuple(number(bound, extents) for bound in value)
+
+    def given(self, *names: str) -> dict[str, Any]:
+        """Those of these arguments that the line has, as keyword arguments; all of them if no name is given."""
+        return {name: value for name, value in self.arguments.items() if not names or name in names}
+
+    def path(self) -> str:
+        """The file of the line, beside the script unless it has a folder of its own from the root."""
+        return str(self.directory / self.arguments["file"])
+
+    def existing(self) -> str:
+        """A file to read: beside the script, then in ./data below it. Rank 0 looks, so that all ranks agree."""
+        comm = getattr(self.sim, "comm", None)
+        found = find(self.directory, self.arguments["file"]) if comm is None or comm.rank == 0 else None
+        found = comm.bcast(found) if comm is not None else found
+        if found is None:
+            name = self.arguments["file"]
+            raise CommandError(f"there is no file {self.directory / name}, nor {self.directory / 'data' / name}")
+        return found
+
+
+def find(directory: Path, name: str) -> str | None:
+    """Where a file to be read is: in `directory`, or in the folder data below it; None if in neither."""
+    for path in (directory / name, directory / "data" / name):
+        try:
+            if path.is_file():
+                return str(path)
+        except (OSError, ValueError):  # a name the system cannot have
+            continue
+    return None
+
+
+# ---- one function per command --------------------------------------------------------------------------------------
+
+
+def _start(call: _Call) -> None:
+    call.verbs.particles.start(call.sim)
+
+
+def _restore(call: _Call) -> None:
+    call.verbs.saving.restore(call.sim, call.existing())
+
+
+def _load(call: _Call) -> None:
+    call.verbs.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
+
+
+def _stop(call: _Call) -> None:
+    call.verbs.running.stop(call.sim)
+
+
+def _box(call: _Call) -> None:
+    call.verbs.walls.box(call.sim, **call.given())
+
+
+def _wall(call: _Call) -> None:
+    call.verbs.walls.wall(call.sim, **call.given())
+
+
+def _ball(call: _Call) -> None:
+    arguments = call.given()
+    call.verbs.particles.ball(call.sim, arguments.pop("id"), **arguments)
+
+
+def _gen(call: _Call) -> None:
+    arguments = call.given()
+    radii = arguments.pop("rad")
+    if arguments.pop("grid", False):
+        call.verbs.particles.gen_grid(call.sim, radii, **arguments)
+    else:
+        call.verbs.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
+
+
+def _gline(call: _Call) -> None:
+    call.verbs.particles.gline(call.sim, **call.given())
+
+
+def _del(call: _Call) -> None:
+    call.verbs.particles.delete(call.sim, call.where)
+
+
+def _exp(call: _Call) -> None:
+    call.verbs.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
+
+
+def _prop(call: _Call) -> None:
+    properties = {name: value for name, value in call.given().items() if name not in BOND_KEYS}
+    if call.given(*BOND_MODEL_1, *BOND_MODEL_2):
+        # Bonds are made with the new properties, but before the particles leave the group that RANGE may name.
+        group = {"group": properties.pop("group")} if "group" in properties else {}
+        if properties:
+            call.verbs.properties.prop(call.sim, call.where, **properties)
+        call.verbs.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
+        properties = group
+    if properties:
+        call.verbs.properties.prop(call.sim, call.where, **properties)
+
+
+def _bond(call: _Call) -> None:
+    call.verbs.bonds.break_bonds(call.sim, call.where)
+
+
+def _fix(call: _Call) -> None:
+    call.verbs.properties.fix(call.sim, tuple(call.arguments), where=call.where)
+
+
+def _free(call: _Call) -> None:
+    call.verbs.properties.free(call.sim, tuple(call.arguments), where=call.where)
+
+
+def _set(call: _Call) -> None:
+    for name, value in call.arguments.items():
+        if name == "damp":
+            name = "lsm"
+        elif name == "outdir":
+            value = str(call.directory / value)
+        call.verbs.settings.set_option(call.sim, name, value)
+
+
+def _cyc(call: _Call) -> None:
+    call.verbs.running.cycle(call.sim, call.arguments["steps"])
+
+
+def _imple(call: _Call) -> None:
+    arguments = call.given()
+    call.verbs.running.imple(call.sim, arguments.pop("id"), **arguments)
+
+
+def _sav(call: _Call) -> None:
+    call.verbs.saving.save(call.sim, call.path())
+
+
+def _hist(call: _Call) -> None:
+    what = "kinetic" if "kinetic" in call.arguments else "step"
+    call.verbs.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
+
+
+def _plot(call: _Call) -> None:
+    call.verbs.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
+
+
+def _draw(call: _Call) -> None:
+    what = [name for name in call.arguments if name != "interval"]
+    call.verbs.history.draw(call.sim, call.arguments.get("interval"), what)
+
+
+_VERBS: dict[str, Callable[[_Call], None]] = {
+    "START": _start,
+    "RESTORE": _restore,
+    "LOAD": _load,
+    "STOP": _stop,
+    "BOX": _box,
+    "WALL": _wall,
+    "BALL": _ball,
+    "GEN": _gen,
+    "GLINE": _gline,
+    "DEL": _del,
+    "EXP": _exp,
+    "PROP": _prop,
+    "BOND": _bond,
+    "FIX": _fix,
+    "FREE": _free,
+    "SET": _set,
+    "CYC": _cyc,
+    "IMPLE": _imple,
+    "SAV": _sav,
+    "HIST": _hist,
+    "PLOT": _plot,
+    "DRAW": _draw,
+}

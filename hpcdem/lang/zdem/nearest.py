@@ -1,0 +1,24 @@
+"""Did you mean ...? The known word that is most like the one that was read."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+LONGEST = 40
+"""Longer words are not typing mistakes, and comparing them would take long."""
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The most similar known word, or None if none is similar."""
+    if len(word) > LONGEST:
+        return None
+    by_lower = {name.lower(): name for name in known}
+    found = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[found[0]] if found else None
+
+
+def hint(word: str, known: Iterable[str]) -> str:
+    """``; did you mean 'xmove'?`` or nothing, to be put into a message."""
+    best = nearest(word, known)
+    return f"; did you mean '{best}'?" if best else ""

@@ -1,0 +1,151 @@
+"""What a script alone tells about its run: the steps of every CYC and IMPLE, and lines that cannot work.
+
+The statements are followed as the solver will follow them, knowing only what stands in the script. After RESTORE the
+time step, the walls and the histories of the file are not known here; they count as unknown, not as missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+
+from hpcdem.lang.zdem.lexer import LARGEST_WHOLE
+from hpcdem.lang.zdem.statement import Statement
+
+OUTPUTS = ("print", "ps", "vtk", "save")
+Velocity = tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One CYC or IMPLE. index: of its statement; start: step it begins at; steps: how many; None where unknown.
+
+    every: steps between outputs of each of OUTPUTS, 0 is off, None unknown; counted from step 0 for CYC, from the start
+    of the command for IMPLE.
+    """
+
+    index: int
+    start: int | None
+    steps: int | None
+    every: Mapping[str, int | None]
+
+
+@dataclass
+class _Known:
+    """What is known at a point of the script. complete: the calculation began in this script, nothing is hidden."""
+
+    complete: bool = True
+    step: int | None = 0
+    dt: float | None = None
+    has_step_rule: bool = False
+    walls: dict[int, Velocity] = field(default_factory=dict)
+    histories: set[int] = field(default_factory=set)
+    every: dict[str, int | None] = field(default_factory=lambda: dict.fromkeys(OUTPUTS, 0))
+
+
+def follow(
+    statements: Iterable[Statement], dt: float | None = None, walls: Mapping[int, Velocity] | None = None
+) -> list[Run]:
+    """All runs of a script in order. ScriptError at a line that refers to something that is not there.
+
+    dt [s] and walls (id -> velocity [m/s]): what a restored state is known to hold, if the script begins with RESTORE.
+    """
+    known, runs = _Known(), []
+    for index, statement in enumerate(statements):
+        match statement.command:
+            case "RESTORE":
+                known = _Known(False, _step_in_name(statement.get("file")), dt, True, dict(walls or {}))
+                known.every = dict.fromkeys(OUTPUTS)
+            case "SET":
+                _set(statement, known)
+            case "WALL":
+                _wall(statement, known)
+            case "HIST":
+                known.histories.add(statement.get("id"))
+            case "PLOT":
+                _plot(statement, known)
+            case "CYC" | "IMPLE":
+                runs.append(_run(index, statement, known))
+                steps = runs[-1].steps
+                known.step = None if known.step is None or steps is None else known.step + steps
+    return runs
+
+
+def expected_steps(
+    statements: Sequence[Statement], dt: float | None = None, walls: Mapping[int, Velocity] | None = None
+) -> int | None:
+    """Steps of the whole script, None if that depends on something the script does not say (frac, a restored state)."""
+    steps = [run.steps for run in follow(statements, dt, walls)]
+    return None if any(n is None for n in steps) else sum(n for n in steps if n is not None)
+
+
+def _step_in_name(file: str) -> int | None:
+    """ZDEM names restart files after the step: 0000046000.sav."""
+    stem = PurePath(file).stem
+    return int(stem) if stem.isascii() and stem.isdigit() and len(stem) == 10 else None
+
+
+def _set(statement: Statement, known: _Known) -> None:
+    for name, value in statement.arguments.items():
+        if name in ("dt", "frac"):
+            known.dt, known.has_step_rule = (value if name == "dt" else None), True
+        elif name in OUTPUTS:
+            known.every[name] = max(value, 0)
+
+
+def _wall(statement: Statement, known: _Known) -> None:
+    wall = statement.get("id")
+    if "nodes" in statement.arguments:
+        known.walls[wall] = (0.0, 0.0)
+    elif wall not in known.walls and known.complete:
+        raise statement.error(f"there is no wall {wall} yet ({_walls(known)}); nodes make one")
+    x, y = known.walls.get(wall, (None, None))
+    known.walls[wall] = (statement.get("xv", x), statement.get("yv", y))
+
+
+def _plot(statement: Statement, known: _Known) -> None:
+    for axis in ("x", "y"):
+        if known.complete and statement.get(axis) not in known.histories:
+            raise statement.error(f"there is no history {statement.get(axis)}; HIST makes one")
+
+
+def _run(index: int, statement: Statement, known: _Known) -> Run:
+    if statement.command == "CYC":
+        run = Run(index, known.step, statement.get("steps"), dict(known.every))
+    else:
+        run = _imple(index, statement, known)
+    if not known.has_step_rule:
+        raise statement.error("there is no time step yet; SET DT or SET frac gives one")
+    return run
+
+
+def _imple(index: int, statement: Statement, known: _Known) -> Run:
+    wall = statement.get("id")
+    if wall not in known.walls and known.complete:
+        raise statement.error(f"there is no wall {wall} ({_walls(known)})")
+    axis = 0 if "xmove" in statement.arguments else 1
+    speed = known.walls.get(wall, (None, None))[axis]
+    if speed == 0.0:
+        raise statement.error(f"wall {wall} does not move; give it a velocity with WALL id {wall} {'xy'[axis]}v")
+
+    def steps_for(distance: float) -> int | None:
+        if speed is None or known.dt is None:
+            return None
+        per_step = abs(speed) * known.dt
+        steps = abs(distance) / per_step if per_step > 0.0 else math.inf
+        if steps > LARGEST_WHOLE:
+            raise statement.error(f"{abs(distance):g} m would take {steps:g} steps")
+        return math.floor(steps + 0.5)
+
+    every: dict[str, int | None] = {}
+    for name in OUTPUTS:
+        distance = statement.get(name, 0.0)
+        steps = steps_for(distance) if distance > 0.0 else 0
+        every[name] = max(1, steps) if steps is not None and distance > 0.0 else steps
+    return Run(index, known.step, steps_for(statement.get("xmove", statement.get("ymove"))), every)
+
+
+def _walls(known: _Known) -> str:
+    return "walls so far: " + (", ".join(str(i) for i in sorted(known.walls)) or "none")

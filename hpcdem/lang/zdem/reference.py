@@ -1,0 +1,148 @@
+"""The reference page of the ZDEM language, made from the table: ``python -m hpcdem.lang.zdem.reference``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from hpcdem.lang.zdem.table import COLORS, FLAG, SOURCES, ZDEM, Choice, Command, Option, Row, Table
+
+_TOP = """\
+# ZDEM commands
+
+This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it
+(`python -m hpcdem.lang.zdem.reference > docs/zdem_reference.md`).
+
+## How a script is read
+
+- One command per line. Upper and lower case are the same, except in file names.
+- `( ) = ,` and blanks only separate: `fric=0.3`, `fric 0.3` and `(fric, 0.3)` are the same.
+- `# ! ;` begin a comment; comments may be in any text encoding, the rest is UTF-8.
+- Whole numbers may be written `100000.0`.
+- A command may be shortened to three letters or more. Keywords of up to three letters are written in full, longer ones
+  may be shortened to three letters or more. In the headings below what may be left out stands in brackets.
+- The first command is START, RESTORE or LOAD. What follows STOP is not read.
+- The whole script is read before anything runs. The first wrong line is reported with its number, and nothing is done.
+- Units are SI. File names are relative to the folder of the script.
+"""
+
+_RANGE = """\
+## RANGE
+
+Stands last on the line and limits a command to some particles; without it the command acts on all. Terms are joined by
+`and` and `or`, from left to right with equal precedence; terms that follow each other without a word are joined by
+`and`. The centres of particles count. A particle is in one group, so group terms joined by `and` next to each other
+select the particles of all these groups.
+"""
+
+_VARIABLES = """\
+### Variables
+
+In RANGE, and in `x` and `y` of GEN, a number may be an expression of `{left} {right} {bottom} {top}`: the extents
+min(x - r), max(x + r), min(y - r), max(y + r) of the particles that are not fixed in both x and y, at the moment of the
+command. Operators are `+ - * /`; no blanks inside, no parentheses. Example: `DEL RANGE y {top}-1000.0, {top}`.
+"""
+
+
+def page(table: Table = ZDEM) -> str:
+    """The whole page, in Markdown."""
+    parts = [_TOP, _overview(table)]
+    parts += [_command(command) for command in table.commands]
+    parts += [_RANGE, _options(table.range_terms), "", _VARIABLES, _colors()]
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def _overview(table: Table) -> str:
+    rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
+    for command in table.commands:
+        first_sentence = command.doc.split(". ")[0].rstrip(".")
+        rows.append(f"| [{command.name}](#{command.name.lower()}) | {_cell(first_sentence)} |")
+    return "\n".join([*rows, ""])
+
+
+def _command(command: Command) -> str:
+    lines = [f"## {command.name}", "", f"`{_shortened(command)}` {_remarks(command)}", "", command.doc, "", "```"]
+    lines += [*_syntax(command), "```", ""]
+    if command.same_as:
+        return "\n".join(lines)
+    values = [option for option in command.leading if option.kind is not FLAG]
+    if values or command.options:
+        lines += [_options(command.options, values), ""]
+    lines += ["Example:" if len(command.example) == 1 else "Examples:", "", "```", *command.example, "```", ""]
+    return "\n".join(lines)
+
+
+def _syntax(command: Command) -> list[str]:
+    """One line: fixed words and values, then the keywords (in brackets where they may be left out)."""
+    words = [command.name]
+    for option in command.leading:
+        word = option.name if option.kind is FLAG else option.kind.pattern
+        words.append(word if option.required else f"[{word}]")
+    if command.same_as:
+        words.append(f"... (as {command.same_as})")
+    else:
+        for option in command.options:
+            word = f"{option.name} {_pattern(option)}".strip()
+            words.append(word if option.required else f"[{word}]")
+    if command.ranged and not command.same_as:
+        words.append("[RANGE ...]")
+    lines, line = [], ""
+    for word in words:
+        if line and len(line) + len(word) > 100:
+            lines.append(line)
+            line = "   "
+        line = f"{line} {word}" if line else word
+    return [*lines, line]
+
+
+def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
+    """A table of values that stand alone, and of keywords."""
+    rows = ["| keyword | value | unit | default | meaning | from |", "|---|---|---|---|---|---|"]
+    for option in [*values, *options]:
+        cells = [
+            f"`{_shortened(option)}`" if option not in values else "",
+            f"`{_pattern(option)}`" if option.kind is not FLAG else "",
+            option.unit,
+            "required" if option.required else f"`{option.default}`" if option.default else "",
+            option.doc + _also(option) + ("" if option.executed else " (**not carried out yet**)"),
+            option.source,
+        ]
+        rows.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+    return "\n".join(rows)
+
+
+def _pattern(option: Option) -> str:
+    return option.kind.pattern if not isinstance(option.kind, Choice) else f"<{option.kind.pattern}>"
+
+
+def _shortened(row: Row) -> str:
+    """``DEN[SITY]``: what may be left out in brackets."""
+    full = row.longest or row.name
+    if isinstance(row, Command):
+        full = full.upper()
+    return full if len(full) <= 3 else f"{full[:3]}[{full[3:]}]"
+
+
+def _remarks(row: Row) -> str:
+    state = "" if row.executed else "; **not carried out yet**"
+    return f"(from: {SOURCES[row.source]}{_also(row)}{state})"
+
+
+def _also(row: Row) -> str:
+    return f"; also read: {', '.join(f'`{word}`' for word in row.also)}" if row.also else ""
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _colors() -> str:
+    rows = ["## Colours", "", "By number or name:", "", "| number | name |", "|---|---|"]
+    rows += [f"| {number} | {name} |" for name, number in COLORS.items()]
+    sources = ["", "## Sources", "", "The last column of the tables says where a keyword is known from:", ""]
+    sources += [f"- {tag}: {text}" for tag, text in SOURCES.items()]
+    return "\n".join(rows + sources)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())

@@ -1,0 +1,593 @@
+"""Every command, keyword and option of the ZDEM language, in one table.
+
+Parsing, abbreviations, error messages, ``hpcdem --check`` and the page docs/zdem_reference.md are all made from the
+rows below; a new option is one new row. A row says how the option is written, its unit and default, what it does, where
+it is known from, and whether the solver carries it out (a script that uses a row with ``executed=False`` is refused by
+name before anything runs).
+
+Sources: R command reference of the ZDEM manual 2.x, S only in the manual's scripts or change log, W scripts on the
+author's web site, X our extension.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from hpcdem.lang.zdem.nearest import hint
+
+SOURCES = {
+    "R": "command reference of the manual",
+    "S": "scripts or change log of the manual",
+    "W": "scripts on the author's web site",
+    "X": "extension of hpcdem",
+}
+
+COLORS = {
+    "lg": 0,
+    "green": 1,
+    "yellow": 2,
+    "red": 3,
+    "white": 4,
+    "black": 5,
+    "mg": 6,
+    "blue": 7,
+    "gb": 8,
+    "violet": 9,
+}
+"""Colour names and numbers (manual, chapter 9)."""
+
+
+# ---- kinds of values: how many words, of which sort ----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kind:
+    """pattern: as syntax lines show it; meaning: as "expected ..." messages say it."""
+
+    pattern: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Flag(Kind):
+    """The keyword alone."""
+
+
+@dataclass(frozen=True)
+class Number(Kind):
+    """One number within [low, high]; `above` excludes low itself; `zero` False excludes 0."""
+
+    integer: bool = False
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    zero: bool = True
+
+
+@dataclass(frozen=True)
+class Optional(Kind):
+    """A positive number that may be left out; then `absent` counts."""
+
+    absent: float = 0.0
+
+
+@dataclass(frozen=True)
+class Point(Kind):
+    """Two numbers."""
+
+
+@dataclass(frozen=True)
+class Segment(Kind):
+    """Two points that differ."""
+
+
+@dataclass(frozen=True)
+class Interval(Kind):
+    """Lower and upper bound, numbers or expressions."""
+
+
+@dataclass(frozen=True)
+class Corners(Kind):
+    """Four points, numbers or expressions."""
+
+
+@dataclass(frozen=True)
+class EllipseShape(Kind):
+    """Centre and half axes, numbers or expressions."""
+
+
+@dataclass(frozen=True)
+class IdRange(Kind):
+    """One id, or first and last."""
+
+
+@dataclass(frozen=True)
+class Radii(Kind):
+    """The word ``discrete`` and at least one radius."""
+
+
+@dataclass(frozen=True)
+class Viscosity(Kind):
+    """The word ``lsm`` and a number."""
+
+
+@dataclass(frozen=True)
+class Color(Kind):
+    """A name of COLORS or its number."""
+
+
+@dataclass(frozen=True)
+class Name(Kind):
+    """A group name; kept in lower case."""
+
+
+@dataclass(frozen=True)
+class File(Kind):
+    """A file name; case is kept."""
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of the words of `choices`, each with the value it stands for."""
+
+    choices: tuple[tuple[str, str], ...] = ()
+
+
+FLAG = Flag("", "the word alone")
+FLOAT = Number("<float>", "a number")
+POSITIVE = Number("<float>", "a number above 0", low=0.0, above=True)
+NOT_NEGATIVE = Number("<float>", "a number not below 0", low=0.0)
+DISTANCE = Number("<float>", "a distance other than 0", zero=False)
+FRACTION = Number("<float>", "a number from 0 to 1", low=0.0, high=1.0)
+RATIO = Number("<float>", "a number above 0, at most 1", low=0.0, high=1.0, above=True)
+POISSON = Number("<float>", "a Poisson ratio above -1, at most 0.5", low=-1.0, high=0.5, above=True)
+INT = Number("<int>", "a whole number", integer=True)
+COUNT = Number("<int>", "a whole number above 0", integer=True, low=1)
+INDEX = Number("<int>", "a whole number not below 0", integer=True, low=0)
+TOLERANCE = Optional("[<float>]", "a number not below 0, or nothing", absent=1e-6)
+POINT = Point("(<float> <float>)", "two numbers (x y)")
+SEGMENT = Segment("(<float> <float>) (<float> <float>)", "two points (x1 y1) (x2 y2)")
+INTERVAL = Interval("(<float> <float>)", "a lower and an upper bound")
+CORNERS = Corners("(<float> <float>) x 4", "four points (x y)")
+ELLIPSE = EllipseShape("(<float> <float>) <float> <float>", "a centre (x y) and two half axes")
+IDS = IdRange("<int> [<int>]", "an id, or the first and the last id")
+RADII = Radii("discrete <float> ...", "the word 'discrete' and one or more radii")
+LSM = Viscosity("lsm <float>", "the word 'lsm' and a number not below 0")
+COLOR = Color("<colour>", "a colour: " + ", ".join(f"{name} ({n})" for name, n in COLORS.items()))
+NAME = Name("<name>", "a group name")
+FILE = File("<file>", "a file name")
+
+
+# ---- rows ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Row:
+    """What commands and options have in common.
+
+    name: as the manual writes it; longest: the longest spelling of which an abbreviation may be the beginning
+    (default: the name itself); also: other accepted spellings, misprints of the manual among them.
+    """
+
+    name: str
+    doc: str
+    longest: str = ""
+    also: tuple[str, ...] = ()
+    executed: bool = True
+    source: str = "R"
+
+    def accepts(self, word: str) -> bool:
+        """Does this (lower-case) word stand for the row? Names of up to three letters only match exactly, longer ones
+        by any beginning of at least three letters."""
+        full = self.full
+        return word == full or word in self.also or (len(full) > 3 and len(word) >= 3 and full.startswith(word))
+
+    @property
+    def full(self) -> str:
+        """Longest spelling, lower case."""
+        return (self.longest or self.name).lower()
+
+    @property
+    def stem(self) -> str:
+        """Shortest accepted spelling, lower case."""
+        return self.full[:3]
+
+
+@dataclass(frozen=True)
+class Option(Row):
+    """A keyword and the value behind it. unit and default are for the reader."""
+
+    kind: Kind = FLAG
+    unit: str = ""
+    default: str = ""
+    required: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its name among the arguments of a statement."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Command(Row):
+    """A command: fixed words and values first (`leading`, in this order), then `options` in any order, then RANGE.
+
+    same_as: the command this is another name of. example: lines that parse; the reference page shows them.
+    """
+
+    leading: tuple[Option, ...] = ()
+    options: tuple[Option, ...] = ()
+    ranged: bool = False
+    same_as: str = ""
+    example: tuple[str, ...] = ()
+
+    def option(self, word: str) -> Option | None:
+        """The option a (lower-case) word stands for."""
+        return next((option for option in self.options if option.accepts(word)), None)
+
+    @property
+    def words(self) -> list[str]:
+        """Keywords that may follow, for messages."""
+        return [option.name for option in self.options] + (["RANGE"] if self.ranged else [])
+
+
+@dataclass(frozen=True)
+class Table:
+    """All commands, and the terms of RANGE."""
+
+    commands: tuple[Command, ...]
+    range_terms: tuple[Option, ...]
+    range_row: Row = field(default_factory=lambda: Row("RANGE", "limits a command to the particles chosen"))
+
+    def command(self, word: str) -> Command | None:
+        """The command a (lower-case) word stands for."""
+        return next((command for command in self.commands if command.accepts(word)), None)
+
+    def range_term(self, word: str) -> Option | None:
+        """The RANGE term a (lower-case) word stands for."""
+        return next((term for term in self.range_terms if term.accepts(word)), None)
+
+    def hint(self, word: str) -> str:
+        """The nearest command."""
+        return hint(word, [name for c in self.commands for name in (c.name, c.full.upper())])
+
+
+def joined(words: Iterable[str]) -> str:
+    """Words of a list, as messages show them."""
+    return ", ".join(words)
+
+
+# Options that several commands share.
+
+
+def _id(doc: str, required: bool = True) -> Option:
+    return Option("id", doc, kind=INDEX, required=required)
+
+
+_COLOR = Option("color", "colour, by name or number", also=("colour",), kind=COLOR, default="lg")
+_GROUP = Option("group", "group the particles are put in", kind=NAME, default="***")
+_KN = Option("kn", "normal stiffness", kind=NOT_NEGATIVE, unit="N/m", default="0")
+_KS = Option("ks", "shear stiffness", kind=NOT_NEGATIVE, unit="N/m", default="0")
+_FRIC = Option("fric", "friction coefficient", longest="friction", kind=NOT_NEGATIVE, default="0")
+_RAD = Option("rad", "radius", also=("r",), kind=POSITIVE, unit="m", required=True)
+_RADII = Option(
+    "rad", "radii drawn at random, a repeated one more often", also=("r",), kind=RADII, unit="m", required=True
+)
+_BOX_X = Option("x", "left and right side of the rectangle", kind=INTERVAL, unit="m", required=True)
+_BOX_Y = Option("y", "lower and upper side of the rectangle", kind=INTERVAL, unit="m", required=True)
+
+_PROPERTIES = (
+    Option("density", "density; per area unless SET disk off", kind=POSITIVE, unit="kg/m3 or kg/m2"),
+    Option("fric", "friction coefficient", longest="friction", kind=NOT_NEGATIVE, default="0"),
+    Option("shear", "shear modulus G of the Hertz-Mindlin contact", kind=POSITIVE, unit="Pa"),
+    Option("poiss", "Poisson ratio of the Hertz-Mindlin contact", longest="poisson", kind=POISSON),
+    Option("damp", "local damping: share of the force that acts against the motion", kind=FRACTION, default="0"),
+    Option("hertz", "the particles take the Hertz-Mindlin contact; a later kn or ks without it takes that back"),
+    Option("kn", "normal stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
+    Option("ks", "shear stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
+    Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
+    Option("yv", "velocity in y", kind=FLOAT, unit="m/s"),
+    Option("spin", "angular velocity, anticlockwise", kind=FLOAT, unit="rad/s"),
+    Option("color", "colour, by name or number", also=("colour", "coloe"), kind=COLOR, source="S"),
+    Option("group", "moves the particles to this group; a particle is in one group", kind=NAME, source="S"),
+    Option("ebmod", "model 1 bond: Young's modulus", kind=NOT_NEGATIVE, unit="Pa"),
+    Option("gbmod", "model 1 bond: shear modulus", also=("gbmmod",), kind=NOT_NEGATIVE, unit="Pa"),
+    Option("tstrength", "model 1 bond: tensile strength", kind=NOT_NEGATIVE, unit="Pa"),
+    Option("sstrength", "model 1 bond: cohesion", kind=NOT_NEGATIVE, unit="Pa"),
+    Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
+    Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
+    Option("tolerate", "largest gap that is bonded; the word alone keeps the default", kind=TOLERANCE, unit="m",
+           default="1e-6"),
+    Option("rext", "factor on the radii in the search for bonds, see cratio of GLINE", kind=POSITIVE, default="1"),
+)  # fmt: skip
+
+_PROP_DOC = (
+    "Sets properties, velocities, colour and group of particles. With a bond key (ebmod gbmod tstrength sstrength, or "
+    "n_bond s_bond) it also bonds all pairs of chosen particles with distance <= (Ra + Rb) rext + tolerate, at once; "
+    "pairs bonded already get the new values. Without a bond key tolerate and rext have no effect."
+)
+
+_DEGREES = (
+    Option("x", "motion in x"),
+    Option("y", "motion in y"),
+    Option("spin", "rotation"),
+)
+
+
+def _interval(name: str, doc: str, source: str = "R") -> Option:
+    return Option(name, doc, kind=INT, unit="steps", default="off", source=source)
+
+
+def _every(name: str, doc: str, source: str = "R") -> Option:
+    return Option(name, doc, kind=NOT_NEGATIVE, unit="m", default="off", source=source)
+
+
+_SETTINGS = (
+    Option("dt", "time step; of DT and frac the one given last counts", kind=POSITIVE, unit="s"),
+    Option("gravity", "gravity in x and y", kind=POINT, unit="m/s2", default="0 0"),
+    Option(
+        "disk",
+        "volume that makes the mass: on pi r^2, off (or 0) 4/3 pi r^3, hex 2 sqrt(3) r^2",
+        kind=Choice("on|off|hex", "on, off (or 0), or hex",
+                    (("on", "on"), ("off", "off"), ("hex", "hex"), ("0", "off"), ("1", "on"))),
+        default="on",
+    ),
+    Option("frac", "time step over sqrt(smallest mass / largest pair stiffness)", kind=POSITIVE, source="S"),
+    Option("damp", "lattice-solid damping, force -v times this", kind=LSM, unit="N s/m", default="lsm 0", source="S"),
+    _interval("stepbar", "a line of progress every so many steps"),
+    _interval("save", "a restart file .sav every so many steps"),
+    _interval("print", "a frame .dat and .vtkhdf every so many steps"),
+    _interval("ps", "a vector picture every so many steps"),
+    _interval("vtk", "a .vtk file every so many steps"),
+    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="1", source="X"),
+    Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
+           kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
+    Option("gentry", "attempts of GEN per particle asked for", kind=POSITIVE, default="2.25", source="X"),
+    Option("outdir", "folder of the results", kind=FILE, default="data", source="X"),
+)  # fmt: skip
+
+COMMANDS = (
+    # ---- beginning and end
+    Command("START", "Begins a new calculation: no particles, no walls, step 0.", example=("START",)),
+    Command(
+        "RESTORE",
+        "Goes on from a restart file of hpcdem, looked for beside the script, then in ./data below it.",
+        leading=(Option("file", "restart file", kind=FILE, required=True),),
+        example=("RES 0000046000.sav",),
+    ),
+    Command(
+        "LOAD",
+        "Begins a new calculation with the particles of a text file of columns x y r [group].",
+        leading=(Option("file", "file of particles", kind=FILE, required=True),),
+        options=(
+            Option("scale", "factor on x, y and r", kind=POSITIVE, default="1"),
+            Option("x", "only particles of the file within these bounds, before scaling", kind=INTERVAL, unit="m"),
+            Option("y", "only particles of the file within these bounds, before scaling", kind=INTERVAL, unit="m"),
+        ),
+        example=("LOAD init_xyr.dat", "LOAD init_xyr.dat scale 0.1 x 1000.0 2000.0 y 2000.0 4000.0"),
+    ),
+    Command("STOP", "Ends the run; what follows it is not read.", source="S", example=("STOP",)),
+    # ---- walls
+    Command(
+        "BOX",
+        "The region of the model: four walls that act inwards; particles that leave it are deleted.",
+        source="S",
+        options=(
+            Option("left", "x of the left wall", kind=FLOAT, unit="m", required=True, source="S"),
+            Option("right", "x of the right wall", kind=FLOAT, unit="m", required=True, source="S"),
+            Option("bottom", "y of the lower wall", kind=FLOAT, unit="m", required=True, source="S"),
+            Option("height", "height above bottom", kind=POSITIVE, unit="m", required=True, source="S"),
+            replace(_KN, doc="normal stiffness, linear contacts only", source="S"),
+            replace(_KS, doc="shear stiffness, linear contacts only", source="S"),
+            replace(_FRIC, source="S"),
+        ),
+        example=("BOX left 0.0 right 41000.0 bottom 0.0 height 11000.0 kn=0e10 ks=0e10 fric 0.0",),
+    ),
+    Command(
+        "WALL",
+        "With nodes: makes a wall, or replaces the one of this id. Without: changes the properties given.",
+        options=(
+            _id("number of the wall"),
+            Option("nodes", "end points P1 and P2", kind=SEGMENT, unit="m"),
+            _KN,
+            _KS,
+            _FRIC,
+            _COLOR,
+            Option("xv", "velocity in x, until it is changed", kind=FLOAT, unit="m/s", default="0"),
+            Option("yv", "velocity in y, until it is changed", kind=FLOAT, unit="m/s", default="0"),
+        ),
+        example=("WALL ID 1, NODES ( 10.0 , 10000.0 ) ( 10.0 , 10.0 ), kn=0e10 ks=0e10 fric 0.0 COLOR blue",
+                 "WALL id 1 xv 2.0"),
+    ),
+    # ---- particles
+    Command(
+        "BALL",
+        "Makes one particle.",
+        options=(
+            _id("number of the particle"),
+            Option("x", "centre", kind=FLOAT, unit="m", required=True),
+            Option("y", "centre", kind=FLOAT, unit="m", required=True),
+            _RAD,
+            _COLOR,
+            _GROUP,
+        ),
+        example=("BALL ID=0 X=2.0 Y=0.5 RAD=0.5 COLOR=blue",),
+    ),
+    Command(
+        "GEN",
+        "Fills a rectangle with particles. num: at random without overlap, until so many are placed or no more fit in "
+        "(gentry times num attempts). grid: on a square lattice with a spacing of twice the largest radius. "
+        "The sides of the rectangle may be expressions.",
+        longest="generate",
+        options=(
+            Option("num", "particles asked for", kind=COUNT),
+            Option("grid", "one particle on every node of a lattice", source="S"),
+            Option("idmin", "first id of a lattice", kind=INDEX, default="next free id", source="S"),
+            _RADII,
+            _BOX_X,
+            _BOX_Y,
+            _COLOR,
+            _GROUP,
+        ),
+        example=(
+            "GEN NUM 20000, rad discrete 60.0 80.0, x (1000.0, 61000.0), y (1000.0, 13000.0), COLOR black GROUP sand",
+            "GEN NUM 1e5 rad discrete 60.0 80.0, x ({left}, {right}), y ({top}-1000.0, {top}), COLOR red GROUP sed1",
+            "GEN grid idmin 0 rad discrete 0.1e-3 0.1e-3 0.2e-3, x (5e-3, 605e-3), y (5e-3, 155e-3)",
+        ),
+    ),
+    Command(
+        "GLINE",
+        "Makes a row of equal particles from p1 towards p2, centres 2 rad cratio apart, the first at p1.",
+        options=(
+            Option("p1", "first centre", kind=POINT, unit="m", required=True),
+            Option("p2", "end of the row", kind=POINT, unit="m", required=True),
+            _RAD,
+            Option("cratio", "distance of neighbours over the sum of their radii", kind=RATIO, default="1"),
+            _KN,
+            _KS,
+            _FRIC,
+            _COLOR,
+            _GROUP,
+        ),
+        example=("GLINE P1 ( 2.0 10.0 ) P2 ( 40.0 10.0 ), RAD=0.5 kn=4.14e3 ks=4.14e3 fric=0.55 GROUP=bom CRATIO=0.8",),
+    ),
+    Command(
+        "DEL",
+        "Deletes particles with their contacts and bonds.",
+        longest="delete",
+        ranged=True,
+        example=("DEL RANGE y {top}-1000.0, {top}",),
+    ),
+    Command(
+        "EXP",
+        "Writes x y r of particles to a text file that LOAD reads.",
+        longest="export",
+        leading=(Option("file", "file of particles", kind=FILE, required=True),),
+        options=(Option("group", "the group as a fourth column"),),
+        ranged=True,
+        example=("EXP init_xyr.dat GROUP RANGE y 1000.0 2000.0",),
+    ),
+    # ---- properties
+    Command(
+        "PROP",
+        _PROP_DOC,
+        options=_PROPERTIES,
+        ranged=True,
+        example=(
+            "PROP density 2.5e3, fric 0.0, shear 2.9e9, poiss 0.2, damp 0.4, hertz",
+            "PROP ebmod 2e8 gbmod 2e8 tstrength 2e7 sstrength 4e7 fric 0.3 RANGE x (1.0 10.0) y (1.0 10.0)",
+            "PROP tolerate rext 0.4 n_bond 1e4 s_bond 1e4 RANGE group base",
+        ),
+    ),
+    Command("INIT", "The same as PROP.", options=_PROPERTIES, ranged=True, same_as="PROP",
+            example=("INI xv 2.0 RANGE group base",)),
+    Command(
+        "BOND",
+        "Breaks the bonds that have both ends among the chosen particles.",
+        leading=(Option("break", "the only thing BOND does", required=True),),
+        ranged=True,
+        example=("BOND break RANGE y 1.0 10.0",),
+    ),
+    Command(
+        "FIX",
+        "The chosen particles keep their velocity in these degrees of freedom, whatever force acts.",
+        options=_DEGREES,
+        ranged=True,
+        example=("FIX y spin RANGE group base",),
+    ),
+    Command("FREE", "Takes FIX back.", options=_DEGREES, ranged=True, example=("FREE x RANGE group base",)),
+    # ---- settings
+    Command(
+        "SET",
+        "Settings; several on one line. Intervals of 0 or less switch that output off.",
+        options=_SETTINGS,
+        example=("SET DT 5e-2, GRAVITY 0.0, -9.8", "SET disk off", "SET print 1000 ps 5000", "SET damp lsm 0.04"),
+    ),
+    # ---- running
+    Command(
+        "CYC",
+        "Calculates so many steps. A frame all_<step>_ini is written first.",
+        longest="cycle",
+        leading=(Option("steps", "steps", kind=INDEX, required=True),),
+        example=("CYC 5000",),
+    ),
+    Command(
+        "IMPLE",
+        "Calculates until a wall has moved the distance at its velocity: nint(distance / (|velocity| dt)) steps. "
+        "A frame all_<step>_ini is written first and one at the end; the intervals of SET rest meanwhile.",
+        also=("implie",),
+        leading=(Option("wall", "the only thing that can be moved", required=True),),
+        options=(
+            _id("number of the wall"),
+            Option("xmove", "distance in x", kind=DISTANCE, unit="m"),
+            Option("ymove", "distance in y", kind=DISTANCE, unit="m", source="X"),
+            _every("print", "a frame each time the wall has moved so far"),
+            _every("ps", "a vector picture each time the wall has moved so far"),
+            _every("save", "a restart file each time the wall has moved so far"),
+            _every("vtk", "a .vtk file each time the wall has moved so far", source="S"),
+        ),
+        example=("IMPLE wall id 1 xmove 10000.0 save 2000.0 print 1000.0 ps 1000.0 vtk 1000.0",),
+    ),
+    Command(
+        "SAV",
+        "Writes a restart file of this name, beside the script.",
+        longest="save",
+        source="S",
+        leading=(Option("file", "restart file", kind=FILE, required=True, source="S"),),
+        example=("SAV initxyr.sav",),
+    ),
+    # ---- histories and pictures
+    Command(
+        "HIST",
+        "Records a number every so many steps in data/hist_<id>.dat.",
+        source="S",
+        longest="history",
+        options=(
+            Option("id", "number of the history", kind=INDEX, required=True, source="S"),
+            Option("interval", "steps between two records", kind=COUNT, unit="steps", required=True, source="S"),
+            Option("kinetic", "record the kinetic energy", source="S"),
+            Option("step", "record the number of the step", source="S"),
+        ),
+        example=("HIST ID 1 INTERVAL 1000 , kinetic", "HIST ID 2 INTERVAL 1000 , step"),
+    ),
+    Command(
+        "PLOT",
+        "Writes one history against another at the end of the run.",
+        source="S",
+        leading=(
+            Option("hist", "histories are all that can be plotted; the word may be left out", source="S"),
+            Option("x", "history on the x axis", kind=INDEX, required=True, source="S"),
+            Option("y", "history on the y axis", kind=INDEX, required=True, source="S"),
+        ),
+        example=("PLOT hist 2 1",),
+    ),
+    Command(
+        "DRAW",
+        "Live drawing in ZDEM; read, and only noted in the log.",
+        source="S",
+        options=(
+            Option("interval", "steps between two drawings", kind=COUNT, unit="steps", source="S"),
+            Option("bfill", "filled particles", source="S"),
+            Option("wall", "walls", source="S"),
+            *(Option(name, doc, source="W") for name, doc in (
+                ("bondc", "bonds"), ("bid", "ids"), ("bang", "rotations"), ("mesh", "search cells"),
+                ("cforce", "contact forces"))),
+        ),
+        example=("DRAW INTERVAL 200, bfill wall",),
+    ),
+)  # fmt: skip
+
+RANGE_TERMS = (
+    Option("x", "centres with a <= x < b", kind=INTERVAL, unit="m"),
+    Option("y", "centres with a <= y < b", kind=INTERVAL, unit="m"),
+    Option("P4", "centres inside a quadrilateral, corners in order (even-odd rule)", kind=CORNERS, unit="m"),
+    Option("ellipse", "centres with (x-x0)^2/a^2 + (y-y0)^2/b^2 <= 1", kind=ELLIPSE, unit="m"),
+    Option("group", "particles of a group", kind=NAME),
+    Option("id", "particles with first <= id <= last", kind=IDS, source="S"),
+    Option("and", "both; also where two terms follow each other without a word"),
+    Option("or", "either"),
+)
+
+ZDEM = Table(COMMANDS, RANGE_TERMS)

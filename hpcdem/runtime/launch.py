@@ -1,0 +1,296 @@
+"""From a process to a rank: environment, MPI, refusals and the start report.
+
+Nothing here imports numpy, numba or mpi4py before it must: several of their settings are read only once, at
+their import.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.metadata
+import os
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.errors import HpcdemError, UsageError
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+
+LAUNCHERS = {
+    # who: (size of the job, rank in it)
+    "Open MPI": ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
+    "PMI (MPICH, Intel MPI)": ("PMI_SIZE", "PMI_RANK"),
+    "MVAPICH": ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
+    "PALS": ("PALS_NRANKS", "PALS_RANKID"),
+    "Slurm": ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
+}
+"""The variables by which a launcher tells its processes who they are; the first launcher found wins.
+
+SLURM_NTASKS is not asked: sbatch sets it too, for a batch script that is one process. PMIx has no variable for
+the size, so its processes start MPI and ask.
+"""
+
+
+def version() -> str:
+    """The version of hpcdem, of the source tree if it carries one."""
+    import hpcdem
+
+    own = getattr(hpcdem, "__version__", None)
+    if own is not None:
+        return own
+    try:
+        return importlib.metadata.version("hpcdem")
+    except importlib.metadata.PackageNotFoundError:
+        return "0 (source tree, not installed)"
+
+
+# -- environment ---------------------------------------------------------------------------------------------
+
+
+def prepare_environment(threads: int) -> tuple[int, list[str]]:
+    """Set what numba, HDF5 and the BLAS read at their import; a user's own setting stays.
+
+    Returns the number of threads per rank that can be had, and warnings. The number of threads is taken from -j
+    alone: it overrides what a job script left in OMP_NUM_THREADS.
+    """
+    os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
+    set_thread_variables(threads)
+    if "NUMBA_THREADING_LAYER" in os.environ:
+        return threads, []
+    # Fork and join cost 2 us with OpenMP, 24 with workqueue and up to 3000 with TBB, which numba would take first.
+    if openmp_runtime_found():
+        os.environ["NUMBA_THREADING_LAYER"] = "omp"
+        return threads, []
+    os.environ["NUMBA_THREADING_LAYER"] = "workqueue"
+    if threads == 1:
+        return 1, []
+    set_thread_variables(1)
+    return 1, [
+        f"libgomp.so.1 (OpenMP) is not on this machine, and without it {threads} threads are slower than one: going "
+        "on with 1 thread per rank. Install libgomp (it comes with gcc), or start more ranks instead"
+    ]
+
+
+def set_thread_variables(threads: int) -> None:
+    """One number for numba, OpenMP and the BLAS libraries."""
+    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = str(threads)
+
+
+def openmp_runtime_found() -> bool:
+    """Whether numba's OpenMP layer finds the library it is linked against."""
+    if sys.platform != "linux":
+        return True
+    try:
+        ctypes.CDLL("libgomp.so.1")
+    except OSError:
+        return False
+    return True
+
+
+def cores() -> int:
+    """The number of cores this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+# -- MPI -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Launcher:
+    """What the launcher says: its name, the number of processes (None: it does not say) and which one this is."""
+
+    name: str
+    size: int | None
+    rank: int
+
+
+def launcher() -> Launcher | None:
+    """The launcher this process was started by; None when it was started by hand."""
+    for name, (size, rank) in LAUNCHERS.items():
+        if size in os.environ:
+            return Launcher(name, int(os.environ[size]), int(os.environ.get(rank, "0")))
+    if "PMIX_RANK" in os.environ:
+        return Launcher("PMIx", None, int(os.environ["PMIX_RANK"]))
+    return None
+
+
+def speaks_for_all() -> bool:
+    """Whether this process is the one that prints before MPI runs (the launcher's rank 0)."""
+    who = launcher()
+    return who is None or who.rank == 0
+
+
+@contextmanager
+def one_voice() -> Iterator[None]:
+    """Before MPI has begun: one process shows what all of them find wrong.
+
+    The others are silent and leave with 0; with an error code the launcher might end the first before it has
+    printed. Faults that may be one process's own (anything but a UsageError or an exit) pass through.
+    """
+    if speaks_for_all():
+        yield
+        return
+    with open(os.devnull, "w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        try:
+            yield
+        except (UsageError, SystemExit):
+            raise SystemExit(0) from None
+
+
+def start_mpi() -> SerialComm:
+    """The communicator of the run. MPI is started only when a launcher started several processes.
+
+    UsageError when the launcher says n processes and MPI says one: n copies of the same run would overwrite each
+    other's files. HpcdemError when no MPI library can be loaded.
+    """
+    from hpcdem.halo.comm import MpiComm, SerialComm
+
+    who = launcher()
+    if who is None or who.size == 1:
+        return SerialComm()
+    try:
+        import mpi4py
+
+        # One thread calls MPI, so MPI can leave its locks out; the exit is ours (runtime.ending).
+        mpi4py.rc.thread_level = "funneled"
+        mpi4py.rc.finalize = False
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise HpcdemError(
+            f"started as {who.size or 'several'} processes by {who.name}, but mpi4py finds no MPI library: {error}"
+        ) from error
+    # Debian's h5py takes its build without MPI unless it is told; others do not read this.
+    os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
+    size = MPI.COMM_WORLD.Get_size()
+    if size == 1 and (who.size is None and who.rank == 0):
+        return SerialComm()
+    if size == 1:
+        raise UsageError(copies_of_rank_0(who, mpi_library()))
+    return MpiComm(MPI.COMM_WORLD)
+
+
+def mpi_library() -> str:
+    """Name and version of the MPI library that mpi4py runs on."""
+    from mpi4py import MPI
+
+    first = MPI.Get_library_version().strip("\0\n ").splitlines()[0]
+    return " ".join(first.replace("\t", " ").split())
+
+
+def copies_of_rank_0(who: Launcher, library: str) -> str:
+    """The refusal when MPI and the launcher do not know each other, and the way out of it."""
+    many = f"{who.size} processes" if who.size else "several processes"
+    if "Open MPI" in library:
+        pmi, own = "pmix", "Open MPI's own mpiexec"
+    else:
+        pmi, own = "pmi2", "the mpiexec of this library (a wheel has it in the bin folder of the venv)"
+    cure = f"srun --mpi={pmi} (srun --mpi=list shows what there is)" if "SLURM_JOB_ID" in os.environ else own
+    return (
+        f"{who.name} started {many}, but in MPI each of them is rank 0 of 1: the launcher does not belong to the MPI "
+        f"library that mpi4py uses, which is {library}. They would overwrite each other's files. Start with {cure}"
+    )
+
+
+def patient_barrier(comm: SerialComm) -> None:
+    """Wait for all ranks without keeping a core busy, for waits of seconds and more."""
+    if comm.mpi is not None:
+        request = comm.mpi.Ibarrier()
+        while not request.Test():
+            time.sleep(0.005)
+
+
+# -- start report --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a rank runs: host and the cores in its mask before and after MPI began."""
+
+    host: str
+    cores_before: int
+    mask: frozenset[int]
+    threads: int
+
+
+def place(cores_before: int, threads: int) -> Place:
+    """The place of this rank."""
+    mask = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    return Place(socket.gethostname(), cores_before, frozenset(mask), threads)
+
+
+def start_report(places: list[Place], library: str | None) -> str:
+    """One line: version, ranks, threads, hosts, cores."""
+    hosts = dict.fromkeys(p.host for p in places)
+    ranks, threads = len(places), places[0].threads
+    where = next(iter(hosts)) if len(hosts) == 1 else f"{len(hosts)} hosts ({', '.join(list(hosts)[:4])}"
+    if len(hosts) > 1:
+        where += ", ...)" if len(hosts) > 4 else ")"
+    masks = sorted({len(p.mask) for p in places})
+    each = f"{masks[0]}" if len(masks) == 1 else f"{masks[0]} to {masks[-1]}"
+    parts = [
+        f"hpcdem {version()}",
+        f"{ranks} rank{'s' * (ranks > 1)} x {threads} thread{'s' * (threads > 1)} on {where}",
+        f"{each} core{'s' * (masks[-1] > 1)} open to each rank" if ranks > 1 else f"{each} core{'s' * (masks[-1] > 1)}",
+    ]
+    return " | ".join(parts + [library] if library else parts)
+
+
+def start_warnings(places: list[Place], environ: Any = os.environ) -> list[str]:
+    """What is wrong with the launch: threads and ranks that share cores, masks that shrank, idle cores of a job."""
+    found = []
+    tight = [p for p in places if p.threads > len(p.mask)]
+    if tight:
+        p = tight[0]
+        found.append(
+            f"{p.threads} threads per rank, but {len(tight)} of {len(places)} ranks may use only {len(p.mask)} "
+            f"core{'s' * (len(p.mask) > 1)}: the threads will take turns. Give each rank its cores "
+            f"(srun -c {p.threads}; mpiexec --map-by slot:PE={p.threads} or --bind-to none) or use -j 1"
+        )
+    for host in dict.fromkeys(p.host for p in places):
+        here = [p for p in places if p.host == host]
+        free, wanted = len(frozenset.union(*(p.mask for p in here))), sum(p.threads for p in here)
+        if wanted > free and not tight:
+            found.append(
+                f"{len(here)} ranks x {here[0].threads} threads share {free} core{'s' * (free > 1)} on {host}: "
+                "expect less speed than with as many as there are cores"
+            )
+            break
+    shrunk = [p for p in places if len(p.mask) < p.cores_before]
+    if shrunk:
+        p = shrunk[0]
+        found.append(
+            f"starting MPI narrowed the cores of {len(shrunk)} ranks from {p.cores_before} to {len(p.mask)} each"
+        )
+    found += slurm_core_warnings(places, environ)
+    return found
+
+
+def slurm_core_warnings(places: list[Place], environ: Any) -> list[str]:
+    """The two ways to ask sbatch for -c 12 and then run on one core."""
+    asked = environ.get("SLURM_CPUS_PER_TASK", "")
+    if "SLURM_STEP_ID" not in environ or not asked.isdigit() or int(asked) < 2:
+        return []
+    cores_here = len(places[0].mask)
+    if cores_here < int(asked) and "SRUN_CPUS_PER_TASK" not in environ:
+        return [
+            f"the job asked for {asked} cores per task, this srun got {cores_here}: some versions of srun do not take "
+            "--cpus-per-task from sbatch. Start with: srun -c $SLURM_CPUS_PER_TASK"
+        ]
+    here = [p for p in places if p.host == places[0].host]
+    used = sum(p.threads for p in here)
+    if used < cores_here:
+        return [
+            f"{used} of the {cores_here} cores of this job are used: ask for ranks instead "
+            f"(#SBATCH -n {asked} -c 1 and srun -n {asked}), or for threads (-j {asked})"
+        ]
+    return []

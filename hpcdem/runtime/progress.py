@@ -1,0 +1,337 @@
+"""What the user sees while a run goes on: plain lines in a log file, a bar on a terminal, a table at the end.
+
+Only rank 0 prints; on all other ranks the same calls do nothing, so callers never ask for the rank. What only
+another rank knows has to be brought to rank 0 first.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, TextIO
+
+from hpcdem.timers import Summary, Timers
+
+QUIET_SECONDS = 10.0
+"""A log file gets at most one progress line in this time, unless the script sets the interval itself."""
+
+
+@dataclass(frozen=True)
+class StepStatus:
+    """The model at one step, global values, SI units.
+
+    unbalanced_ratio: largest unbalanced force of a particle over the mean contact force. broken_tension and
+    broken_shear count bonds since the start of the script. walls: (id, fx, fy), the force of the particles on each
+    wall.
+    """
+
+    step: int
+    time: float
+    dt: float
+    dt_critical: float
+    kinetic: float
+    unbalanced_ratio: float
+    particles: int
+    contacts: int
+    bonds: int
+    broken_tension: int = 0
+    broken_shear: int = 0
+    walls: Sequence[tuple[int, float, float]] = field(default_factory=tuple)
+
+
+def duration(seconds: float) -> str:
+    """``1:02:03``, ``2:03`` or ``2 s``; ``--`` for what is not known."""
+    if not 0.0 <= seconds < 1e8:
+        return "--"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    minutes, s = divmod(whole, 60)
+    hours, m = divmod(minutes, 60)
+    return f"{hours}:{m:02d}:{s:02d}" if hours else f"{m}:{s:02d}"
+
+
+def rate(number: float) -> str:
+    """A number per second with three digits: ``812``, ``20.4k``, ``48.2M``."""
+    for scale, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if number >= 0.9995 * scale:
+            return f"{number / scale:.3g}{letter}"
+    return f"{number:.3g}"
+
+
+@dataclass
+class Command:
+    """A running CYC or IMPLE: name, script line, steps to do, and the step and time at which it began."""
+
+    name: str
+    line: int
+    steps: int
+    first_step: int | None = None
+
+
+class Log:
+    """The log of a run.
+
+    rank: only 0 prints. stream: where to; a bar is drawn when it is a terminal. now: a clock [s], for tests.
+    """
+
+    def __init__(self, rank: int = 0, stream: TextIO | None = None, now: Any = time.monotonic) -> None:
+        self._speaks = rank == 0
+        self._stream = stream if stream is not None else sys.stdout
+        self._now = now
+        self._terminal = self._speaks and self._stream.isatty()
+        self._bar: Bar | None = None
+        self._warned: set[str] = set()
+        self._script_steps = 0
+        self._script_done = self._script_first = 0
+        self._script_began = now()
+        self._command: Command | None = None
+        self._window: tuple[int, float] | None = None  # step and time of the last line
+        self._last_line = -QUIET_SECONDS
+        self.every_interval = False
+
+    # -- lines -----------------------------------------------------------------------------------------------
+
+    def info(self, text: str) -> None:
+        """A line on stdout."""
+        if self._speaks:
+            self._print(text)
+
+    def warn(self, text: str) -> None:
+        """A line that starts with ``warning:``."""
+        self.info(f"warning: {text}")
+
+    def warn_once(self, key: str, text: str) -> None:
+        """A warning, the first time that `key` comes by."""
+        if key not in self._warned:
+            self._warned.add(key)
+            self.warn(text)
+
+    def _print(self, text: str) -> None:
+        if self._bar is not None:
+            self._bar.print(text)
+        else:
+            self._stream.write(f"{text}\n")  # in one piece: launchers pass on pieces
+            self._stream.flush()
+
+    # -- progress --------------------------------------------------------------------------------------------
+
+    def script_started(self, name: str, steps: int, done: int = 0) -> None:
+        """The script takes so many steps in all (0: not known), of which `done` were done by an earlier run."""
+        self._script_steps = steps
+        self._script_done = self._script_first = done
+        self._script_began = self._now()
+
+    def set_interval(self, explicit: bool) -> None:
+        """After SET stepbar: the user wants a line per interval, however short."""
+        self.every_interval = explicit
+
+    def command_started(self, name: str, line: int, steps: int, step: int | None = None) -> None:
+        """A CYC or IMPLE of `steps` steps begins at this line of the script (0: no script).
+
+        step: the step number now; left out, the first call of `step` tells it.
+        """
+        self._command = Command(name, line, steps, step)
+        self._window = None if step is None else (step, self._now())
+        if not self._speaks:
+            return
+        where = f"line {line}: " if line else ""
+        self._print(f"{where}{name}, {steps} step{'s' * (steps != 1)}")
+        if self._terminal:
+            self._bar = Bar(self._stream, name, steps, self._script_steps, self._script_done)
+
+    def wants(self, step: int) -> bool:
+        """Move the bar to this step; True if a line is due, so that a StepStatus must be made (ask rank 0)."""
+        command = self._command
+        if not self._speaks or command is None:
+            return False
+        if command.first_step is None or self._window is None:
+            return True
+        done = step - command.first_step
+        if self._bar is not None:
+            self._bar.update(done, self._script_done + done)
+        due = self.every_interval or self._now() - self._last_line >= QUIET_SECONDS or done >= command.steps
+        return due and step > self._window[0]
+
+    def step(self, status: StepStatus) -> None:
+        """The model after a step; printed if a line is due."""
+        command = self._command
+        if not self._speaks or command is None:
+            return
+        now = self._now()
+        if command.first_step is None or self._window is None:
+            command.first_step, self._window = status.step, (status.step, now)
+        if not self.wants(status.step):
+            return
+        last_step, last_time = self._window
+        speed = (status.step - last_step) / max(now - last_time, 1e-9)
+        self._last_line, self._window = now, (status.step, now)
+        self._print(self.line(status, status.step - command.first_step, speed))
+
+    def line(self, status: StepStatus, done: int, speed: float) -> str:
+        """The progress line: `done` steps of the command, `speed` [steps/s] since the last line."""
+        command = self._command
+        assert command is not None
+        total, script_done = self._script_steps, self._script_done + done
+        left = (command.steps - done) / speed if speed > 0 else -1.0
+        parts = [f"step {status.step}", f"{command.name} {percent(done, command.steps)}"]
+        if total:
+            parts.append(f"script {percent(script_done, total)}")
+        parts.append(f"{rate(speed)} steps/s, {rate(speed * status.particles)} particle-steps/s")
+        parts.append(f"left {duration(left)}")
+        if total:
+            parts[-1] += f", script {duration(self._script_left(script_done))}"
+        known = 0.0 < status.dt_critical < math.inf
+        critical = f" ({status.dt / status.dt_critical:.2f} of critical)" if known else ""
+        parts.append(f"t {status.time:.6g} s, dt {status.dt:.4g} s{critical}")
+        parts.append(f"kinetic {status.kinetic:.4g} J, unbalanced/contact {status.unbalanced_ratio:.3g}")
+        parts.append(f"{status.particles} particles, {status.contacts} contacts, {bonds(status)}")
+        if status.walls:
+            parts.append("walls " + " ".join(f"{i}:({fx + 0.0:.4g},{fy + 0.0:.4g})" for i, fx, fy in status.walls) + " N")
+        return " | ".join(parts)
+
+    def _script_left(self, done: int) -> float:
+        """Seconds left for the script, at the mean speed since its start: steps of early and late commands differ."""
+        spent, here = self._now() - self._script_began, done - self._script_first
+        return (self._script_steps - done) * spent / here if here > 0 else -1.0
+
+    def command_finished(self) -> None:
+        """The command is done, or left by an error."""
+        if self._command is not None:
+            self._script_done += self._command.steps
+            self._command = None
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+    # -- the end ---------------------------------------------------------------------------------------------
+
+    def stages(self, timers: Timers, comm: Any) -> None:
+        """Collective: the table of stages."""
+        summary = timers.merge(comm)
+        if not self._speaks:
+            return
+        self.command_finished()
+        if self._terminal:
+            print_table(summary, self._stream)
+        else:
+            self._print(stage_text(summary))
+        self._print(closing_line(summary))
+
+
+def bonds(status: StepStatus) -> str:
+    """Bonds and what became of the others."""
+    text = f"{status.bonds} bonds"
+    if status.broken_tension or status.broken_shear:
+        text += f" ({status.broken_tension} broken in tension, {status.broken_shear} in shear)"
+    return text
+
+
+def percent(done: int, total: int) -> str:
+    """``37.5%``."""
+    return f"{100.0 * done / total:.1f}%" if total else "--"
+
+
+# -- stages ----------------------------------------------------------------------------------------------------
+
+HEADINGS = ("stage", "mean s", "max s", "max/mean", "%", "calls")
+
+
+def stage_rows(summary: Summary) -> list[tuple[str, ...]]:
+    """The table of stages as text, longest stage first; the last row is the rest of the wall time."""
+    rows: list[tuple[str, ...]] = []
+    for s in sorted(summary.stages, key=lambda s: -s.mean):
+        share = 100.0 * s.mean / summary.wall if summary.wall > 0 else 0.0
+        spread = f"{s.largest / s.mean:.2f}" if s.mean > 0 else "--"
+        rows.append((s.name, f"{s.mean:.2f}", f"{s.largest:.2f}", spread, f"{share:.1f}", str(s.calls)))
+    rest = max(summary.wall - sum(s.mean for s in summary.stages), 0.0)
+    share = 100.0 * rest / summary.wall if summary.wall > 0 else 0.0
+    rows.append(("other", f"{rest:.2f}", "", "", f"{share:.1f}", ""))
+    return rows
+
+
+def stage_text(summary: Summary) -> str:
+    """The table in aligned plain text."""
+    table = [HEADINGS, *stage_rows(summary)]
+    widths = [max(len(row[i]) for row in table) for i in range(len(HEADINGS))]
+    lines = []
+    for first, *others in table:
+        cells = [first.ljust(widths[0]), *(c.rjust(w) for c, w in zip(others, widths[1:], strict=True))]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def closing_line(summary: Summary) -> str:
+    """Totals: wall time, steps, rates, imbalance."""
+    wall = max(summary.wall, 1e-9)
+    parts = [
+        f"{summary.steps} steps in {duration(summary.wall)}",
+        f"{rate(summary.steps / wall)} steps/s",
+        f"{rate(summary.particle_steps / wall)} particle-steps/s",
+    ]
+    if summary.ranks > 1:
+        parts.append(f"imbalance of {summary.ranks} ranks {summary.imbalance:.2f}")
+    return " | ".join(parts)
+
+
+# -- terminal --------------------------------------------------------------------------------------------------
+
+
+def print_table(summary: Summary, stream: TextIO) -> None:
+    """The table of stages, drawn."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table()
+    for i, name in enumerate(HEADINGS):
+        table.add_column(name, justify="right" if i else "left")
+    for row in stage_rows(summary):
+        table.add_row(*row)
+    Console(file=stream).print(table)
+
+
+class Bar:
+    """Two bars at the foot of a terminal, the command's and the script's; lines scroll above them."""
+
+    REDRAW = 0.2
+
+    def __init__(self, stream: TextIO, name: str, steps: int, script_steps: int, script_done: int) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        # No thread of its own (auto_refresh): a thread would take time from the step loop at odd moments.
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=Console(file=stream),
+            auto_refresh=False,
+            transient=True,
+        )
+        self._command = self._progress.add_task(name, total=steps)
+        self._script = (
+            self._progress.add_task("script", total=script_steps, completed=script_done) if script_steps else None
+        )
+        self._drawn = 0.0
+        self._progress.start()
+
+    def update(self, done: int, script_done: int) -> None:
+        """Move the bars; redrawn a few times a second."""
+        self._progress.update(self._command, completed=done)
+        if self._script is not None:
+            self._progress.update(self._script, completed=script_done)
+        if time.monotonic() - self._drawn > self.REDRAW:
+            self._progress.refresh()
+            self._drawn = time.monotonic()
+
+    def print(self, text: str) -> None:
+        """A line above the bars."""
+        self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def close(self) -> None:
+        """Take the bars away."""
+        self._progress.stop()

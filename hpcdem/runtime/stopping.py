@@ -1,0 +1,172 @@
+"""Requests to save or to stop, from outside: signals, a time limit, the end of a Slurm job.
+
+| what | then |
+|---|---|
+| SIGUSR1 | save a checkpoint and go on |
+| SIGUSR2, SIGTERM, first SIGINT (Ctrl-C) | save a checkpoint and stop, exit code 85 |
+| second SIGINT | stop at once, nothing is saved |
+| time limit or end of the Slurm job | save and stop, early enough for the save to finish |
+
+A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
+seen it. The step loop puts `local_request()` into a maximum that it takes over the ranks anyway, and hands the
+result to `decide()`.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from types import FrameType
+from typing import Any, Literal
+
+import numpy as np
+
+from hpcdem.errors import UsageError
+
+NONE, SAVE, STOP = 0, 1, 2
+"""Codes of a request; the larger one wins."""
+
+Decision = Literal["none", "save", "stop"]
+
+HANDLED = ("SIGUSR1", "SIGUSR2", "SIGTERM", "SIGINT")
+SAME_REQUEST = 2.0
+"""A SIGUSR1 this soon [s] after a save was sent to all ranks at once and is answered already."""
+
+
+def parse_limit(text: str) -> float:
+    """Seconds in ``HH:MM:SS``, ``MM:SS``, ``D-HH:MM:SS`` (as Slurm writes it) or a plain number of seconds.
+
+    UsageError for anything else.
+    """
+    try:
+        days, dash, clock = text.strip().rpartition("-")
+        seconds = 0.0
+        for part in clock.split(":", 2):
+            seconds = 60.0 * seconds + float(part)
+        seconds += 86400.0 * int(days if dash else 0)
+    except ValueError:
+        seconds = -1.0
+    if not 0.0 < seconds < np.inf:
+        raise UsageError(f"--time-limit {text}: expected a time as HH:MM:SS, for example 11:30:00")
+    return seconds
+
+
+class StopRequests:
+    """The requests seen by this rank.
+
+    time_limit: seconds from now (wall clock) after which the run must have ended; None: no limit of its own.
+    end_time: the same as a time of day [s since 1970], as Slurm gives it.
+    """
+
+    def __init__(self, time_limit: float | None = None, end_time: float | None = None) -> None:
+        self.reason = ""
+        self._began = time.monotonic()
+        self._limits: list[tuple[float, float, str]] = []  # latest end (monotonic), first margin, name
+        if time_limit is not None:
+            self._limits.append((self._began + time_limit, min(60.0, 0.05 * time_limit), "the time limit"))
+        if end_time is not None:
+            left = end_time - time.time()
+            self._limits.append((self._began + left, min(120.0, 0.05 * left), "the end of the Slurm job"))
+        self._save = False
+        self._stop = ""
+        self._interrupts = 0
+        self._last_save_took: float | None = None
+        self._last_saved = -np.inf
+        self._before: dict[int, Any] = {}
+
+    # -- signals ---------------------------------------------------------------------------------------------
+
+    def install(self) -> StopRequests:
+        """Take over the signals; call it after MPI has begun, which may set its own handlers."""
+        for name in HANDLED:
+            number = getattr(signal, name, None)
+            if number is not None:
+                self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def uninstall(self) -> None:
+        """Give the signals back."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before.clear()
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """Only sets a flag: the state may be in the middle of a step."""
+        name = signal.Signals(number).name
+        if name == "SIGUSR1":
+            self._save = self._save or time.monotonic() - self._last_saved > SAME_REQUEST
+            return
+        if name == "SIGINT":
+            self._interrupts += 1
+            if self._interrupts > 1:
+                raise KeyboardInterrupt
+        self._stop = self._stop or ("Ctrl-C" if name == "SIGINT" else name)
+
+    # -- the questions of the step loop ----------------------------------------------------------------------
+
+    def local_request(self) -> int:
+        """What this rank knows of: 0 nothing, 1 save, 2 save and stop."""
+        if not self._stop:
+            now = time.monotonic()
+            for end, _, name in self._limits:
+                if now >= end - self.margin():
+                    self._stop = name
+        return STOP if self._stop else SAVE if self._save else NONE
+
+    def decide(self, code: int) -> Decision:
+        """The decision that belongs to the largest code of all ranks; a save request is answered by it."""
+        if code >= STOP:
+            self.reason = self._stop or "a request to another rank"
+            return "stop"
+        if code == SAVE:
+            self._save = False
+            self._last_saved = time.monotonic()
+            return "save"
+        return "none"
+
+    def poll(self, comm: Any) -> Decision:
+        """Collective: the decision of all ranks, where no other reduction can carry the code."""
+        return self.decide(int(comm.max_into(np.array([self.local_request()], dtype=np.int64))[0]))
+
+    # -- margin ----------------------------------------------------------------------------------------------
+
+    def saved(self, seconds: float) -> None:
+        """A checkpoint took so long: the next margin follows it."""
+        self._last_save_took = seconds
+        self._last_saved = time.monotonic()
+
+    def margin(self) -> float:
+        """Seconds before the nearest limit at which the last checkpoint is begun.
+
+        Twice the last save and a second for the check interval; before the first save 5 % of the limit, at most
+        one minute (two before the end of a Slurm job).
+        """
+        if self._last_save_took is not None:
+            return 2.0 * self._last_save_took + 1.0
+        return max((margin for _, margin, _ in self._limits), default=0.0)
+
+    def seconds_left(self) -> float | None:
+        """Seconds to the nearest limit; None without one."""
+        return min((end for end, _, _ in self._limits), default=np.inf) - time.monotonic() if self._limits else None
+
+
+def slurm_end_time(environ: Mapping[str, str] = os.environ, ask: Callable[..., Any] = subprocess.run) -> float | None:
+    """The end of this Slurm job [s since 1970]: SLURM_JOB_END_TIME, else what squeue says; None outside a job.
+
+    Ask on one rank only: a thousand squeue calls at once would hurt the controller.
+    """
+    given = environ.get("SLURM_JOB_END_TIME", "")
+    if given.isdigit():
+        return float(given)
+    job = environ.get("SLURM_JOB_ID")
+    if job is None:
+        return None
+    try:
+        answer = ask(["squeue", "-h", "-j", job, "-o", "%e"], capture_output=True, text=True, timeout=10, check=True)
+        return datetime.fromisoformat(answer.stdout.strip()).timestamp()
+    except (OSError, ValueError, subprocess.SubprocessError):
+        return None

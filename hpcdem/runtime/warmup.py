@@ -1,0 +1,201 @@
+"""The compiled kernels: where numba keeps them, and who compiles when.
+
+A kernel is compiled once per machine type and read by everyone else. numba's own cache folder is not safe when
+several processes fill it at the same time (two of them may number different kernels alike), so a folder is filled
+under a private name and then renamed; a folder with its final name is complete. Folders that already have their
+final name are only read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import shutil
+import socket
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hpcdem.runtime.launch import patient_barrier, version
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+KERNEL_FOLDERS = ("physics", "decomp", "halo", "pre", "model")
+"""Parts of hpcdem whose source text belongs to the key of the cache."""
+BUILDING = ".building-"
+UNUSED_DAYS = 60
+
+
+def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None] | None = None) -> Path:
+    """Collective: load or compile all kernels (by calling `warm`); returns the cache folder of this rank.
+
+    Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
+    a folder has still to be filled, one rank of each machine type goes first, then one of each host, then the rest,
+    so that nothing is compiled twice on a shared file system and each local disk gets its copy.
+    """
+    folder, writable = cache_folder()
+    ranks = comm.allgather((socket.gethostname(), folder.name, folder.is_dir()))
+    host, key, _ = ranks[comm.rank]
+    if all(ready for *_, ready in ranks):
+        turn = 0
+    elif next(r for r, rank in enumerate(ranks) if rank[1] == key) == comm.rank:
+        turn = 0
+    elif next(r for r, rank in enumerate(ranks) if rank[0] == host) == comm.rank:
+        turn = 1
+    else:
+        turn = 2
+    if comm.rank == 0 and not folder.is_dir():
+        log.info("compiling the kernels (first run of this version on this machine)")
+
+    damaged = False
+    for now in range(3):
+        if now == turn:
+            damaged = not load_kernels(folder, warm or compile_kernels)
+        patient_barrier(comm)
+
+    if comm.any(not writable):
+        log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
+    if comm.any(damaged):
+        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it anew")
+    if comm.rank == 0:
+        tidy(folder)
+    return folder
+
+
+def compile_kernels() -> None:
+    """Call every kernel once. Imports them: the folder must be settled before."""
+    import hpcdem.simulation as simulation
+
+    if hasattr(simulation, "warmup"):  # without it a kernel is compiled when it is first used
+        simulation.warmup()
+
+
+def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
+    """Run `warm` with the folder if it is there, else fill it; False if the cache had to be given up."""
+    import numba
+
+    private = f"{folder.name}{BUILDING}{socket.gethostname()}-{os.getpid()}"
+    building = None if folder.is_dir() else folder.with_name(private)
+    numba.config.CACHE_DIR = str(building or folder)  # type: ignore[attr-defined]
+    try:
+        warm()
+    except Exception:
+        # numba passes on whatever a damaged file makes pickle or LLVM say. If it is no cache error it comes again.
+        give_up_cache()
+        shutil.rmtree(building or folder, ignore_errors=True)
+        warm()
+        return False
+    if building is not None and building.is_dir():
+        with contextlib.suppress(OSError):  # another job was faster
+            building.rename(folder)
+        shutil.rmtree(building, ignore_errors=True)
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    return True
+
+
+def give_up_cache() -> None:
+    """No kernel of hpcdem reads or writes the disk any more in this process."""
+    from numba.core.dispatcher import Dispatcher
+
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == "hpcdem":
+            for thing in vars(module).values():
+                if isinstance(thing, Dispatcher):
+                    thing._cache.disable()  # type: ignore[attr-defined]
+
+
+# -- the folder ------------------------------------------------------------------------------------------------
+
+
+def cache_folder() -> tuple[Path, bool]:
+    """The folder for this version, machine type and user; False with it if it had to go to the temporary folder."""
+    key = cache_key()
+    base = cache_base()
+    if can_write(base):
+        return base / key, True
+    return temporary_base() / key, False
+
+
+def cache_base() -> Path:
+    """NUMBA_CACHE_DIR if set, else the user's cache folder."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    if given:
+        return Path(given).absolute()
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hpcdem"
+
+
+def can_write(base: Path) -> bool:
+    """Whether files can be made in the folder, which is made first."""
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=base):
+            return True
+    except OSError:
+        return False
+
+
+def temporary_base() -> Path:
+    """A folder on this host that is ours alone: numba executes what it reads from its cache."""
+    if hasattr(os, "getuid"):
+        mine = Path(tempfile.gettempdir()) / f"hpcdem-{os.getuid()}"
+        with contextlib.suppress(OSError):
+            mine.mkdir(mode=0o700, exist_ok=True)
+            found = mine.lstat()
+            if found.st_uid == os.getuid() and found.st_mode & 0o170077 == 0o040000 and can_write(mine):
+                return mine
+    return Path(tempfile.mkdtemp(prefix="hpcdem-"))
+
+
+def cache_key() -> str:
+    """Name of a cache folder: all that compiled code depends on.
+
+    numba compares the source file of a kernel, but not of the functions that are inlined into it, and knows nothing
+    of constants: hence the digest over all kernel sources.
+    """
+    import llvmlite.binding as llvm
+    import numba
+
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    sources = [package / "simulation.py", *(p for f in KERNEL_FOLDERS for p in sorted((package / f).rglob("*.py")))]
+    for source in sources:
+        if source.exists():
+            digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
+    features = llvm.get_host_cpu_features().flatten()
+    settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k in COMPILER_SETTINGS)
+    digest.update(repr((sys.version_info[:2], llvm.get_host_cpu_name(), features, settings)).encode())
+    release = version().split()[0]
+    return f"{release}-numba{numba.__version__}-{llvm.get_host_cpu_name()}-{digest.hexdigest()[:12]}"
+
+
+COMPILER_SETTINGS = frozenset(
+    f"NUMBA_{name}"
+    for name in ("DISABLE_INTEL_SVML", "CPU_NAME", "CPU_FEATURES", "OPT", "BOUNDSCHECK", "THREADING_LAYER")
+)
+"""Variables that change the code numba makes, or the library it calls, without numba's cache seeing it."""
+
+
+def tidy(folder: Path) -> None:
+    """Note that the folder was used, and remove its neighbours that were not for two months."""
+    with contextlib.suppress(OSError):
+        os.utime(folder)
+        for other in folder.parent.iterdir():
+            age = (time.time() - other.stat().st_mtime) / 86400.0
+            if "-numba" in other.name and age > (1 if BUILDING in other.name else UNUSED_DAYS):
+                shutil.rmtree(other, ignore_errors=True)
+
+
+def warmup(log: Log) -> Path:
+    """Compile for later runs, as on a login node: `hpcdem warmup`."""
+    from hpcdem.halo.comm import SerialComm
+
+    began = time.monotonic()
+    folder = prepare_kernels(SerialComm(), log)
+    log.info(f"kernels ready in {time.monotonic() - began:.1f} s: {folder}")
+    return folder
