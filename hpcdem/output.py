@@ -7,6 +7,7 @@ that fails before leaves nothing behind.
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,7 +76,7 @@ def folder(sim: Simulation) -> Path:
     return path
 
 
-def write_checkpoint(sim: Simulation) -> Path:
+def write_checkpoint(sim: Simulation, _: Snapshot | None = None) -> Path:
     """`<step>.sav`; returns its path."""
     path = folder(sim) / f"{sim.clock.step:010d}.sav"
     saving.save(sim, path)
@@ -115,9 +116,9 @@ HISTORIES = {
 """What HIST can follow: unit and function of the simulation."""
 
 
-def write_history(sim: Simulation, ident: int) -> None:
+def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
     """Append (step, time, value) to `hist_<id>.dat`."""
-    _, what = sim.history_wishes[ident]
+    what = sim.history_wishes[ident][1]
     unit, measure = HISTORIES[what]
     with sim.timers("output"):
         value = measure(sim)
@@ -126,7 +127,7 @@ def write_history(sim: Simulation, ident: int) -> None:
         _append(sim, f"hist_{ident}.dat", header, [row])
 
 
-def report(sim: Simulation) -> None:
+def report(sim: Simulation, _: Snapshot | None = None) -> None:
     """A row per wall in `walls.csv`, and the progress line where one is due."""
     with sim.timers("output"):
         force = observe.wall_forces(sim)
@@ -171,7 +172,7 @@ def finish(sim: Simulation) -> None:
         missing = [i for i in (y, x) if i not in sim.history_wishes]
         if missing:
             raise CommandError(f"PLOT {y} {x}: there is no HIST {missing[0]}")
-        text = None
+        text = ""
         if sim.comm.rank == 0:
             columns = []
             for ident in (x, y):
@@ -181,4 +182,8 @@ def finish(sim: Simulation) -> None:
             names = [sim.history_wishes[i][1] for i in (x, y)]
             rows = [f"{columns[0][s]} {columns[1][s]}" for s in columns[0] if s in columns[1]]
             text = "\n".join([f"# {names[0]} {names[1]}", *rows]) + "\n"
-        write_sections(folder(sim) / f"hist_{y}_vs_{x}.txt", sim.comm, lambda t=text: [(t or "").encode()])
+        write_sections(folder(sim) / f"hist_{y}_vs_{x}.txt", sim.comm, partial(_sections, text))
+
+
+def _sections(text: str) -> list[bytes]:
+    return [text.encode()]

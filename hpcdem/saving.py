@@ -35,7 +35,7 @@ def save(sim: Simulation, path: Path | str) -> None:
 
 def _state(sim: Simulation) -> dict[str, Any]:
     """Everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
-    closed = sim.lists is not None
+    closed = sim.closed
     longest2 = np.array([sim.lists.longest_bond2() if closed else sim._longest2])
     breaks = sim.breaks.copy()
     if closed:
@@ -67,7 +67,7 @@ def _state(sim: Simulation) -> dict[str, Any]:
 def _tables(sim: Simulation) -> dict[str, Table]:
     p = sim.particles
     columns = {name: p[name].copy() for name in FIELDS}
-    if sim.lists is not None:
+    if sim.closed:
         force = sim.lists.owned_forces()
         for k, name in enumerate(("fx", "fy", "torque")):
             columns[name] = force[:, k].copy()
@@ -137,18 +137,17 @@ def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, n
     sim.restarted = True
     if sim.comm.rank == 0:
         sim.breaks[:] = state["breaks"]
-    if tables is not None:
-        _take_particles(sim, tables)
+    origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)
     if state["closed"]:
-        _close_as_it_was(sim, state)
+        _close_as_it_was(sim, state, origin)
     sim.rebuilds = state["rebuilds"]
 
 
-def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -> None:
-    """All particles and histories, on this rank; the first close shares them out."""
+def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -> np.ndarray:
+    """All particles and histories, on this rank; the first close shares them out. Returns their positions at the last
+    rebuild (n, 2) [m]."""
     columns = dict(tables["particles"])
     sim.particles.append(**{name: columns[name] for name in FIELDS})
-    sim.saved_origin = np.column_stack([columns["x0"], columns["y0"]])
     pairs, walls = tables["pairs"], tables["wall_contacts"]
     none = np.zeros(len(walls["gid"]), np.int64)
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
@@ -160,23 +159,20 @@ def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -
     order = np.argsort(owner, kind="stable")
     ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
     sim.hist = Histories(ptr, partner[order], fs[order], extra[order], bond[order])
+    return np.column_stack([columns["x0"], columns["y0"]])
 
 
-def _close_as_it_was(sim: Simulation, state: dict[str, Any]) -> None:
+def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray) -> None:
     """Lists as they were when the state was saved: built from the positions and walls of that rebuild, then the present
     positions put in. Order, ownership and lists depend on the former alone."""
     p, walls = sim.particles, sim.walls
     saved_lattice = dataclasses.replace(sim.lattice)
     travel = walls.travel.copy()
     now = walls.p1.copy(), walls.p2.copy()
-    if len(p):
-        present = p.positions()
-        p["x"][:], p["y"][:] = sim.saved_origin.T
-        # The present positions travel with their particles in columns that the close does not read.
-        p.cold[:, FX : FX + 2], forces = present, p.cold[:, FX : TORQUE + 1].copy()
-    else:
-        forces = np.empty((0, 3))
-    gid = p["gid"].copy()
+    gid, forces = p["gid"].copy(), p.cold[:, FX : TORQUE + 1].copy()
+    # The present positions travel with their particles in columns that the close does not read.
+    p.cold[:, FX : FX + 2] = p.positions()
+    p["x"][:], p["y"][:] = origin.T
     walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
     sim._close(frozen=True)
     walls.p1, walls.p2, walls.travel = now[0], now[1], travel

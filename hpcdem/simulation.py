@@ -109,9 +109,9 @@ class Simulation:
         self.series_open: set[str] = set()
         self.restarted = False
         self.lattice = Lattice()
-        self.hist: Histories | None = Histories.empty(0)
-        self.lists: neighbours.ContactLists | None = None
-        self.borders: np.ndarray | None = None
+        self._hist: Histories | None = Histories.empty(0)
+        self._lists: neighbours.ContactLists | None = None
+        self.borders = np.zeros(0, np.int64)
         self.origin = np.empty((0, 2))
         self.rebuilds = 0
         self._wants_balance = True
@@ -197,6 +197,29 @@ class Simulation:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
         self.lattice.countdown = self.lattice.pace = 1
 
+    # ---- open and closed -----------------------------------------------------------------------------------------
+
+    @property
+    def closed(self) -> bool:
+        """Whether the lists are built and the ghosts in place."""
+        return self._lists is not None
+
+    @property
+    def lists(self) -> neighbours.ContactLists:
+        """The contact lists of a closed model."""
+        assert self._lists is not None, "the model is open: there are no lists"
+        return self._lists
+
+    @property
+    def hist(self) -> Histories:
+        """The contact histories of an open model, one entry list per owned particle."""
+        assert self._hist is not None, "the model is closed: histories are in the lists"
+        return self._hist
+
+    @hist.setter
+    def hist(self, histories: Histories) -> None:
+        self._hist = histories
+
     # ---- lists, ghosts, ownership --------------------------------------------------------------------------------
 
     def rebuild(self) -> None:
@@ -207,7 +230,7 @@ class Simulation:
 
     def open(self) -> None:
         """Make the model free to be changed: owned particles, their histories and forces only."""
-        if self.lists is None:
+        if not self.closed:
             return
         self.particles.cold[:, FX : TORQUE + 1] = self.lists.owned_forces()
         self._open_lists()
@@ -216,10 +239,10 @@ class Simulation:
         p = self.particles
         self._harvest()
         self._longest2 = self.lists.longest_bond2()
-        self.hist = self.lists.histories(p.ihot)
+        self._hist = self.lists.histories(p.ihot)
         self.halo.close()
         p.set_owned(p.hot[p.owned].copy(), p.cold)
-        self.lists = None
+        self._lists = None
 
     def _harvest(self) -> None:
         """Take over what the force loops counted."""
@@ -231,7 +254,7 @@ class Simulation:
 
         least_skin [m]: pairs up to this gap will be in the lists, if the model was open.
         """
-        if self.lists is None:
+        if not self.closed:
             self._close(least_skin=least_skin)
             self.lists.set_owned_forces(self.particles.cold[:, FX : TORQUE + 1])
         self.refresh_tables()
@@ -257,12 +280,12 @@ class Simulation:
             self.origin = p.positions()
             self.walls.travel[:] = 0.0
             self._wall_table = self.walls.table()
-            self.lists = neighbours.build(
+            self._lists = neighbours.build(
                 storage, cx, cy, p.n_left, p.n_own, hist, self._wall_table, lattice.skin,
                 min(lattice.side, lattice.bond_reach + lattice.skin), self.threads,
             )  # fmt: skip
             self._count_bonds(hist)
-            self.hist = None
+            self._hist = None
             lattice.age = 0
             self.rebuilds += 1
             self._tables_stale = True
@@ -349,7 +372,7 @@ class Simulation:
         if comm.size == 1:
             self.borders, self._border_side = np.array([0, 1]), side
             return
-        if self.borders is None:
+        if not len(self.borders):
             self._wants_balance = True
         elif self._border_side != side:
             self.borders = strips.separate(np.rint(self.borders * (self._border_side / side)).astype(np.int64))
@@ -393,7 +416,7 @@ class Simulation:
     def broken(self) -> tuple[int, int]:
         """Bonds broken so far in tension and in shear. Collective."""
         total = self.breaks.copy()
-        if self.lists is not None:
+        if self.closed:
             total += self.uncollected_breaks()
         self.comm.sum_into(total)
         return int(total[0]), int(total[1])
@@ -404,7 +427,7 @@ class Simulation:
 
     def bonds_left(self) -> int:
         """Bonds that hold. Collective."""
-        if self.lists is None:
+        if not self.closed:
             return self.bonds
         return self.bonds - int(self.comm.sum_into(self.uncollected_breaks().sum(keepdims=True))[0])
 
@@ -416,7 +439,7 @@ class Simulation:
 
     def refresh_tables(self) -> None:
         """Masses, law tables and argument lists of the kernels, from materials, walls and settings."""
-        if not self._tables_stale or self.lists is None:
+        if not self._tables_stale or not self.closed:
             return
         p, s, lists = self.particles, self.settings, self.lists
         rows, n_mat = self.materials.rows, len(self.materials)
@@ -489,7 +512,8 @@ class Simulation:
         total = self.count(int(bad.sum()))
         what = "a number is not finite" if broken else "a particle moves over half its radius per step"
         places = "\n".join(
-            f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}" for g, x, y, vx, vy, rank in rows
+            f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}"
+            for g, x, y, vx, vy, rank in rows
         )
         raise PhysicsError(
             f"step {self.clock.step}: {what} ({total} particles); the time step {dt:g} s is probably too large, "

@@ -83,7 +83,8 @@ def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
     lists = sim.lists
     which = _flags_with_ghosts(sim, where)
     gone = sum(
-        contacts.break_bonds(t, lists.blocks, lists.ptr, lists.partner, lists.bond, which) for t in range(lists.n_blocks)
+        contacts.break_bonds(t, lists.blocks, lists.ptr, lists.partner, lists.bond, which)
+        for t in range(lists.n_blocks)
     )
     total = sim.count(gone)
     sim.bonds -= total

@@ -174,8 +174,9 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
     """EXP: rows "x y r [group]" in the order of ids, 13 significant digits."""
     p = sim.particles
     which = chosen(sim, where)
-    mine = np.column_stack([p["gid"][which], p["group"][which]]), np.column_stack(
-        [p["x"][which], p["y"][which], p["radius"][which]]
+    mine = (
+        np.column_stack([p["gid"][which], p["group"][which]]),
+        np.column_stack([p["x"][which], p["y"][which], p["radius"][which]]),
     )
     parts = sim.comm.gather(mine)
     text = ""

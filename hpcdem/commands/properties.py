@@ -58,7 +58,9 @@ def prop(
     SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving kn or
     ks without it the linear one. Existing contacts use the new values from the next step.
     """
-    given = {k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None}
+    given = {
+        k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None
+    }
     for name in NOT_NEGATIVE:
         if given.get(name, 0.0) < 0.0:
             raise CommandError(f"{name} must not be negative, got {given[name]:g}")

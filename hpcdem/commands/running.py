@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -43,12 +44,15 @@ def imple(
     """
     if (xmove is None) == (ymove is None):
         raise CommandError("IMPLE needs either xmove or ymove")
-    way, axis, name = (xmove, 0, "xv") if xmove is not None else (ymove, 1, "yv")
+    axis, name = (0, "xv") if xmove is not None else (1, "yv")
+    way = float(xmove if xmove is not None else ymove or 0.0)
     speed = float(sim.walls.v[sim.walls.row(wall), axis])
     if speed == 0.0:
         raise CommandError(f"wall {wall} does not move: {name} is 0, so it never gets {way:g} m far")
     if way * speed < 0.0 and sim.log is not None:
-        sim.log.warn(f"IMPLE: wall {wall} moves with {name} {speed:g}, against {way:g}; the distance is taken as positive")
+        sim.log.warn(
+            f"IMPLE: wall {wall} moves with {name} {speed:g}, against {way:g}; the distance is taken as positive"
+        )
     prepare(sim)
     per_step = abs(speed) * sim.clock.dt
     given = {"save": save, "print": print, "ps": ps, "vtk": vtk}
@@ -92,7 +96,9 @@ def _check_materials(sim: Simulation) -> None:
     p = sim.particles
     light = (sim.materials.rows["density"][p["material"]] <= 0.0) & (p["fix"] != 7)
     if sim.comm.any(bool(light.any())):
-        raise CommandError(f"{sim.count(int(light.sum()))} particles that are free to move have no density (PROP density)")
+        raise CommandError(
+            f"{sim.count(int(light.sum()))} particles that are free to move have no density (PROP density)"
+        )
 
 
 def _check_laws(sim: Simulation) -> None:
@@ -124,7 +130,9 @@ def time_step(sim: Simulation) -> float:
     free = p["fix"] != 7
     light = float(sim.comm.min_into(np.array([sim.body[free, 0].min() if free.any() else math.inf]))[0])
     if not math.isfinite(light):
-        raise CommandError("SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT")
+        raise CommandError(
+            "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
+        )
     used = np.flatnonzero(sim.used(p["material"], sim.materials))
     n = len(sim.materials)
     pairs = sim.pair_laws.reshape(n, n, 4)[np.ix_(used, used)].reshape(-1, 4)
@@ -163,7 +171,7 @@ class Task:
 
     every: int
     origin: int
-    run: Callable[[output.Snapshot], None]
+    run: Callable[[output.Snapshot], object]
 
     def next_after(self, step: int) -> int:
         """The first step after `step` at which it is due."""
@@ -175,17 +183,17 @@ def _tasks(sim: Simulation) -> list[Task]:
     progress = sim.progress
     assert progress is not None
     origin, intervals = progress["origin"], progress["intervals"]
-    tasks = []
+    tasks: list[Task] = []
     for ident, (every, _) in sorted(sim.history_wishes.items()):
-        tasks.append(Task(every, 0, lambda _, i=ident: output.write_history(sim, i)))
+        tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
     bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
-    tasks.append(Task(bar, progress["first"], lambda _: output.report(sim)))
+    tasks.append(Task(bar, progress["first"], partial(output.report, sim)))
     shot = output.Snapshot
     for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
         if intervals[kind] > 0:
             tasks.append(Task(intervals[kind], origin, write))
     if intervals["save"] > 0:
-        tasks.append(Task(intervals["save"], origin, lambda _: output.write_checkpoint(sim)))
+        tasks.append(Task(intervals["save"], origin, partial(output.write_checkpoint, sim)))
     return tasks
 
 

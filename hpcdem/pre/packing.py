@@ -100,9 +100,7 @@ def insert_randomly(
     return np.column_stack([px[new], py[new], pr[new]]), int(tried)
 
 
-def lattice(
-    radii: np.ndarray, x: tuple[float, float], y: tuple[float, float], seed: int, stream: int
-) -> np.ndarray:
+def lattice(radii: np.ndarray, x: tuple[float, float], y: tuple[float, float], seed: int, stream: int) -> np.ndarray:
     """Square lattice of spacing 2 max(radii), row by row from the lower left, a listed radius drawn at each node.
 
     Returns (n, 3) f8 rows x, y, r [m]; every node keeps half a spacing from the edges.

@@ -47,7 +47,9 @@ class Histories:
     @staticmethod
     def empty(n: int) -> Histories:
         """No memory for n particles."""
-        return Histories(np.zeros(n + 1, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int32))
+        return Histories(
+            np.zeros(n + 1, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int32)
+        )
 
     def counts(self) -> np.ndarray:
         """Number of entries per particle (n,)."""
@@ -208,7 +210,23 @@ class ContactLists:
     """Pair slots and wall slots of this rank, cut into blocks, with the force rows they add to.
 
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
+
+    Pair slots: partner (storage row), fs [N], bond (type), u_made [m]; row i of block t has the slots ptr[poff[t] + i - lo[t]] up
+    to the next. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side; block t has wptr[t] : wptr[t+1].
     """
+
+    ptr: np.ndarray
+    partner: np.ndarray
+    fs: np.ndarray
+    bond: np.ndarray
+    u_made: np.ndarray
+    wptr: np.ndarray
+    slot_row: np.ndarray
+    slot_wall: np.ndarray
+    slot_fs: np.ndarray
+    slot_side: np.ndarray
+    new_side: np.ndarray
+    n_pairs: int
 
     def __init__(self, n_left: int, n_own: int, blocks: Blocks) -> None:
         self.n_left, self.n_own, self.blocks = n_left, n_own, blocks
