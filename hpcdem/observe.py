@@ -21,7 +21,8 @@ FN, FS, FORCE_X, FORCE_Y, AT_X, AT_Y, OVERLAP, STIFFNESS = range(8)
 
 
 def contact_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
-    """Touching or bonded pairs, each once over all ranks: (m, 8) f8 [columns above] and (m, 3) i8 [gid, gid, bond type]."""
+    """Touching or bonded pairs, each once over all ranks: (m, 8) f8 [columns above] and (m, 3) i8 [gid, gid, bond
+    type]."""
     lists, p = sim.lists, sim.particles
     out, iout = np.empty((lists.n_pairs, 8)), np.empty((lists.n_pairs, 3), np.int64)
     n = 0
@@ -34,7 +35,8 @@ def contact_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wall_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
-    """Wall contacts of the owned particles: (m, 8) f8 and (m, 2) i8 [gid, wall row]; forces are those on the particle."""
+    """Wall contacts of the owned particles: (m, 8) f8 and (m, 2) i8 [gid, wall row]; forces are those on the
+    particle."""
     lists, p = sim.lists, sim.particles
     sim._wall_table[:, 0:2], sim._wall_table[:, 2:4] = sim.walls.p1, sim.walls.p2
     m = len(lists.slot_row)

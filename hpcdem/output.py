@@ -93,7 +93,8 @@ def write_last_words(sim: Simulation) -> None:
 
 
 def unbalanced(sim: Simulation) -> float:
-    """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts. Collective."""
+    """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
+    Collective."""
     p, s = sim.particles, sim.settings
     force = sim.lists.owned_forces()
     free = p["fix"] & 3
@@ -132,10 +133,11 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
     with sim.timers("output"):
         force = observe.wall_forces(sim)
         w, clock = sim.walls, sim.clock
-        rows = [
-            ",".join([str(clock.step), repr(clock.time), str(w.id[k]), *(repr(float(v)) for v in (*w.p1[k], *w.p2[k], *force[k]))])
-            for k in w.in_output_order()
-        ]  # fmt: skip
+        rows = []
+        for k in w.in_output_order():
+            numbers = (clock.time, *w.p1[k], *w.p2[k], *force[k])
+            time, *rest = (repr(float(v)) for v in numbers)
+            rows.append(",".join([str(clock.step), time, str(w.id[k]), *rest]))
         if rows:
             _append(sim, "walls.csv", WALL_COLUMNS, rows)
         wanted = sim.log is not None and sim.log.wants(clock.step)

@@ -96,7 +96,8 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`, on any number of ranks and threads. Collective.
 
     Returns where the run that saved was: "script" (its text), "position" (index of the statement), "progress" (of the
-    CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is missing, foreign or damaged; the simulation is then as it was.
+    CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is
+    missing, foreign or damaged; the simulation is then as it was.
     """
     found = None
     error = None

@@ -45,8 +45,8 @@ LARGEST_STRIDE = 0.5
 class Lattice:
     """What the order of particles and the moment of the next rebuild depend on; global, saved in checkpoints.
 
-    side h of the cells [m], skin [m], longest bond [m] as last seen, steps since the lists were built, steps to the next
-    look at the motion, steps between the last two looks, lists that came late.
+    side h of the cells [m], skin [m], longest bond [m] as last seen, steps since the lists were built, steps to the
+    next look at the motion, steps between the last two looks, lists that came late.
     """
 
     side: float = 0.0
@@ -62,7 +62,8 @@ class Lattice:
 class Simulation:
     """One model on one communicator.
 
-    comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never stopped).
+    comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
+    stopped).
     """
 
     def __init__(

@@ -30,9 +30,9 @@ def bond(
 ) -> int:
     """Bond the pairs with both particles in `where` and d - (Ra + Rb) rext <= tolerate; returns the bonds made.
 
-    Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in `where`
-    that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m] defaults to
-    1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP.
+    Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in
+    `where` that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m]
+    defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP.
     """
     values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
     elastic = any(v is not None for v in values.values())
@@ -78,7 +78,8 @@ def bond(
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
-    """Remove the bonds with both ends in `where`; returns how many. Shear forces stay, limited by friction from then on."""
+    """Remove the bonds with both ends in `where`; returns how many. Shear forces stay, limited by friction from then
+    on."""
     sim.close()
     lists = sim.lists
     which = _flags_with_ghosts(sim, where)

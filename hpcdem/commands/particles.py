@@ -213,7 +213,8 @@ def _add(
     first_gid: int | None = None,
     material: int = 0,
 ) -> int:
-    """New particles from (n, 3) rows x, y, r, the same on all ranks; rank 0 takes them until the next cycle shares them out."""
+    """New particles from (n, 3) rows x, y, r, the same on all ranks; rank 0 takes them until the next cycle shares them
+    out."""
     sim.open()
     first = sim.next_gid if first_gid is None else first_gid
     sim.next_gid = max(sim.next_gid, first + len(rows))

@@ -14,7 +14,8 @@ NOT_NEGATIVE = ("density", "fric", "shear", "damp", "kn", "ks")
 
 
 def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
-    """Flags (n_own,) of the owned particles in a selection; None is all. Collective if `where` uses {top} and the like."""
+    """Flags (n_own,) of the owned particles in a selection; None is all. Collective if `where` uses {top} and the
+    like."""
     p = sim.particles
     if where is None:
         return np.ones(len(p), bool)
@@ -55,8 +56,8 @@ def prop(
 ) -> None:
     """Set properties of the particles in `where`; keys left out keep their values.
 
-    SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving kn or
-    ks without it the linear one. Existing contacts use the new values from the next step.
+    SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving
+    kn or ks without it the linear one. Existing contacts use the new values from the next step.
     """
     given = {
         k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None

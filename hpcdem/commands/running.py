@@ -38,7 +38,8 @@ def imple(
     ps: float | None = None,
     vtk: float | None = None,
 ) -> None:
-    """IMPLE: step until the wall has gone xmove or ymove [m]; intervals are ways of the wall [m] from the start of the command.
+    """IMPLE: step until the wall has gone xmove or ymove [m]; intervals are ways of the wall [m] from the start of the
+    command.
 
     Kinds of output that are left out are off during the command; a frame is always written at its end.
     """
@@ -118,8 +119,8 @@ def _check_laws(sim: Simulation) -> None:
 def time_step(sim: Simulation) -> float:
     """The time step [s]: SET DT, or SET frac f: f sqrt(m_min / k_max). Collective.
 
-    m_min: the smallest mass of a particle with a free degree of freedom; k_max: the largest pair stiffness, linear: of any
-    two materials or material and wall in use; Hertz: tangent at the largest overlap (1 % of R without contacts).
+    m_min: the smallest mass of a particle with a free degree of freedom; k_max: the largest pair stiffness, linear: of
+    any two materials or material and wall in use; Hertz: tangent at the largest overlap (1 % of R without contacts).
     Source: step count published with Li et al. 2021.
     """
     s, p = sim.settings, sim.particles

@@ -10,8 +10,8 @@ import numpy as np
 class Migration:
     """One change of ownership: row i of any per-particle table goes to rank owner[i].
 
-    Rows that stay are not copied through MPI. The new rows are [stayed | arrived from rank 0, 1, ...], the same order in
-    every table.
+    Rows that stay are not copied through MPI. The new rows are [stayed | arrived from rank 0, 1, ...], the same order
+    in every table.
     """
 
     def __init__(self, comm: Any, owner: np.ndarray) -> None:

@@ -1,7 +1,7 @@
 """`.sav` files: HDF5, in the order of ids, free of ranks and threads.
 
-Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table, one
-dataset per column, each with the attribute `sum` (its 64-bit words added up modulo 2^64), which is compared after
+Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
+one dataset per column, each with the attribute `sum` (its 64-bit words added up modulo 2^64), which is compared after
 writing, before the file gets its name, and again on reading.
 """
 
@@ -31,7 +31,8 @@ def word_sum(values: np.ndarray) -> int:
 
 
 def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Any) -> None:
-    """Collective. Writes to a temporary name, reads it back, then renames. HpcdemError on all ranks if anything fails."""
+    """Collective. Writes to a temporary name, reads it back, then renames. HpcdemError on all ranks if anything
+    fails."""
     with atomic_path(path, comm) as temporary:
         sums = {}
         writer = Writer(os.fspath(path), temporary, comm)
@@ -62,9 +63,10 @@ def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, n
         try:
             if file.attrs.get("format") != FORMAT:
                 raise HpcdemError(f"{os.fspath(path)} is not an hpcdem checkpoint")
-            if int(file.attrs["version"]) > VERSION:
+            version = int(file.attrs["version"])
+            if version > VERSION:
                 raise HpcdemError(
-                    f"{os.fspath(path)} has checkpoint version {int(file.attrs['version'])}, this program reads up to {VERSION}"
+                    f"{os.fspath(path)} has checkpoint version {version}, this program reads up to {VERSION}"
                 )
             state, sums = json.loads(file.attrs["state"]), json.loads(file.attrs["sums"])
             tables: dict[str, dict[str, np.ndarray]] = {}

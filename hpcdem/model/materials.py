@@ -22,8 +22,8 @@ MATERIAL = np.dtype(
         ("hertz", "f8"),
     ]
 )
-"""Density [kg/m^3, or kg/m^2 for disks], friction, shear modulus [Pa], Poisson's ratio, local damping, linear normal and shear
-stiffness [N/m], 1 for the Hertz-Mindlin law."""
+"""Density [kg/m^3, or kg/m^2 for disks], friction, shear modulus [Pa], Poisson's ratio, local damping, linear normal
+and shear stiffness [N/m], 1 for the Hertz-Mindlin law."""
 
 BOND_TYPE = np.dtype([("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8")])
 """Kind (laws.ELASTIC_BOND, laws.CONTACT_BOND), moduli [Pa], strengths [Pa; N for contact bonds]. Row 0: no bond."""

@@ -63,7 +63,8 @@ def insert_randomly(
     stream: int,
     attempts: int,
 ) -> tuple[np.ndarray, int]:
-    """Discs placed at random in a rectangle, whole, without overlap with each other or with `existing` (m, 3) [x, y, r].
+    """Discs placed at random in a rectangle, whole, without overlap with each other or with `existing` (m, 3) [x, y,
+    r].
 
     Each attempt draws a radius from the list (repeats weight it) and a place. Returns ((n, 3) f8 rows x, y, r [m] with
     n <= number, attempts used).
@@ -85,8 +86,8 @@ def insert_randomly(
     px, py, pr = np.empty(total), np.empty(total), np.empty(total)
     px[: len(old)], py[: len(old)], pr[: len(old)] = old.T
     head, nxt = np.full(shape, -1, np.int64), np.full(total, -1, np.int64)
-    # Neighbours outside the rectangle fall into the rim cells, which are one cell wide like the others: a disc inside is
-    # at most `reach` away from any it could touch.
+    # Neighbours outside the rectangle fall into the rim cells: a disc inside is at most `reach`, one cell, away from
+    # any it could touch.
     ox = np.clip(((old[:, 0] - x0) // cell).astype(np.int64) + 1, 0, shape[0] - 1)
     oy = np.clip(((old[:, 1] - y0) // cell).astype(np.int64) + 1, 0, shape[1] - 1)
     for k in range(len(old)):

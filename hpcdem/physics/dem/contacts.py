@@ -26,7 +26,8 @@ LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 
 @njit(cache=True, nogil=True)
 def _block(
-    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
+    pairs, bonds, n_mat, dt, spheres, tally,
 ):  # fmt: skip
     """Forces of block t at the current positions; shear histories move on by dt, bonds may break.
 
@@ -125,12 +126,14 @@ def forces(n_blocks, *args):
 
 @njit(cache=True, parallel=True)
 def forces_threaded(
-    n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+    n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
+    pairs, bonds, n_mat, dt, spheres, tally,
 ):  # fmt: skip
     """All blocks, one thread each (numba's threads take no tuples, hence the list of names)."""
     for t in prange(n_blocks):
         _block(
-            t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force, pairs, bonds, n_mat, dt, spheres, tally
+            t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
+            pairs, bonds, n_mat, dt, spheres, tally,
         )  # fmt: skip
 
 
@@ -226,7 +229,8 @@ def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, c
 
 @njit(cache=True, nogil=True)
 def break_bonds(t, blocks, ptr, partner, bond, chosen):
-    """Remove the bonds of block t with both ends chosen; returns how many (of pairs whose earlier end the block owns)."""
+    """Remove the bonds of block t with both ends chosen; returns how many (of pairs whose earlier end the block
+    owns)."""
     cut, lo, _, poff, _ = blocks
     gone = 0
     p = poff[t] - lo[t]

@@ -35,8 +35,9 @@ class Blocks(NamedTuple):
 
 @dataclass
 class Histories:
-    """What contacts remember, per owned particle (CSR): partner gid (-1 - w for wall w), shear force [N], a second number
-    (overlap at bonding of a pair [m]; side of a wall contact) and the bond type. Both partners of a pair carry it."""
+    """What contacts remember, per owned particle (CSR): partner gid (-1 - w for wall w), shear force [N], a second
+    number (overlap at bonding of a pair [m]; side of a wall contact) and the bond type. Both partners of a pair carry
+    it."""
 
     ptr: np.ndarray
     partner: np.ndarray
@@ -97,7 +98,8 @@ def _fill(
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
 
-    Returns slots needed, bonds placed (counted where the block owns the earlier partner), longest bonded distance squared.
+    Returns slots needed, bonds placed (counted where the block owns the earlier partner), longest bonded distance
+    squared.
     """
     a, b, last = cut[t], cut[t + 1], hi[t]
     n = 0
@@ -211,8 +213,8 @@ class ContactLists:
 
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
 
-    Pair slots: partner (storage row), fs [N], bond (type), u_made [m]; row i of block t has the slots ptr[poff[t] + i - lo[t]] up
-    to the next. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side; block t has wptr[t] : wptr[t+1].
+    Pair slots: partner (storage row), fs [N], bond (type), u_made [m]; row i of block t has the slots ptr[poff[t] + i -
+    lo[t]] up to the next. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side; block t has wptr[t] : wptr[t+1].
     """
 
     ptr: np.ndarray
@@ -308,8 +310,8 @@ def build(
 ) -> ContactLists:
     """Make the lists for particles stored in global order.
 
-    hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cx, cy (n,) i8 cells; hist: of the owned particles in storage
-    order; walls (w, 8) f8; skin [m]; bond_reach [m]: bonded pairs are listed up to this distance.
+    hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cx, cy (n,) i8 cells; hist: of the owned particles in
+    storage order; walls (w, 8) f8; skin [m]; bond_reach [m]: bonded pairs are listed up to this distance.
     """
     ihot = hot.view(np.int64)
     lists = ContactLists(n_left, n_own, make_blocks(cx, n_left, n_own, n_blocks))

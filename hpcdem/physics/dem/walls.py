@@ -146,12 +146,14 @@ def forces(n_blocks, *args):
 
 @njit(cache=True, parallel=True)
 def forces_threaded(
-    n_blocks, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side, laws_table, n_mat, dt
+    n_blocks, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
+    laws_table, n_mat, dt,
 ):  # fmt: skip
     """All blocks, one thread each."""
     for t in prange(n_blocks):
         _block(
-            t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side, laws_table, n_mat, dt
+            t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
+            laws_table, n_mat, dt,
         )  # fmt: skip
 
 
@@ -195,8 +197,8 @@ def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table
 def near(hot, n_left, n_own, walls, skin, hptr, hpartner, slot_row, slot_wall):
     """Owned particles within R + skin of a wall, or with a history there, sorted by row then wall.
 
-    hpartner: partner gids of the histories (walls are -1 - index). Returns the number of slots needed; slots past the end of
-    the arrays are counted only.
+    hpartner: partner gids of the histories (walls are -1 - index). Returns the number of slots needed; slots past the
+    end of the arrays are counted only.
     """
     n = 0
     room = len(slot_row)

@@ -2,7 +2,8 @@
 
 The bed is data of the ZDEM manual; it is read where it lies and not part of this project. Exact statements:
 
-- At rest the vertical contact force through a horizontal cut is the weight above it. For a pair cut by y = h this is the y
+- At rest the vertical contact force through a horizontal cut is the weight above it. For a pair cut by y = h this is
+the y
   component of the force that the lower particle exerts on the upper one; walls that cross the cut are frictionless.
 - Floor and BOX bottom together carry the whole weight.
 """
@@ -65,8 +66,8 @@ def test_cuts_carry_the_weight_above(bed: Simulation) -> None:
         assert lifted / weight[y > depth].sum() == pytest.approx(1.0, abs=0.005), f"cut at {depth} m"
     assert 2.0 * len(out) / len(p) == pytest.approx(4.92, rel=0.005)
 
-    # K0, horizontal over vertical stress: force through vertical cuts over the integral of the weight above. The frictionless
-    # bed is close to hydrostatic; the published number has two digits and no recorded method.
+    # K0, horizontal over vertical stress: force through vertical cuts over the integral of the weight above. The
+    # frictionless bed is close to hydrostatic; the published number has two digits and no recorded method.
     heights = np.linspace(10.0, 4110.0, 400)
     above = np.array([weight[y > h].sum() for h in heights])
     vertical = float(((above[1:] + above[:-1]) / 2.0 * np.diff(heights)).sum()) / 39950.0
@@ -91,8 +92,8 @@ def test_published_bed_stays_at_rest(bed: Simulation) -> None:
 
 
 def test_settling_reproduces_the_published_bed() -> None:
-    """A3: settle, cut at 4 km, rest. Kept 10 700 +- 2 %, small : large 2.0 +- 0.1, cover 0.943 +- 0.005 inside, rebound of the
-    top to about 4110 m (bands of the published file)."""
+    """A3: settle, cut at 4 km, rest. Kept 10 700 +- 2 %, small : large 2.0 +- 0.1, cover 0.943 +- 0.005 inside, rebound
+    of the top to about 4110 m (bands of the published file)."""
     sim = Simulation()
     deck(sim)
     particles.gen(sim, 100000, [60.0, 80.0], (10.0, 40000.0), (10.0, 10000.0))
