@@ -344,7 +344,7 @@ _SETTINGS = (
     Option("seed", "start of the random numbers of GEN", kind=INDEX, default="1", source="X"),
     Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
            kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
-    Option("gentry", "attempts of GEN per particle asked for", kind=POSITIVE, default="2.25", source="X"),
+    Option("gentry", "attempts of GEN per particle asked for", kind=POSITIVE, default="2.75", source="X"),
     Option("outdir", "folder of the results", kind=FILE, default="data", source="X"),
 )  # fmt: skip
 
