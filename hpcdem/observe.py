@@ -71,22 +71,17 @@ def kinetic_energy(sim: Simulation) -> float:
 def critical_dt(sim: Simulation) -> float:
     """0.8 min sqrt(m / sum k) over the particles that are free to move [s]; inf without contacts. Collective.
 
-    k: tangent normal stiffness of each contact of the particle (PFC's estimate).
+    k: tangent normal stiffness of each touching contact of the particle (PFC's estimate).
     """
-    p = sim.particles
-    out, iout = contact_rows(sim)
+    p, lists = sim.particles, sim.lists
+    stiffness = np.zeros(len(p))
+    for t in range(lists.n_blocks):
+        contacts.stiffness(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, sim.pair_laws, len(sim.materials), p.n_left, stiffness
+        )  # fmt: skip
     wout, wiout = wall_rows(sim)
-    gid = p["gid"]
-    order = np.argsort(gid)
-    stiffness = np.zeros(len(gid))
-    pairs = sim.comm.allgather((iout[:, :2].copy(), out[:, STIFFNESS].copy())) if sim.comm.size > 1 else None
-    ids = np.concatenate([i for i, _ in pairs]) if pairs else iout[:, :2]
-    ks = np.concatenate([k for _, k in pairs]) if pairs else out[:, STIFFNESS]
-    for ends, values in ((ids[:, 0], ks), (ids[:, 1], ks), (wiout[:, 0], wout[:, STIFFNESS])):
-        if len(gid):
-            at = np.searchsorted(gid[order], ends)
-            mine = (at < len(gid)) & (gid[order][np.minimum(at, len(gid) - 1)] == ends)
-            np.add.at(stiffness, order[at[mine]], values[mine])
+    order = np.argsort(p["gid"])
+    np.add.at(stiffness, order[np.searchsorted(p["gid"], wiout[:, 0], sorter=order)], wout[:, STIFFNESS])
     counts = (stiffness > 0.0) & ((p["fix"] & 3) != 3)
     best = float(np.sqrt(sim.body[counts, 0] / stiffness[counts]).min()) if counts.any() else math.inf
     return 0.8 * -float(sim.comm.max_into(np.array([-best]))[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hpcdem import observe
 from hpcdem.commands import bonds, particles, properties, running, settings, walls
 from hpcdem.halo.comm import SerialComm
 from hpcdem.selection import Ids
@@ -28,3 +29,5 @@ def rehearse(threads: int = 1) -> None:
     running.prepare(sim)
     sim.rebuild()
     sim.step()
+    observe.frame(sim)
+    observe.critical_dt(sim)

@@ -22,6 +22,9 @@ from hpcdem.io.textnum import TextTable
 PIECE = 4 << 20
 """Most bytes sent to rank 0 in one message."""
 
+AHEAD = 64 << 20
+"""Most bytes of text a rank keeps ready for rank 0."""
+
 _TAG = 7301
 _CAUSES = {
     errno.ENOSPC: "no space left on the disk",
@@ -191,7 +194,7 @@ def write_sections(path: str | os.PathLike, comm: Any, build: Callable[[], Seque
             error = f"cannot write {os.fspath(path)}: {failure}"
         try:
             comm.agree(error)
-            for section in sections:
+            for section in sections if comm.rank == 0 else _made_ahead(sections):
                 if isinstance(section, bytes):
                     writer.write(section)
                 else:
@@ -199,6 +202,33 @@ def write_sections(path: str | os.PathLike, comm: Any, build: Callable[[], Seque
                         writer.write(piece)
         finally:
             writer.close()
+
+
+_scratch = np.empty(0, dtype=np.uint8)
+
+
+def _made_ahead(sections: Sequence[Section]) -> list[bytes | TextTable | np.ndarray]:
+    """The sections with tables turned into text while rank 0 is still busy with its own, up to AHEAD bytes of it.
+
+    The text stands in memory that is kept for the next file, and is valid until then.
+    """
+    global _scratch
+    result: list[bytes | TextTable | np.ndarray] = []
+    sizes = [s.rows * s.width if isinstance(s, TextTable) else 0 for s in sections]
+    needed = min(sum(sizes), AHEAD)
+    if len(_scratch) < needed:
+        _scratch = np.empty(needed, dtype=np.uint8)
+    at = 0
+    for section, size in zip(sections, sizes):
+        if not isinstance(section, TextTable) or at + size > needed:
+            result.append(section)
+            continue
+        start = at
+        for block in section.blocks():
+            _scratch[at : at + len(block)] = block
+            at += len(block)
+        result.append(_scratch[start:at])
+    return result
 
 
 class RootWriter:

@@ -6,9 +6,7 @@ a time in bounded pieces. Layout and content are the same either way.
 
 from __future__ import annotations
 
-import errno
 import os
-import resource
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -86,73 +84,69 @@ class _Patient:
     def flush(self) -> None:
         """Nothing is held back."""
 
+    def claim(self) -> None:
+        """Get disk space for the whole file, holes included."""
+        if self._size:
+            self._do(lambda: os.posix_fallocate(self._file.fileno(), 0, self._size))
+
     def close(self) -> None:
         self._do(self._file.close)
 
 
 class Writer:
     """An HDF5 file being written by all ranks of `comm`. Every method is collective and takes the same names, types
-    and totals on all ranks. Errors are kept back until `close`, so that no rank waits for another."""
+    and totals on all ranks. Errors are kept back until `close`, so that no rank waits for another.
 
-    def __init__(self, path: str, temporary: str, comm: Any, expected: int = 0) -> None:
-        self._path, self.comm = path, comm
+    Rank 0 makes groups, attributes and the empty datasets alone. With MPI in h5py it then claims the disk space, and
+    all ranks open the file to fill the datasets together: a full disk or quota is noticed before many ranks are
+    inside HDF5, where a failed write ends in a crash or a hang. `rows` handed in must not change until `close`.
+    """
+
+    def __init__(self, path: str, temporary: str, comm: Any) -> None:
+        self._path, self._temporary, self.comm = path, temporary, comm
         self._parallel = has_mpi(comm)
+        self._waiting: list[tuple[str, np.ndarray, int]] = []
         self._error: str | None = None
         self._file: Any = None
         self._below: _Patient | None = None
-        if self._parallel:
-            # Ask for the space, and for the file, in a plain way first: with many ranks inside HDF5 it is too late.
-            if comm.rank == 0:
-                self._try(lambda: _claim(temporary, expected))
-            comm.agree(self._error)
-            self._try(lambda: self._open(temporary, driver="mpio", comm=comm.mpi))
-        elif comm.rank == 0:
-            self._try(lambda: self._open_below(temporary))
+        if comm.rank == 0:
+            self._try(self._open)
 
-    def _open(self, target: Any, **driver: Any) -> None:
-        self._file = h5py.File(target, "w", **driver)
+    def _open(self) -> None:
+        self._below = _Patient(self._temporary)
+        self._file = h5py.File(self._below, "w")
 
-    def _open_below(self, temporary: str) -> None:
-        self._below = _Patient(temporary)
-        self._open(self._below)
-
-    def _try(self, action: Any) -> None:
-        if self._error is None:
+    def _try(self, action: Callable[[], Any]) -> None:
+        if self._error is None and (self._below is None or self._below.error is None):
             try:
                 action()
             except _FAILURES as failure:
                 self._error = explain(self._path, failure)
 
-    def _stopped(self) -> bool:
-        """Collective where the file is: in parallel, one rank's failure must keep all from the next collective call."""
-        if self._parallel:
-            return self.comm.any(self._error is not None)
-        return self._file is None or self._error is not None or (self._below is not None and bool(self._below.error))
-
     def group(self, name: str, attributes: Mapping[str, Any] | None = None) -> None:
         """Make a group and give it attributes."""
-        if self._stopped():
-            return
 
         def make() -> None:
             made = self._file.require_group(name)
             for key, value in (attributes or {}).items():
                 made.attrs[key] = value
 
-        self._try(make)
+        if self.comm.rank == 0:
+            self._try(make)
+
+    def _dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype) -> None:
+        how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        self._file.create_dataset(name, shape=shape, dtype=dtype, dcpl=how)
 
     def whole(self, name: str, values: Any) -> None:
         """A small dataset that is the same on all ranks; rank 0 writes it."""
         values = np.asarray(values)
-        if self._stopped():
-            return
-
-        def make() -> None:
-            made = self._file.create_dataset(name, shape=values.shape, dtype=values.dtype)
-            if self.comm.rank == 0 and values.size:
-                made[...] = values
-
-        self._try(make)
+        if self.comm.rank == 0:
+            self._try(lambda: self._dataset(name, values.shape, values.dtype))
+            if values.size:
+                self._try(lambda: self._file[name].__setitem__(..., values))
 
     def slabs(self, name: str, rows: np.ndarray, offset: int, total: int) -> None:
         """A dataset of `total` rows, of which this rank holds ``rows`` from `offset` on."""
@@ -161,81 +155,82 @@ class Writer:
     def parts(self, name: str, parts: list[tuple[np.ndarray, int]], total: int) -> None:
         """A dataset put together of several distributed arrays: this rank's rows of each, and where they start."""
         first = parts[0][0]
-        shape = (total, *first.shape[1:])
-        made: Any = None
-
-        def make() -> None:
-            nonlocal made
-            made = self._file.create_dataset(name, shape=shape, dtype=first.dtype)
-
-        if not self._stopped():
-            self._try(make)
+        if self.comm.rank == 0:
+            self._try(lambda: self._dataset(name, (total, *first.shape[1:]), first.dtype))
         for rows, offset in parts:
-            if self._parallel:
-                if not self._stopped() and total:
-                    self._try(lambda: self._write_collectively(made, rows, offset))  # noqa: B023
-            else:
-                self._write_through_root(made, rows, offset)
+            if not self._parallel:
+                self._write_through_root(name, rows, offset)
+            elif total:
+                self._waiting.append((name, rows, offset))
 
-    @staticmethod
-    def _write_collectively(made: Any, rows: np.ndarray, offset: int) -> None:
-        # By hand, since h5py leaves a rank without rows out of the collective call, and the others then wait for it.
-        space = made.id.get_space()
-        if len(rows):
-            memory = h5py.h5s.create_simple(rows.shape)
-            space.select_hyperslab((offset,) + (0,) * (rows.ndim - 1), rows.shape)
-        else:
-            memory = h5py.h5s.create_simple((1,) * rows.ndim)
-            memory.select_none()
-            space.select_none()
-        how = h5py.h5p.create(h5py.h5p.DATASET_XFER)
-        how.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
-        made.id.write(memory, space, np.ascontiguousarray(rows), dxpl=how)
-
-    def _write_through_root(self, made: Any, rows: np.ndarray, offset: int) -> None:
+    def _write_through_root(self, name: str, rows: np.ndarray, offset: int) -> None:
         # Slabs follow each other by rank, so rank 0 only counts on.
         for piece in stream_to_root(self.comm, np.ascontiguousarray(rows)):
-            if not self._stopped():
-                self._try(lambda: made.__setitem__(slice(offset, offset + len(piece)), piece))  # noqa: B023
+            self._try(lambda: _write_rows(self._file[name], piece, offset))  # noqa: B023
             offset += len(piece)
 
     def close(self) -> None:
-        """Close the file. Raises HpcdemError where something failed on this rank."""
-        if self._file is not None:
-            self._try(self._file.close)
-            self._file = None
-        if self._below is not None:
-            self._below.close()
-            if self._below.error is not None:
-                self._error = explain(self._path, self._below.error)
+        """Write what is still to be written and close the file. Raises HpcdemError where that failed."""
+        self.abandon(claim=self._parallel)
+        if self._parallel and not self.comm.any(self._error is not None):
+            self._write_together()
         if self._error is not None:
             raise HpcdemError(self._error)
 
+    def abandon(self, claim: bool = False) -> None:
+        """Close rank 0's file as it is; not collective. claim: first get disk space for all of it."""
+        if self._file is not None:
+            try:
+                self._file.close()
+            except _FAILURES as failure:
+                self._error = self._error or explain(self._path, failure)
+            self._file = None
+        if self._below is not None:
+            if claim:
+                self._below.claim()
+            self._below.close()
+            if self._below.error is not None:
+                self._error = explain(self._path, self._below.error)
+            self._below = None
 
-def _claim(path: str, size: int) -> None:
-    """Make an empty file. Raises OSError if `size` bytes are more than fit on the disk or are allowed in a file."""
-    open(path, "wb").close()
-    space = os.statvfs(path)
-    if size > space.f_bavail * space.f_frsize:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
-    if limit != resource.RLIM_INFINITY and size > limit:
-        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    def _write_together(self) -> None:
+        how = h5py.h5p.create(h5py.h5p.DATASET_XFER)
+        how.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
+        try:
+            with h5py.File(self._temporary, "r+", driver="mpio", comm=self.comm.mpi) as file:
+                for name, rows, offset in self._waiting:
+                    _write_rows(file[name], rows, offset, how)
+        except _FAILURES as failure:
+            self._error = explain(self._path, failure)
+
+
+def _write_rows(made: Any, rows: np.ndarray, offset: int, how: Any = None) -> None:
+    """Write rows from `offset` on, with the transfer properties `how`.
+
+    By hand, since h5py leaves a rank without rows out of a collective call, and the others then wait for it.
+    """
+    space = made.id.get_space()
+    if len(rows):
+        memory = h5py.h5s.create_simple(rows.shape)
+        space.select_hyperslab((offset,) + (0,) * (rows.ndim - 1), rows.shape)
+    else:
+        memory = h5py.h5s.create_simple((1,) * rows.ndim)
+        memory.select_none()
+        space.select_none()
+    made.id.write(memory, space, np.ascontiguousarray(rows), dxpl=how)
 
 
 @contextmanager
-def writing(path: str | os.PathLike, comm: Any, expected: int = 0) -> Iterator[Writer]:
-    """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks.
-
-    expected: about how many bytes this rank will write, so that a full disk can be told beforehand.
-    """
+def writing(path: str | os.PathLike, comm: Any) -> Iterator[Writer]:
+    """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks."""
     with atomic_path(path, comm) as temporary:
-        total = int(comm.sum_into(np.array([expected], dtype=np.int64))[0])
-        writer = Writer(os.fspath(path), temporary, comm, total)
+        writer = Writer(os.fspath(path), temporary, comm)
         try:
             yield writer
-        finally:
-            writer.close()
+        except BaseException:
+            writer.abandon()
+            raise
+        writer.close()
 
 
 @contextmanager

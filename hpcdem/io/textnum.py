@@ -47,7 +47,8 @@ def _powers() -> tuple[np.ndarray, np.ndarray]:
 
 
 _HIGH, _LOW = _powers()
-_PAIRS = np.frombuffer("".join(f"{i:02d}" for i in range(100)).encode(), dtype=np.uint8).reshape(100, 2).copy()
+# The numbers 0000 to 9999 as text.
+_DIGITS = (_ZERO + np.arange(10000)[:, None] // np.array([1000, 100, 10, 1]) % 10).astype(np.uint8)
 _LIMITS = np.array([10**k for k in range(19)], dtype=np.int64)
 
 
@@ -98,18 +99,22 @@ def _round(h: float, low: float) -> np.int64:
 def _put_digits(out: np.ndarray, end: int, n: int | np.int64, count: int) -> np.int64:
     """Write the last `count` digits of n >= 0 so that they end before `end`; returns the digits left over."""
     m = np.uint64(n)  # unsigned: division by a constant becomes one multiplication
-    while count >= 2:
-        q = m // np.uint64(100)
-        r = m - q * np.uint64(100)
-        out[end - 1] = _PAIRS[r, 1]
-        out[end - 2] = _PAIRS[r, 0]
+    while count >= 4:
+        q = m // np.uint64(10000)
+        r = m - q * np.uint64(10000)
+        out[end - 4] = _DIGITS[r, 0]
+        out[end - 3] = _DIGITS[r, 1]
+        out[end - 2] = _DIGITS[r, 2]
+        out[end - 1] = _DIGITS[r, 3]
         m = q
-        end -= 2
-        count -= 2
-    if count:
+        end -= 4
+        count -= 4
+    while count:
         q = m // np.uint64(10)
-        out[end - 1] = _ZERO + (m - q * np.uint64(10))
+        out[end - 1] = _DIGITS[m - q * np.uint64(10), 3]
         m = q
+        end -= 1
+        count -= 1
     return np.int64(m)
 
 
@@ -161,9 +166,12 @@ def _put_sci(out: np.ndarray, end: int, v: float, digits: int) -> None:
             n = _LIMITS[digits - 1]
             e10 += 1
     x = abs(e10)
-    count = 3 if x > 99 else 2
-    _put_digits(out, end, x, count)
-    end -= count + 2
+    out[end - 1] = _DIGITS[x, 3]
+    out[end - 2] = _DIGITS[x, 2]
+    if x > 99:
+        out[end - 3] = _DIGITS[x, 1]
+        end -= 1
+    end -= 4
     out[end + 1] = _MINUS if e10 < 0 else _PLUS
     out[end] = _E
     lead = _put_digits(out, end, n, digits - 1)

@@ -6,6 +6,7 @@ Format: VTK File Formats, simple legacy formats, https://docs.vtk.org/en/latest/
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,11 @@ _WHOLE = 21  # characters that hold any int64 and a blank
 
 
 def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
-    """Collective: the particles as points and vertices, with scalars radius, id, color, group (number) and vectors
-    velocity. The same bytes for any number of ranks. Raises HpcdemError on all ranks."""
+    """Collective: the particles in `path`, usually ``all_<step>.vtk``, and the walls in ``wall_<step>.vtk`` beside it.
+
+    Particles are points and vertices with scalars radius, id, color, group (number) and vectors velocity. The same
+    bytes for any number of ranks. Raises HpcdemError on all ranks.
+    """
 
     def sections() -> list[Section]:
         table = frame.tables["particles"]
@@ -35,12 +39,15 @@ def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
         return [*result, b"VECTORS velocity double\n", _vectors(columns["vx"], columns["vy"])]
 
     write_sections(path, comm, sections)
+    name = Path(path).name
+    write_wall_vtk(Path(path).with_name("wall_" + name.removeprefix("all_")), frame, comm)
 
 
 def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
     """Collective: the walls as lines, with cell scalars id, color and vectors velocity, force.
 
-    Raises HpcdemError on all ranks."""
+    Raises HpcdemError on all ranks.
+    """
 
     def sections() -> list[Section]:
         walls, n = frame.walls, len(frame.walls["id"])

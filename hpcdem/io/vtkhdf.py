@@ -49,8 +49,7 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
     bonded = find_rows(comm, [bonds.columns[k] for k in pairs], [contacts.columns[k] for k in pairs]) >= 0
 
     n, n_contacts, n_bonds = particles.total, contacts.total, bonds.total
-    size = sum(v.nbytes for t in frame.tables.values() for v in t.columns.values())
-    with h5.writing(path, comm, expected=size) as out:
+    with h5.writing(path, comm) as out:
         out.group("VTKHDF", {"Version": np.array([2, 0], dtype=np.int64), "Type": np.bytes_("PolyData")})
         out.whole("VTKHDF/NumberOfPoints", np.array([n], dtype=np.int64))
         out.slabs("VTKHDF/Points", _vector(particles.columns["x"], particles.columns["y"]), particles.offset, n)

@@ -195,6 +195,30 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
 
 
 @njit(cache=True, nogil=True)
+def stiffness(t, hot, ihot, blocks, ptr, partner, pairs, n_mat, n_left, out):
+    """Add the tangent normal stiffness of every touching pair of block t to its owned particles, out (n_own,) f8 [N/m]."""
+    cut, lo, _, poff, _ = blocks
+    a, b = cut[t], cut[t + 1]
+    p = poff[t] - lo[t]
+    for i in range(lo[t], b):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx = hot[j, X] - hot[i, X]
+            dy = hot[j, Y] - hot[i, Y]
+            reach = hot[i, RADIUS] + hot[j, RADIUS]
+            u = reach - math.sqrt(dx * dx + dy * dy)
+            if u < 0.0:
+                continue
+            q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
+            two_rt = 4.0 * hot[i, RADIUS] * hot[j, RADIUS] / reach
+            kn = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u)
+            if a <= i:
+                out[i - n_left] += kn
+            if a <= j < b:
+                out[j - n_left] += kn
+
+
+@njit(cache=True, nogil=True)
 def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, chosen, renewed, fresh, tolerate, rext):
     """Bond the pairs of block t with both ends chosen: d - (Ra + Rb) rext <= tolerate, or renew the bond they have.
 

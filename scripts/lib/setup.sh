@@ -1,0 +1,130 @@
+# Shared by scripts/run and scripts/test: makes and fills virtual environments, once.
+# Sourced with the repository root as working directory; needs nothing but bash, coreutils and a Python.
+
+say() { printf '%s\n' "$*" >&2; }
+die() { say "error: $*"; exit 1; }
+
+# Path of the first Python >= 3.11 that can make virtual environments; PYTHON=... takes precedence.
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3}; do
+        if "$candidate" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then
+            command -v "$candidate"
+            return
+        fi
+    done
+    say "found: $(${PYTHON:-python3} --version 2>&1 | head -n 1 || true)"
+    die "hpcdem needs Python 3.11 or newer with its venv module (Debian, Ubuntu: apt install python3-venv);" \
+        "name another one with PYTHON=/path/to/python3"
+}
+
+# What an environment depends on: place, Python's version (not its path, which shims change), the project's
+# requirements and this recipe.
+fingerprint() {
+    { printf '%s\n' "$PWD" "${@:2}"; "$1" -VV; cat pyproject.toml scripts/lib/setup.sh; } | sha256sum | cut -d' ' -f1
+}
+
+# make_venv DIR PYTHON [OPTION]: an empty environment, unless a usable one of the same Python is there already.
+make_venv() {
+    local dir=$1 python=$2
+    if [[ "$("$dir/bin/python" -VV 2>/dev/null)" == "$("$python" -VV)" ]] &&
+        [[ "$("$dir/bin/pip" --version 2>/dev/null)" == *" $PWD/$dir/"* ]]; then
+        return
+    fi
+    "$python" -m venv --clear "${@:3}" "$dir"
+}
+
+# install DIR ARGUMENTS: pip with a word of explanation when it fails.
+install() {
+    "$1/bin/pip" install -qq --disable-pip-version-check "${@:2}" ||
+        die "pip could not install the packages (its message is above). Is a package index within reach?" \
+            "Behind a proxy set HTTPS_PROXY, for a mirror PIP_INDEX_URL."
+}
+
+# once DIR NAME KEY COMMAND...: run the command unless DIR carries the stamp NAME with this key; one at a time.
+once() {
+    local stamp=$1/.ready-$2 key=$3
+    if [[ -e $stamp && $(<"$stamp") == "$key" ]]; then return; fi
+    (
+        if command -v flock >/dev/null; then flock 9; fi
+        if [[ -e $stamp && $(<"$stamp") == "$key" ]]; then exit; fi
+        "${@:4}" && printf '%s\n' "$key" >"$stamp"
+    ) 9>.setup.lock
+}
+
+# wheels_venv DIR EXTRAS: everything from wheels, MPI included; no root, any Linux.
+wheels_venv() {
+    local python
+    python=$(find_python)
+    once "$1" "wheels-$2" "$(fingerprint "$python" "$2")" fill_from_wheels "$1" "$python" "$2"
+}
+
+fill_from_wheels() {
+    say "Setting up $1 from wheels with $("$2" --version) (once; some 20 s where the network is quick) ..."
+    make_venv "$1" "$2" && install "$1" --editable ".[$3]"
+}
+
+# debian_venv DIR EXTRAS: Debian's MPI, parallel HDF5, PETSc and Slurm; pip adds the rest around Debian's numpy.
+debian_venv() {
+    once "$1" "debian-$2" "$(fingerprint /usr/bin/python3 "$2")" fill_from_debian "$1" "$2"
+}
+
+debian_packages=(
+    python3-venv python3-dev python3-mpi4py python3-petsc4py python3-h5py-mpi python3-scipy python3-matplotlib
+    openmpi-bin libopenmpi-dev slurmctld slurmd slurm-client munge libpmix-dev
+)
+
+# Command prefix that makes us root, empty when we are; fails where there is no way without a password.
+root_prefix() {
+    if [[ $(id -u) == 0 ]]; then return; fi
+    if command -v sudo >/dev/null && sudo -n true 2>/dev/null; then echo "sudo -n"; return; fi
+    return 1
+}
+
+# Says why on failure; nothing is installed then, or only packages that do no harm.
+have_debian_packages() {
+    local sudo
+    if ! command -v apt-get >/dev/null; then say "no apt-get on this machine"; return 1; fi
+    if ! dpkg -s "${debian_packages[@]}" >/dev/null 2>&1; then
+        if ! sudo=$(root_prefix); then say "apt-get needs root or a sudo without password"; return 1; fi
+        say "Installing Debian packages for parallel HDF5, PETSc, Open MPI and Slurm (once; about a minute) ..."
+        apt_install "$sudo" || { say "apt-get could not install: ${debian_packages[*]}"; return 1; }
+    fi
+    if ! /usr/bin/python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
+        say "the system's $(/usr/bin/python3 --version) is older than 3.11"
+        return 1
+    fi
+}
+
+# Another apt may be at work (a fresh cloud machine updates itself): wait for its locks, up to five minutes each.
+apt_install() {
+    local try log options=(-qq -o DPkg::Lock::Timeout=300)
+    for try in {1..10}; do
+        if $1 apt-get update "${options[@]}" >&2; then break; fi
+        say "apt-get update did not work (try $try of 10)"
+        if ((try < 10)); then sleep 30; fi
+    done
+    if ! log=$($1 env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${options[@]}" \
+        "${debian_packages[@]}" </dev/null 2>&1); then
+        tail -n 20 <<<"$log" >&2
+        return 1
+    fi
+}
+
+fill_from_debian() {
+    say "Setting up $1 around Debian's packages (once; about half a minute) ..."
+    make_venv "$1" /usr/bin/python3 --system-site-packages &&
+        # Debian's binaries hold to the numpy they were built with.
+        /usr/bin/python3 -c 'import numpy; print("numpy==" + numpy.__version__)' >"$1/constraints.txt" &&
+        install "$1" --constraint "$1/constraints.txt" --editable ".[$2]" &&
+        # pip does not see Debian's h5py and brings its own without MPI, which would hide it.
+        "$1/bin/pip" uninstall -qq --yes h5py
+}
+
+# Environment of the Debian stack; each line answers a trap (see docs on installing).
+debian_environment() {
+    local petsc
+    petsc=$(ls -d /usr/lib/petscdir/petsc*/*-real 2>/dev/null | sort -V | tail -n 1)
+    if [[ -n $petsc ]]; then export PETSC_DIR=$petsc; fi # petsc4py does not find its library otherwise
+    export H5PY_ALWAYS_USE_MPI=1                          # the serial build is taken otherwise
+}

@@ -1,0 +1,265 @@
+"""Shared by all tests: starting the program on n ranks, and saying why a test cannot run here."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+BIN = Path(sys.executable).parent
+
+
+# --- what this machine has -------------------------------------------------------------------------------------
+
+
+def absent(what: str, reason: str) -> None:
+    """Skip; fail instead where HPCDEM_TEST_REQUIRE names it (scripts/test sets that for what it installed itself)."""
+    if what in os.environ.get("HPCDEM_TEST_REQUIRE", "").split(","):
+        pytest.fail(f"{what} is required here: {reason}", pytrace=False)
+    pytest.skip(reason)
+
+
+@cache
+def mpiexec() -> str | None:
+    """The launcher that belongs to this interpreter's MPI: a wheel puts it beside python, a system into PATH."""
+    beside = BIN / "mpiexec"
+    return str(beside) if beside.exists() else shutil.which("mpiexec")
+
+
+@cache
+def is_open_mpi() -> bool:
+    """Whether mpiexec is Open MPI's (MPICH's needs no coaxing)."""
+    version = subprocess.run([mpiexec() or "", "--version"], capture_output=True, text=True, check=False)
+    return "Open" in version.stdout
+
+
+def mpi_environment() -> dict[str, str]:
+    """The variables of this process, and those without which ranks do not start or crawl on a small machine.
+
+    A copy of os.environ on purpose: a test that initialises MPI in pytest's own process leaves variables in the C
+    environment that a new job must not inherit.
+    """
+    env = dict(os.environ)
+    env.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    if mpiexec() and is_open_mpi():
+        env.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        env.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        env.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        env.setdefault("OMPI_MCA_hwloc_base_binding_policy", "none")
+        # More ranks than cores: a waiting rank must let go of its core.
+        env.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+        # Containers forbid reading another process's memory; without this Open MPI complains on every start.
+        env.setdefault("OMPI_MCA_btl_vader_single_copy_mechanism", "none")
+    return env
+
+
+@cache
+def why_no_mpi() -> str:
+    """Empty if two ranks can be started and see each other, otherwise the reason."""
+    if mpiexec() is None:
+        return "no mpiexec here: install the extra [mpi] or an MPI of the system"
+    program = "from mpi4py import MPI; MPI.COMM_WORLD.rank or print('ranks', MPI.COMM_WORLD.size)"
+    try:
+        probe = run([*mpi_command(2), sys.executable, "-c", program], timeout=60)
+    except pytest.fail.Exception as error:
+        return str(error)
+    if probe.returncode or probe.stdout.split() != ["ranks", "2"]:
+        return f"mpiexec -n 2 does not start two ranks of one job: {(probe.stderr or probe.stdout)[-300:]}"
+    return ""
+
+
+@cache
+def why_no_parallel_hdf5() -> str:
+    """Empty if h5py was built with MPI, otherwise the reason."""
+    probe = run([sys.executable, "-c", "import h5py; print(h5py.get_config().mpi)"], timeout=120)
+    return "" if probe.stdout.strip() == "True" else "h5py was built without MPI"
+
+
+@pytest.fixture
+def needs_mpi() -> None:
+    """For tests that start several ranks; the mark `mpi` does the same."""
+    if why_no_mpi():
+        absent("mpi", why_no_mpi())
+
+
+@pytest.fixture
+def needs_parallel_hdf5(needs_mpi: None) -> None:
+    """For tests of parallel HDF5 itself; everything else must work without."""
+    if why_no_parallel_hdf5():
+        absent("parallel_hdf5", why_no_parallel_hdf5())
+
+
+@pytest.fixture
+def needs_petsc() -> None:
+    """For tests that solve with PETSc; the mark `petsc` does the same."""
+    probe = run([sys.executable, "-c", "from petsc4py import PETSc"], timeout=120)
+    if probe.returncode:
+        absent("petsc", f"petsc4py cannot be imported: {probe.stderr.strip().splitlines()[-1]}")
+
+
+@pytest.fixture(scope="session")
+def manual_scripts() -> Path:
+    """Folder with the scripts printed in the ZDEM manual, which are not ours to ship."""
+    folder = Path(os.environ.get("HPCDEM_MANUAL_SCRIPTS", ROOT.parent / "shared" / "manual_scripts"))
+    if not folder.is_dir():
+        absent("manual_scripts", "no scripts of the manual here: set HPCDEM_MANUAL_SCRIPTS to their folder")
+    return folder
+
+
+@pytest.fixture
+def needs_manual_scripts(manual_scripts: Path) -> Path:
+    """The same folder under the name of a condition."""
+    return manual_scripts
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A mark is a promise about the machine: let it check the machine too."""
+    for item in items:
+        for mark in ("mpi", "petsc"):
+            if item.get_closest_marker(mark) and isinstance(item, pytest.Function):
+                item.fixturenames.insert(0, f"needs_{mark}")
+
+
+# --- starting the program --------------------------------------------------------------------------------------
+
+
+def mpi_command(n: int) -> list[str]:
+    """The words in front of a program that start n ranks of it."""
+    return [mpiexec() or "mpiexec", "-n", str(n)]
+
+
+def processes_of_session(session: int) -> list[int]:
+    """Process ids of a session: launchers put their ranks into process groups of their own, but not into sessions."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:  # it has ended meanwhile
+            continue
+        if int(fields[3]) == session and fields[0] != "Z":
+            found.append(int(stat.parent.name))
+    return found
+
+
+def end(process: subprocess.Popen) -> None:
+    """End a process started with start_new_session, and all it has started: kindly, then firmly."""
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            pass
+    for pid in processes_of_session(process.pid):
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+    process.wait()
+
+
+def run(
+    command: list[str], cwd: Path | None = None, timeout: float = 300.0, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, whatever its exit code; a test fails if it takes longer than `timeout` seconds."""
+    process = popen(command, cwd, env)
+    try:
+        out, err = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        end(process)
+        out, err = process.communicate()
+        pytest.fail(f"not at its end after {timeout} s: {command}\n{out[-2000:]}\n{err[-2000:]}", pytrace=False)
+    finally:
+        end(process)
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
+
+
+def popen(command: list[str], cwd: Path | None = None, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
+    """Start a command in a session of its own, without input, output as text."""
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command,
+        cwd=cwd,
+        env=mpi_environment() | (env or {}),
+        stdin=subprocess.DEVNULL,
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        start_new_session=True,
+    )
+
+
+class Launcher:
+    """Starts hpcdem, or any Python program, on n ranks: n = 1 is the plain program without mpiexec."""
+
+    def __init__(self) -> None:
+        self.started: list[subprocess.Popen[str]] = []
+
+    def command(self, n: int, *args: object) -> list[str]:
+        """The command line of hpcdem on n ranks."""
+        return self._ranks(n, [str(BIN / "hpcdem")], args)
+
+    def __call__(
+        self,
+        n: int,
+        *args: object,
+        cwd: Path | None = None,
+        timeout: float = 300.0,
+        env: dict[str, str] | None = None,
+    ) -> subprocess.CompletedProcess[str]:
+        """`hpcdem ARGS` on n ranks, to its end."""
+        return run(self.command(n, *args), cwd, timeout, env)
+
+    def python(
+        self,
+        n: int,
+        *args: object,
+        cwd: Path | None = None,
+        timeout: float = 300.0,
+        env: dict[str, str] | None = None,
+    ) -> subprocess.CompletedProcess[str]:
+        """`python ARGS` on n ranks, to its end."""
+        return run(self._ranks(n, [], args), cwd, timeout, env)
+
+    def start(
+        self, n: int, *args: object, cwd: Path | None = None, env: dict[str, str] | None = None
+    ) -> subprocess.Popen[str]:
+        """`hpcdem ARGS` on n ranks in the background, for tests that send signals; ended with the test."""
+        self.started.append(popen(self.command(n, *args), cwd, env))
+        return self.started[-1]
+
+    @staticmethod
+    def _ranks(n: int, program: list[str], args: tuple[object, ...]) -> list[str]:
+        return [*(mpi_command(n) if n > 1 else []), sys.executable, *program, *map(str, args)]
+
+
+@pytest.fixture
+def launch() -> Iterator[Launcher]:
+    """`launch(n, "script.py", cwd=tmp_path)` runs hpcdem on n ranks; see Launcher."""
+    launcher = Launcher()
+    yield launcher
+    for process in launcher.started:
+        end(process)
+        process.communicate()
+
+
+@pytest.fixture
+def wait_until() -> Callable[..., None]:
+    """`wait_until(condition, timeout, what)`: poll until true, fail the test otherwise."""
+
+    def wait(condition: Callable[[], object], timeout: float, what: str) -> None:
+        deadline = time.monotonic() + timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                pytest.fail(f"waited {timeout} s for {what}", pytrace=False)
+            time.sleep(0.1)
+
+    return wait

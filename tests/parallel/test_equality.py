@@ -1,0 +1,136 @@
+"""The same bits on any number of ranks and threads, with moving borders and without, and across a restart.
+
+The model does everything that could spoil the order: particles fall, bonds break, the wall pushes them across borders, some
+are eroded away, others rain down in mid-run, and a few leave the BOX.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Launcher
+from tests.short_push import assert_same_end, contents
+
+BUSY = """\
+START
+SET disk off
+BOX left 0.0 right 7000.0 bottom 0.0 height 4000.0
+WALL id 0 nodes (0.0, 50.0) (6500.0, 50.0)
+WALL id 1 nodes (50.0, 3900.0) (50.0, 50.0)
+WALL id 2 nodes (6500.0, 50.0) (6500.0, 1400.0)
+GEN num 3000 rad discrete 50.0 70.0 x (50.0, 6500.0) y (50.0, 3000.0) group bed
+PROP density 2.5e3 fric 0.0 shear 2.9e9 poiss 0.2 damp 0.3 hertz
+SET dt 0.04 gravity 0.0 -9.8
+SET print 400
+SET save 500
+HIST id 1 interval 100 kinetic
+CYC 500
+PROP ebmod 2e8 gbmod 2e8 tstrength 1e6 sstrength 2e6 fric 0.3
+WALL id 0 fric 0.3
+WALL id 1 fric 0.3 xv 8.0
+IMPLE wall id 1 xmove 160.0 save 64.0 print 80.0
+DEL range y {top}-300.0 {top}
+GEN num 200 rad discrete 50.0 60.0 x (1500.0, 6000.0) y (1800.0, 3600.0) color red group rain
+PROP density 2.2e3 fric 0.4 shear 2.9e9 poiss 0.2 damp 0.2 hertz range group rain
+CYC 700
+PROP n_bond 1e11 s_bond 1e11 range group rain
+BOND break range x 0.0 1500.0
+IMPLE wall id 1 xmove 80.0 save 32.0
+STOP
+"""
+
+CASES = {
+    "2 ranks": (2, []),
+    "3 ranks": (3, []),
+    "4 ranks": (4, []),
+    "3 ranks, borders stay": (3, ["--no-balance"]),
+    "2 threads": (1, ["-j", "2"]),
+    "3 threads": (1, ["-j", "3"]),
+    "2 ranks x 2 threads": (2, ["-j", "2"]),
+}
+
+
+def busy(launch: Launcher, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
+    """Run the model in a folder."""
+    folder.mkdir(exist_ok=True)
+    script = folder / "busy.py"
+    script.write_text(BUSY)
+    done = launch(ranks, script, "--no-figure", *options, *(["--resume"] if resume else []), cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run on one rank and one thread."""
+    folder = tmp_path_factory.mktemp("busy") / "one"
+    busy(Launcher(), folder, 1)
+    return folder
+
+
+def assert_same_files(one: Path, other: Path) -> None:
+    """All frames, checkpoints and series of two runs are equal: HDF5 by content, text byte by byte."""
+    names = sorted(p.name for p in (one / "data").iterdir())
+    assert names == sorted(p.name for p in (other / "data").iterdir())
+    for name in names:
+        a, b = one / "data" / name, other / "data" / name
+        if a.suffix in (".vtkhdf", ".sav"):
+            left, right = contents(a), contents(b)
+            assert left.keys() == right.keys()
+            assert not [k for k in left if left[k].tobytes() != right[k].tobytes()], name
+        else:
+            assert a.read_bytes() == b.read_bytes(), name
+
+
+def test_the_model_is_busy(reference: Path) -> None:
+    """The run is worth comparing: bonds broke both ways, particles came, went and left the BOX."""
+    last = sorted((reference / "data").glob("*.sav"))[-1]
+    state = contents(last)
+    text = str(state["@state"])
+    tension, shear = (int(n) for n in text.split('"breaks": [')[1].split("]")[0].split(","))
+    assert tension > 20 and shear > 20
+    assert len(state["particles/gid"]) < int(text.split('"next_gid": ')[1].split(",")[0])
+    assert (state["particles/birth"] > 0).any()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("case", CASES)
+def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
+    ranks, options = CASES[case]
+    busy(launch, tmp_path / "other", ranks, *options)
+    assert_same_files(reference, tmp_path / "other")
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+@pytest.mark.parametrize("checkpoint", ["first", "middle", "last"])
+def test_resumed_run_equals_the_uninterrupted_one(
+    reference: Path, launch: Launcher, tmp_path: Path, ranks: int, checkpoint: str
+) -> None:
+    """Take a checkpoint of the one-rank run, forget what came after it, and go on with another number of ranks."""
+    saves = sorted((reference / "data").glob("*.sav"))
+    start = {"first": saves[0], "middle": saves[len(saves) // 2], "last": saves[-2]}[checkpoint]
+    folder = tmp_path / "resumed"
+    (folder / "data").mkdir(parents=True)
+    (folder / "data" / start.name).write_bytes(start.read_bytes())
+    busy(launch, folder, ranks, resume=True)
+    assert_same_end(reference, folder, patterns=("*.vtkhdf",))
+    last = saves[-1].name
+    a, b = contents(reference / "data" / last), contents(folder / "data" / last)
+    assert not [k for k in a if a[k].tobytes() != b[k].tobytes()]
+
+
+@pytest.mark.mpi
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_short_push_of_the_manual(launch: Launcher, manual_scripts: Path, tmp_path: Path, case: str) -> None:
+    """The short variant of the manual's push.py, on one rank and otherwise."""
+    ranks, options = CASES[case]
+    for name, n, words in (("one", 1, []), ("other", ranks, options)):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "push.py").write_text((manual_scripts / "short" / "push.py").read_text())
+        done = launch(n, folder / "push.py", "--no-figure", *words, cwd=folder)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert_same_files(tmp_path / "one", tmp_path / "other")

@@ -1,0 +1,133 @@
+"""Figures of frames, and zdem2jpg."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io import colours
+from hpcdem.io.dat import write_dat
+from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.post.plots import LATER, frame_figure, plot_frame, zdem2jpg, zdem2jpg_folder
+from tests.unit.io_synthetic import make_frame
+
+pytestmark = pytest.mark.figures
+
+
+def test_particles_are_drawn_where_they_are_in_true_size_and_colour(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    frame = make_frame(80)
+    frame.tables["particles"].columns["radius"] *= 0.5  # apart from each other
+    plot_frame(frame, tmp_path / "a.png", dpi=300)
+    picture = np.asarray(image.open(tmp_path / "a.png").convert("RGB")) / 255.0
+    figure = frame_figure(frame)
+    figure.set_dpi(300)
+    columns = frame.tables["particles"].columns
+    places = figure.axes[0].transData.transform(np.stack([columns["x"], columns["y"]], axis=1))
+    scale = figure.axes[0].transData.transform([[1.0, 0.0], [0.0, 0.0]])
+    for (u, v), radius, color in zip(places, columns["radius"] * (scale[0] - scale[1])[0], columns["color"]):
+        shade = colours.RGB[color]
+        row = picture[picture.shape[0] - 1 - int(v)]
+        assert np.abs(row[int(u)] - shade).max() < 0.01
+        inside = np.abs(row - shade).max(axis=-1) < 0.01
+        width = 1 + next(k for k in range(99) if not inside[int(u) + k + 1])
+        assert abs(width - radius) < 2.0  # pixels from the centre to the edge
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "pdf", "svg"])
+def test_the_same_frame_gives_the_same_file(tmp_path: Path, suffix: str) -> None:
+    frame = make_frame(30)
+    a, b = (plot_frame(frame, tmp_path / f"{k}.{suffix}") for k in "ab")
+    assert a.read_bytes() == b.read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == [a.name, b.name]
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "km"), (0.01, "m"), (1e-5, "cm"), (1e-6, "mm")])
+def test_axes_are_labelled_in_the_unit_that_fits(scale: float, unit: str) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure = frame_figure(make_frame(30, scale=scale))
+    ax = figure.axes[0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (f"x ({unit})", f"y ({unit})")
+    # Everything is on the page and legible: labels of nine points, none cut off.
+    FigureCanvasAgg(figure).draw()
+    page = figure.bbox
+    for text in (*ax.get_xticklabels(), *ax.get_yticklabels(), ax.xaxis.label, ax.yaxis.label):
+        box = text.get_window_extent()
+        assert text.get_fontsize() == 9.0
+        assert page.x0 <= box.x0 and box.x1 <= page.x1 and page.y0 <= box.y0 and box.y1 <= page.y1, text
+    width, height = figure.get_size_inches()
+    assert width == pytest.approx(17.0 / 2.54)
+    assert height < 0.4 * width  # a wide model makes a wide figure
+
+
+def test_a_tall_model_stays_on_the_page() -> None:
+    frame = make_frame(30)
+    frame.settings["height"] = 200000.0
+    width, height = frame_figure(frame).get_size_inches()
+    assert height == pytest.approx(22.0 / 2.54) and width < height
+
+
+def test_a_frame_of_nothing_can_be_drawn(tmp_path: Path) -> None:
+    frame = make_frame(1)
+    table = frame.tables["particles"]
+    table.columns = {k: v[:0] for k, v in table.columns.items()}
+    frame.walls = {k: v[:0] for k, v in frame.walls.items()}
+    frame.settings = {}
+    plot_frame(frame, tmp_path / "a.png", dpi=50)
+
+
+def test_errors_are_explained(tmp_path: Path) -> None:
+    with pytest.raises(HpcdemError, match=r"pictures end in \.jpg"):
+        plot_frame(make_frame(1), tmp_path / "a.bmp")
+    with pytest.raises(HpcdemError, match="the folder does not exist"):
+        plot_frame(make_frame(1), tmp_path / "none" / "a.png")
+
+
+def test_zdem2jpg_draws_every_frame_of_a_folder(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    write_dat(tmp_path / "all_0000000000_ini.dat", make_frame(20), SerialComm())
+    write_dat(tmp_path / "all_0000001000.dat", make_frame(20), SerialComm())
+    write_vtkhdf(tmp_path / "all_0000001000.vtkhdf", make_frame(20), SerialComm())
+    seen: list[Path] = []
+    pictures = zdem2jpg(tmp_path, seen.append)
+    assert [p.name for p in pictures] == ["all_0000000000_ini.jpg", "all_0000001000.jpg"] and seen == pictures
+    with image.open(pictures[0]) as picture:
+        assert picture.format == "JPEG" and picture.info["dpi"] == (300, 300) and picture.size[0] > 1900
+    for p in tmp_path.glob("all_*"):
+        p.unlink()
+    with pytest.raises(HpcdemError, match="no frame all_"):
+        zdem2jpg(tmp_path)
+
+
+@pytest.mark.parametrize("words", [["--dir", "./data"], ["--dir=./data"]])
+def test_zdem2jpg_takes_a_folder(words: list[str]) -> None:
+    assert zdem2jpg_folder(words) == "./data"
+    assert zdem2jpg_folder([*words, "-h"]) is None
+
+
+def test_options_of_the_manual_that_are_still_to_come_are_refused_by_name() -> None:
+    for name in LATER:
+        for words in ([f"--{name}", "1"], [f"--{name}=1"]):
+            with pytest.raises(UsageError, match=rf"--{name} is not supported yet"):
+                zdem2jpg_folder(["--dir", "x", *words])
+    for words, message in (
+        (["--nonsense"], "unknown option --nonsense"),
+        (["--dir"], "needs a folder"),
+        ([], "--dir is missing"),
+    ):
+        with pytest.raises(UsageError, match=re.escape(message)):
+            zdem2jpg_folder(words)
+
+
+def test_matplotlib_is_not_imported_before_it_is_used() -> None:
+    program = "import sys, hpcdem.post.plots; raise SystemExit('matplotlib' in sys.modules)"
+    root = Path(__file__).resolve().parents[2]
+    assert subprocess.run([sys.executable, "-c", program], cwd=root, timeout=60, check=False).returncode == 0

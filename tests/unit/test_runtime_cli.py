@@ -1,0 +1,126 @@
+"""The programs at their door: options, refusals, what is imported, who speaks."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from hpcdem import cli
+
+
+def program(name: str, *args: str) -> subprocess.CompletedProcess[str]:
+    """An entry point as the installed program calls it."""
+    code = f"import sys; from hpcdem.cli import {name}; sys.argv[1:] = {list(args)!r}; sys.exit({name}())"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+
+
+def options(*words: str) -> dict:
+    return cli.read_command_line(cli.hpcdem, "hpcdem", list(words))
+
+
+def test_defaults_of_a_run():
+    found = cli.Options(**options("push.py"))
+    assert (str(found.script), found.threads, found.figure) == ("push.py", 1, True)
+    assert (found.time_limit, found.resume, found.check, found.outdir) == (None, False, False, None)
+
+
+def test_all_options_of_a_run():
+    words = "-j 12 --time-limit 11:30:00 --resume --check --outdir here --no-figure push.py"
+    found = cli.Options(**options(*words.split()))
+    assert (found.threads, found.time_limit, str(found.outdir)) == (12, 41400.0, "here")
+    assert found.resume and found.check and not found.figure
+
+
+@pytest.mark.parametrize("name", ["main", "zdem2jpg", "zdemss"])
+def test_every_program_starts(name):
+    done = program(name, "--help")
+    assert done.returncode in (0, 2) and "Traceback" not in done.stderr
+
+
+def test_version_is_quick_to_say():
+    done = program("main", "--version")
+    assert done.returncode == 0 and done.stdout.startswith("hpcdem ")
+    code = (
+        "import sys; from hpcdem.cli import main\nsys.argv[1:] = ['--version']\n"
+        "try: main()\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy', 'numba', 'matplotlib', 'mpi4py', 'h5py', 'rich') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+@pytest.mark.parametrize("word", ["-h", "--help", "--hlep"])
+def test_help_also_as_the_manual_spells_it(word):
+    done = program("main", word)
+    assert done.returncode == 0 and "--time-limit" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "-s ./data",
+        "--strain-stress ./data",
+        "--strin-stres ./data",
+        "--addball push.py",
+        "--delball push.py",
+        "-g 200 push.py",
+        "--grid 200 push.py",
+        "--leftwallid 1 push.py",
+        "--rightwallid 2 push.py",
+        "--xmove -1000.0 push.py",
+        "-j 12 --ymove -1000.0 push.py",
+    ],
+)
+def test_options_of_stress_and_strain_are_refused_by_name(words):
+    done = program("main", *words.split())
+    assert done.returncode == 2
+    asked = next(w for w in words.split() if w.startswith("-") and w != "-j")
+    assert "come later" in done.stderr
+    assert asked in done.stderr or (asked == "--strin-stres" and "--strain-stress" in done.stderr)
+
+
+def test_zdemss_is_refused_by_name():
+    done = program("zdemss", "--dir", "./data")
+    assert done.returncode == 2 and done.stderr.startswith("hpcdem: zdemss:")
+
+
+@pytest.mark.parametrize("words", [[], ["-j", "0", "a.py"], ["--time-limit", "soon", "a.py"], ["--nonsense", "a.py"]])
+def test_a_wrong_command_line_is_code_2(words):
+    done = program("main", *words)
+    assert done.returncode == 2 and "Usage:" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.mpi
+def test_a_wrong_command_line_is_said_once(launch):
+    done = launch(3, "--nonsense", "a.py", timeout=60)
+    assert done.returncode == 2
+    assert done.stderr.count("No such option") == 1
+
+
+def test_a_missing_script(launch, tmp_path):
+    done = launch(1, "nowhere.py", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and "hpcdem: nowhere.py: no such script" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.mpi
+def test_a_missing_script_is_said_once(launch, tmp_path):
+    done = launch(3, "nowhere.py", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and done.stderr.count("no such script") == 1
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        (b"\xef\xbb\xbfSTART\r\nSTOP\r\n", "START\r\nSTOP\r\n"),
+        ("START # 开始".encode(), "START # 开始"),
+        ("START # 开始".encode("gb18030"), "START # 开始"),
+    ],
+)
+def test_scripts_from_other_editors_are_read(tmp_path, data, text):
+    from hpcdem.halo.comm import SerialComm
+
+    (tmp_path / "a.py").write_bytes(data)
+    assert cli.read_script(SerialComm(), tmp_path / "a.py") == text

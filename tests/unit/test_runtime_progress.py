@@ -1,0 +1,207 @@
+"""The log: what is printed, when, and what the numbers are."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from hpcdem.halo.comm import SerialComm
+from hpcdem.runtime.progress import Log, StepStatus, duration, rate
+from hpcdem.timers import Timers
+
+
+class Clock:
+    """A clock that stands still until it is told."""
+
+    def __init__(self) -> None:
+        self.t = 1000.0
+
+    def __call__(self) -> float:
+        return self.t
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def status(step: int, **other) -> StepStatus:
+    values = {"time": 0.05 * step, "dt": 0.05, "dt_critical": 0.1, "kinetic": 1.5e6, "unbalanced_ratio": 0.01}
+    counts = {"particles": 1000, "contacts": 2500, "bonds": 1200}
+    return StepStatus(step=step, **{**values, **counts, **other})
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def out() -> io.StringIO:
+    return io.StringIO()
+
+
+@pytest.fixture
+def log(out, clock) -> Log:
+    return Log(stream=out, now=clock)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.2, "0 s"),
+        (59.4, "59 s"),
+        (60, "1:00"),
+        (3723, "1:02:03"),
+        (float("inf"), "--"),
+        (-1, "--"),
+        (float("nan"), "--"),
+    ],
+)
+def test_durations(seconds, text):
+    assert duration(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("number", "text"), [(0.25, "0.25"), (812, "812"), (999.9, "1k"), (20431, "20.4k"), (48.2e6, "48.2M")]
+)
+def test_rates(number, text):
+    assert rate(number) == text
+
+
+def test_a_line_says_where_the_run_is(log, out, clock):
+    log.script_started("push", 2000)
+    log.command_started("CYC", 12, 1000, step=0)
+    clock.t += 20.0
+    log.step(status(500, broken_tension=3, broken_shear=4, walls=((0, 1.0, -2.5e9), (1, 0.0, 0.0))))
+    head, line = out.getvalue().splitlines()
+    assert head == "line 12: CYC, 1000 steps"
+    for part in (
+        "step 500 | CYC 50.0% | script 25.0%",
+        "25 steps/s, 25k particle-steps/s",
+        "left 20 s, script 1:00",
+        "t 25 s, dt 0.05 s (0.50 of critical)",
+        "kinetic 1.5e+06 J, unbalanced/contact 0.01",
+        "1000 particles, 2500 contacts, 1200 bonds (3 broken in tension, 4 in shear)",
+        "walls 0:(1,-2.5e+09) 1:(0,0) N",
+    ):
+        assert part in line
+
+
+def test_the_rate_is_that_of_the_last_window(log, out, clock):
+    log.command_started("CYC", 0, 100000, step=0)
+    clock.t += 10.0
+    log.step(status(10000))
+    clock.t += 10.0
+    log.step(status(11000))
+    first, second = (line for line in out.getvalue().splitlines() if line.startswith("step"))
+    assert "1k steps/s" in first and "100 steps/s" in second
+
+
+def test_a_log_file_gets_a_line_each_ten_seconds(log, out, clock):
+    log.command_started("CYC", 0, 10**9, step=0)
+    for step in range(1, 101):
+        clock.t += 1.0
+        log.step(status(step))
+    assert out.getvalue().count("\nstep") == 10
+
+
+def test_set_stepbar_means_each_interval(log, out, clock):
+    log.set_interval(explicit=True)
+    log.command_started("CYC", 0, 10**9, step=0)
+    for step in range(1, 8):
+        clock.t += 0.01
+        log.step(status(step))
+    assert out.getvalue().count("\nstep") == 7
+
+
+def test_the_last_step_of_a_command_is_always_there_once(log, out, clock):
+    log.command_started("IMPLE", 3, 20, step=100)
+    clock.t += 0.5
+    log.step(status(120))
+    log.step(status(120))
+    log.command_finished()
+    assert out.getvalue().count("\nstep 120 | IMPLE 100.0%") == 1
+
+
+def test_without_a_first_step_the_first_status_sets_it(log, out, clock):
+    log.command_started("CYC", 3, 20)
+    log.step(status(100))
+    clock.t += 1.0
+    log.step(status(120))
+    assert out.getvalue().count("\nstep") == 1 and "20 steps/s" in out.getvalue()
+
+
+def test_finished_commands_count_for_the_script(log, out, clock):
+    log.script_started("push", 400)
+    for begin in (0, 100):
+        log.command_started("CYC", 1, 100, step=begin)
+        clock.t += 10.0
+        log.step(status(begin + 100))
+        log.command_finished()
+    assert "script 50.0%" in out.getvalue().splitlines()[-1]
+
+
+def test_a_critical_step_that_is_not_known_is_left_out(log, out, clock):
+    log.command_started("CYC", 1, 10, step=0)
+    clock.t += 1.0
+    log.step(status(10, dt_critical=float("inf")))
+    assert "critical" not in out.getvalue()
+
+
+def test_a_warning_comes_once(log, out):
+    for _ in range(3):
+        log.warn_once("late", "lists came late")
+    assert out.getvalue() == "warning: lists came late\n"
+
+
+def test_other_ranks_are_silent(out, clock):
+    log = Log(rank=1, stream=out, now=clock)
+    log.info("a")
+    log.warn_once("b", "b")
+    log.command_started("CYC", 1, 10, step=0)
+    clock.t += 100
+    log.step(status(10))
+    log.command_finished()
+    log.stages(Timers(), SerialComm())
+    assert out.getvalue() == ""
+
+
+def test_lines_end_with_newlines_only(log, out, clock):
+    """A carriage return would fill the log file of a batch job with one endless line."""
+    log.command_started("CYC", 1, 10, step=0)
+    clock.t += 10
+    log.step(status(10))
+    assert "\r" not in out.getvalue() and "\x1b" not in out.getvalue()
+
+
+def test_the_table_of_stages(log, out):
+    timers = Timers()
+    for name, seconds, calls in (("halo", 1.0, 40), ("force", 3.0, 40)):
+        timers(name).ns, timers(name).calls = int(seconds * 1e9), calls
+    timers.count(steps=40, particles=100)
+    log.stages(timers, SerialComm())
+    head, force, halo, other, total = out.getvalue().splitlines()
+    assert head.split()[0] == "stage"
+    assert force.split()[:3] == ["force", "3.00", "3.00"] and force.split()[-1] == "40"
+    assert halo.split()[0] == "halo" and other.split()[0] == "other"
+    assert total.startswith("40 steps in ") and "particle-steps/s" in total
+
+
+def test_a_terminal_gets_a_bar_with_lines_above(clock):
+    terminal = Terminal()
+    log = Log(stream=terminal, now=clock)
+    log.script_started("push", 200)
+    log.command_started("CYC", 7, 100, step=0)
+    for step in (25, 50, 100):
+        clock.t += 10.0
+        log.step(status(step))
+    log.warn("something [odd]")
+    log.command_finished()
+    log.stages(Timers(), SerialComm())
+    text = terminal.getvalue()
+    assert "script" in text and "━" in text
+    assert "warning: something [odd]" in text
+    assert text.count("step 50 |") == 1
+    assert "stage" in text
