@@ -34,12 +34,13 @@ class Options:
     """The command line of hpcdem."""
 
     script: Path
-    threads: int = 1
+    threads: int | None = None
     time_limit: float | None = None
     resume: bool = False
     check: bool = False
     outdir: Path | None = None
     figure: bool = True
+    balance: bool = True
 
 
 def run(comm: SerialComm, options: Options, log: Log) -> None:
@@ -58,11 +59,12 @@ def run(comm: SerialComm, options: Options, log: Log) -> None:
         return
     execute.refuse_unexecuted(script.statements)
 
-    prepare_kernels(comm, log)
+    threads = options.threads or 1
+    prepare_kernels(comm, log, lambda: rehearse(threads))
     from hpcdem.simulation import Simulation  # brings the kernels with it
 
     outdir = options.outdir or options.script.parent / "data"
-    sim = Simulation(comm, threads=options.threads, outdir=outdir, log=log, stop=stop.install())
+    sim = Simulation(comm, threads, outdir, log, stop.install(), balance_on=options.balance)
     try:
         if not (options.resume and go_on(sim, script, log)):
             log.script_started(name, plan.expected_steps(script.statements) or 0)
@@ -76,6 +78,16 @@ def run(comm: SerialComm, options: Options, log: Log) -> None:
     log.stages(sim.timers, comm)
     if options.figure and comm.rank == 0:
         draw_last_state(sim.outdir, log)
+
+
+def rehearse(*threads: int) -> None:
+    """Call every kernel once for each number of threads. Imports them: the cache must be settled before."""
+    from hpcdem.commands import rehearsal
+    from hpcdem.io import textnum
+
+    for n in threads:
+        rehearsal.rehearse(n)
+    textnum.warm_up()
 
 
 def go_on(sim: Simulation, script: Script, log: Log) -> bool:
@@ -205,7 +217,9 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     "or script not understood, 85 stopped on request with a checkpoint (go on with --resume).",
 )
 @click.argument("script", type=click.Path(path_type=Path))
-@click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads per rank [1].")
+@click.option(
+    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
+)
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
@@ -213,6 +227,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 @click.option("--check", is_flag=True, help="Read the whole script, say what it would do, run nothing.")
 @click.option("--outdir", type=click.Path(path_type=Path), metavar="DIR", help="Results [data beside the script].")
 @click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
+@click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
 @click.version_option(launch.version(), "-v", "--version", prog_name="hpcdem", message="%(prog)s %(version)s")
 def hpcdem(**options: Any) -> None:
     """Run a discrete-element SCRIPT (ZDEM commands), alone or under mpiexec or srun."""
@@ -245,7 +260,7 @@ def main() -> NoReturn:
         if words[:1] == ["warmup"]:
             run_warmup(words[1:])
         options = Options(**read_command_line(hpcdem, "hpcdem", words))
-        threads, warnings = launch.prepare_environment(options.threads)
+        threads, warnings = launch.prepare_environment(options.threads or launch.threads_by_default())
         comm = launch.start_mpi()
 
     def work() -> None:
@@ -270,7 +285,7 @@ def run_warmup(words: list[str]) -> NoReturn:
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.warmup import warmup as compile_all
 
-        compile_all(Log())
+        compile_all(Log(), lambda: rehearse(*{1, threads}))
     sys.exit(EXIT_OK)
 
 

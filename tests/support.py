@@ -99,6 +99,14 @@ def watch(sim: Simulation, n: int, look: Callable[[Simulation], Any]) -> np.ndar
     return np.array(seen)
 
 
+def carry(sim: Simulation, gid: int, x: float = 0.0, y: float = 0.0, angle: float = 0.0, n: int = 100) -> None:
+    """Move a fixed particle by (x, y) [m] and turn it by `angle` [rad] in n equal steps, then hold it."""
+    t = n * sim.settings.dt
+    properties.prop(sim, only(gid), xv=x / t, yv=y / t, spin=angle / t)
+    steps(sim, n)
+    properties.prop(sim, only(gid), xv=0.0, yv=0.0, spin=0.0)
+
+
 def held_for_a_step(sim: Simulation) -> None:
     """One step in which nothing moves, so that contact forces are in place when the particles are let go: a new particle's
     first step sees none."""

@@ -46,8 +46,10 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
                     writer.slabs(full, values, table.offset, table.total)
             header = {"format": FORMAT, "version": VERSION, "state": json.dumps(state), "sums": json.dumps(sums)}
             writer.group("/", header)
-        finally:
-            writer.close()
+        except BaseException:
+            writer.abandon()
+            raise
+        writer.close()
         error = None
         if comm.rank == 0:
             try:

@@ -162,11 +162,50 @@ def stream_to_root(comm: Any, rows: np.ndarray | TextTable) -> Iterator[np.ndarr
             yield piece
 
 
+def arrays_to_root(comm: Any, parts: Sequence[tuple[np.ndarray, int]]) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Collective generator, to be run to its end on every rank: brings pieces of distributed arrays to rank 0.
+
+    parts: this rank's rows of each array, and the global row they start at; same number, dtypes and trailing shapes
+    on all ranks. Yields, on rank 0 only, (number of the array, global row, rows): first those of rank 0, then of
+    rank 1, ... in pieces of at most about PIECE bytes.
+    """
+    table = np.array([(offset, len(rows)) for rows, offset in parts], dtype=np.int64).reshape(-1, 2)
+    if comm.rank > 0:
+        comm.mpi.Recv(np.empty(1, dtype=np.int64), source=0, tag=_TAG)  # rank 0 is ready for this rank
+        comm.mpi.Send(table, dest=0, tag=_TAG)
+        for rows, _ in parts:
+            for piece in _pieces(rows):
+                comm.mpi.Send(_bytes_of(piece), dest=0, tag=_TAG)
+        return
+    for rank in range(comm.size):
+        if rank:
+            comm.mpi.Send(np.zeros(1, dtype=np.int64), dest=rank, tag=_TAG)
+            comm.mpi.Recv(table, source=rank, tag=_TAG)
+        for k, (mine, _) in enumerate(parts):
+            at, end = int(table[k, 0]), int(table[k].sum())
+            for piece in _pieces(mine) if rank == 0 else _received(comm, rank, mine, end - at):
+                yield k, at, piece
+                at += len(piece)
+
+
+def _received(comm: Any, rank: int, like: np.ndarray, n: int) -> Iterator[np.ndarray]:
+    """n rows of the kind of `like`, cut as the sender cuts them."""
+    step = _rows_of_a_piece(like)
+    for a in range(0, n, step):
+        piece = np.empty((min(step, n - a), *like.shape[1:]), dtype=like.dtype)
+        comm.mpi.Recv(_bytes_of(piece), source=rank, tag=_TAG)
+        yield piece
+
+
+def _rows_of_a_piece(rows: np.ndarray) -> int:
+    return max(1, PIECE // max(1, rows.itemsize * int(np.prod(rows.shape[1:]))))
+
+
 def _pieces(rows: np.ndarray | TextTable) -> Iterator[np.ndarray]:
     if isinstance(rows, TextTable):
         yield from rows.blocks()
         return
-    step = max(1, PIECE // max(1, rows[:1].nbytes))
+    step = _rows_of_a_piece(rows)
     for a in range(0, len(rows), step):
         yield np.ascontiguousarray(rows[a : a + step])
 

@@ -1,7 +1,7 @@
 """HDF5 files that many ranks write together: one dataset per column, one slab of it per rank.
 
-With an h5py that has MPI, all ranks write their slabs collectively; otherwise the slabs pass through rank 0 one at
-a time in bounded pieces. Layout and content are the same either way.
+With an h5py that has MPI, all ranks write their slabs collectively; otherwise the slabs pass through rank 0, one rank
+after the other, in bounded pieces. Layout and content are the same either way.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import atomic_path, explain, stream_to_root
+from hpcdem.io.files import arrays_to_root, atomic_path, explain
 
 _FAILURES = (OSError, RuntimeError, ValueError)
 
@@ -97,9 +97,10 @@ class Writer:
     """An HDF5 file being written by all ranks of `comm`. Every method is collective and takes the same names, types
     and totals on all ranks. Errors are kept back until `close`, so that no rank waits for another.
 
-    Rank 0 makes groups, attributes and the empty datasets alone. With MPI in h5py it then claims the disk space, and
-    all ranks open the file to fill the datasets together: a full disk or quota is noticed before many ranks are
-    inside HDF5, where a failed write ends in a crash or a hang. `rows` handed in must not change until `close`.
+    Rank 0 makes groups, attributes and the empty datasets alone; `close` fills them, so `rows` handed in must not
+    change until then. With MPI in h5py rank 0 first claims the disk space, and all ranks open the file and write
+    together: a full disk or quota is noticed before many ranks are inside HDF5, where a failed write ends in a
+    crash or a hang.
     """
 
     def __init__(self, path: str, temporary: str, comm: Any) -> None:
@@ -157,20 +158,12 @@ class Writer:
         first = parts[0][0]
         if self.comm.rank == 0:
             self._try(lambda: self._dataset(name, (total, *first.shape[1:]), first.dtype))
-        for rows, offset in parts:
-            if not self._parallel:
-                self._write_through_root(name, rows, offset)
-            elif total:
-                self._waiting.append((name, rows, offset))
-
-    def _write_through_root(self, name: str, rows: np.ndarray, offset: int) -> None:
-        # Slabs follow each other by rank, so rank 0 only counts on.
-        for piece in stream_to_root(self.comm, np.ascontiguousarray(rows)):
-            self._try(lambda: _write_rows(self._file[name], piece, offset))  # noqa: B023
-            offset += len(piece)
+        self._waiting += [(name, rows, offset) for rows, offset in parts]
 
     def close(self) -> None:
         """Write what is still to be written and close the file. Raises HpcdemError where that failed."""
+        if not self._parallel:
+            self._write_through_root()
         self.abandon(claim=self._parallel)
         if self._parallel and not self.comm.any(self._error is not None):
             self._write_together()
@@ -193,13 +186,18 @@ class Writer:
                 self._error = explain(self._path, self._below.error)
             self._below = None
 
+    def _write_through_root(self) -> None:
+        for k, at, piece in arrays_to_root(self.comm, [(rows, offset) for _, rows, offset in self._waiting]):
+            self._try(lambda: _write_rows(self._file[self._waiting[k][0]], piece, at))  # noqa: B023
+
     def _write_together(self) -> None:
         how = h5py.h5p.create(h5py.h5p.DATASET_XFER)
         how.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
         try:
             with h5py.File(self._temporary, "r+", driver="mpio", comm=self.comm.mpi) as file:
                 for name, rows, offset in self._waiting:
-                    _write_rows(file[name], rows, offset, how)
+                    if file[name].size:
+                        _write_rows(file[name], rows, offset, how)
         except _FAILURES as failure:
             self._error = explain(self._path, failure)
 

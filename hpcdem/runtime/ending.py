@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import time
 import traceback
@@ -32,6 +33,15 @@ class Failure:
     text: str
 
 
+@dataclass(frozen=True)
+class Ending:
+    """How the job ends, for this rank: exit code of the job, rank, and (host, process id) of the other ranks."""
+
+    code: int = EXIT_OK
+    rank: int = 0
+    others: tuple[tuple[str, int], ...] = ()
+
+
 def describe(error: BaseException) -> Failure:
     """Message alone for what a user can act on, traceback for what only we can."""
     if isinstance(error, HpcdemError):
@@ -44,8 +54,8 @@ def describe(error: BaseException) -> Failure:
     return Failure(EXIT_ERROR, "".join(traceback.format_exception(error)).rstrip())
 
 
-def run_together(comm: Any, work: Callable[[], None]) -> int:
-    """Call `work` on every rank and end all ranks together; returns the exit code of the job.
+def run_together(comm: Any, work: Callable[[], None]) -> Ending:
+    """Call `work` on every rank and bring all ranks together at its end, with the message of an error printed.
 
     If only some ranks fail, the lowest of them prints and the job is aborted; this function does not return then.
     """
@@ -59,18 +69,20 @@ def run_together(comm: Any, work: Callable[[], None]) -> int:
             failure = None
     flush()
     if knock is None:
-        return report(failure, 0, 1)
+        return Ending(report(failure, 0, 1))
     if not all_arrive(knock, failure):
         assert failure is not None
         report(failure, comm.rank, comm.size)
         comm.abort(failure.code)
-    failures = knock.allgather(failure)
+    ranks = knock.allgather((failure, socket.gethostname(), os.getpid()))
+    failures = [failure for failure, *_ in ranks]
     rank, first = next(((r, f) for r, f in enumerate(failures) if f is not None), (0, None))
     # All ranks hold the same message after a collective error; a single rank's error names its rank.
     same = all(f == first for f in failures)
     if comm.rank == 0:
         report(first, rank, 1 if same else comm.size)
-    return EXIT_OK if first is None else first.code
+    others = tuple((host, pid) for r, (_, host, pid) in enumerate(ranks) if r != comm.rank)
+    return Ending(EXIT_OK if first is None else first.code, comm.rank, others)
 
 
 def all_arrive(knock: Any, failure: Failure | None) -> bool:
@@ -107,17 +119,42 @@ def flush() -> None:
             pass
 
 
-def leave(code: int) -> NoReturn:
-    """End MPI and the process. After an error MPI may wait for messages that will never come: not for ever."""
+def leave(end: Ending) -> NoReturn:
+    """End MPI and the process.
+
+    The exit code of a failed job is rank 0's, and it leaves last: launchers kill what still runs when a process
+    leaves with an error, and may then report the kill instead of the code.
+    """
     flush()
     if "mpi4py.MPI" in sys.modules:  # HDF5 may have started it too
         from mpi4py import MPI
 
-        if code != EXIT_OK and hasattr(signal, "alarm"):
+        # After an error MPI may wait for messages that will never come: not for ever.
+        if end.code != EXIT_OK and hasattr(signal, "alarm"):
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
             signal.alarm(LAST_RESORT)
         if MPI.Is_initialized() and not MPI.Is_finalized():
             MPI.Finalize()
-    if code != EXIT_OK:
-        os._exit(code)  # a library whose file was left half written may crash when it tidies up (HDF5 does)
-    sys.exit(code)
+    if end.rank > 0:
+        sys.exit(EXIT_OK)
+    wait_for_end_of(end.others if end.code != EXIT_OK else ())
+    sys.exit(end.code)  # not os._exit: MPICH says goodbye to its launcher in an exit handler
+
+
+def wait_for_end_of(others: tuple[tuple[str, int], ...]) -> None:
+    """Wait, 5 s at most, until the processes (host, pid) of this host are gone; give those elsewhere half a second."""
+    here = socket.gethostname()
+    if any(host != here for host, _ in others) or not os.path.isdir("/proc/self"):
+        time.sleep(0.5)
+    deadline = time.monotonic() + 5.0
+    while any(host == here and runs(pid) for host, pid in others) and time.monotonic() < deadline:
+        time.sleep(0.01)
+
+
+def runs(pid: int) -> bool:
+    """Whether a process is there and not just waiting to be counted (a zombie)."""
+    try:
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False

@@ -62,6 +62,7 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
     os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
     os.environ.setdefault("NUMBA_DISABLE_INTEL_SVML", "1")
     set_thread_variables(threads)
+    let_waiting_threads_sleep(threads)
     if "NUMBA_THREADING_LAYER" in os.environ:
         return threads, []
     # Fork and join cost 2 us with OpenMP, 24 with workqueue and up to 3000 with TBB, which numba would take first.
@@ -76,6 +77,24 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
         f"libgomp.so.1 (OpenMP) is not on this machine, and without it {threads} threads are slower than one: going "
         "on with 1 thread per rank. Install libgomp (it comes with gcc), or start more ranks instead"
     ]
+
+
+def threads_by_default() -> int:
+    """Threads per rank without -j: what `srun -c` or `sbatch -c` gives each task and this process may use, else 1."""
+    given = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    return max(1, min(int(given), cores())) if given.isdigit() else 1
+
+
+def let_waiting_threads_sleep(threads: int) -> None:
+    """With more threads on a host than cores, a thread that waits by spinning takes a core from one that works."""
+    counts = (os.environ.get(name, "") for name in LOCAL_RANKS)
+    ranks = next((int(count) for count in counts if count.isdigit()), 1)
+    if threads > 1 and ranks * threads > (os.cpu_count() or 1):
+        os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+
+
+LOCAL_RANKS = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE")
+"""Where Open MPI, MPICH and Slurm say how many ranks share this host."""
 
 
 def set_thread_variables(threads: int) -> None:

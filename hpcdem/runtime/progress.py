@@ -190,7 +190,9 @@ class Log:
         parts.append(f"kinetic {status.kinetic:.4g} J, unbalanced/contact {status.unbalanced_ratio:.3g}")
         parts.append(f"{status.particles} particles, {status.contacts} contacts, {bonds(status)}")
         if status.walls:
-            parts.append("walls " + " ".join(f"{i}:({fx + 0.0:.4g},{fy + 0.0:.4g})" for i, fx, fy in status.walls) + " N")
+            parts.append(
+                "walls " + " ".join(f"{i}:({fx + 0.0:.4g},{fy + 0.0:.4g})" for i, fx, fy in status.walls) + " N"
+            )
         return " | ".join(parts)
 
     def _script_left(self, done: int) -> float:

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-KERNEL_FOLDERS = ("physics", "decomp", "halo", "pre", "model")
-"""Parts of hpcdem whose source text belongs to the key of the cache."""
+WITHOUT_KERNELS = frozenset({"cli.py", "__main__.py", "lang", "runtime", "post"})
+"""Parts of hpcdem that no kernel takes a function or a constant from: a change there needs no new cache."""
 BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None] | None = None) -> Path:
+def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None]) -> Path:
     """Collective: load or compile all kernels (by calling `warm`); returns the cache folder of this rank.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
@@ -56,7 +56,7 @@ def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None] | None 
     damaged = False
     for now in range(3):
         if now == turn:
-            damaged = not load_kernels(folder, warm or compile_kernels)
+            damaged = not load_kernels(folder, warm)
         patient_barrier(comm)
 
     if comm.any(not writable):
@@ -66,14 +66,6 @@ def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None] | None 
     if comm.rank == 0:
         tidy(folder)
     return folder
-
-
-def compile_kernels() -> None:
-    """Call every kernel once. Imports them: the folder must be settled before."""
-    import hpcdem.simulation as simulation
-
-    if hasattr(simulation, "warmup"):  # without it a kernel is compiled when it is first used
-        simulation.warmup()
 
 
 def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
@@ -156,20 +148,22 @@ def cache_key() -> str:
     """Name of a cache folder: all that compiled code depends on.
 
     numba compares the source file of a kernel, but not of the functions that are inlined into it, and knows nothing
-    of constants: hence the digest over all kernel sources.
+    of constants: hence the digest over all sources. A run with threads has kernels of its own, and a folder must be
+    complete when it gets its name: hence a folder for runs with one thread and one for runs with more.
     """
     import llvmlite.binding as llvm
     import numba
 
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
-    sources = [package / "simulation.py", *(p for f in KERNEL_FOLDERS for p in sorted((package / f).rglob("*.py")))]
-    for source in sources:
-        if source.exists():
-            digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
+    for source in sorted(package.rglob("*.py")):
+        name = source.relative_to(package)
+        if name.parts[0] not in WITHOUT_KERNELS:
+            digest.update(str(name).encode() + b"\0" + source.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
     settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k in COMPILER_SETTINGS)
-    digest.update(repr((sys.version_info[:2], llvm.get_host_cpu_name(), features, settings)).encode())
+    threaded = os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
+    digest.update(repr((sys.version_info[:2], llvm.get_host_cpu_name(), features, settings, threaded)).encode())
     release = version().split()[0]
     return f"{release}-numba{numba.__version__}-{llvm.get_host_cpu_name()}-{digest.hexdigest()[:12]}"
 
@@ -191,11 +185,11 @@ def tidy(folder: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
-def warmup(log: Log) -> Path:
+def warmup(log: Log, warm: Callable[[], None]) -> Path:
     """Compile for later runs, as on a login node: `hpcdem warmup`."""
     from hpcdem.halo.comm import SerialComm
 
     began = time.monotonic()
-    folder = prepare_kernels(SerialComm(), log)
+    folder = prepare_kernels(SerialComm(), log, warm)
     log.info(f"kernels ready in {time.monotonic() - began:.1f} s: {folder}")
     return folder

@@ -53,6 +53,10 @@ PartitionName=tests Nodes=localhost Default=YES MaxTime=60 DefaultTime=10 State=
 """
 
 
+OVER = ("COMPLETED", "FAILED", "CANCELLED", "TIMEOUT", "NODE_FAIL", "OUT_OF_MEMORY")
+"""States of a job that will not change any more."""
+
+
 class CannotStart(Exception):
     """Slurm is not installed, or does not come up; the message says which."""
 
@@ -206,7 +210,7 @@ class Cluster:
     def wait(self, number: int, timeout: float = 300.0) -> Job:
         """Until the job is over; it is cancelled, and the test fails, when that takes too long."""
         deadline = time.monotonic() + timeout
-        while (job := self.job(number)).state in ("PENDING", "RUNNING", "COMPLETING", "CONFIGURING"):
+        while (job := self.job(number)).state not in OVER:
             if time.monotonic() > deadline:
                 self._ask("scancel", str(number))
                 raise AssertionError(f"job {number} still {job.state} after {timeout} s")

@@ -22,8 +22,14 @@ def options(*words: str) -> dict:
 
 def test_defaults_of_a_run():
     found = cli.Options(**options("push.py"))
-    assert (str(found.script), found.threads, found.figure) == ("push.py", 1, True)
-    assert (found.time_limit, found.resume, found.check, found.outdir) == (None, False, False, None)
+    assert (str(found.script), found.threads, found.figure) == ("push.py", None, True)
+    assert (found.time_limit, found.resume, found.check, found.outdir, found.balance) == (
+        None,
+        False,
+        False,
+        None,
+        True,
+    )
 
 
 def test_all_options_of_a_run():
@@ -112,15 +118,49 @@ def test_a_missing_script_is_said_once(launch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("data", "text"),
-    [
-        (b"\xef\xbb\xbfSTART\r\nSTOP\r\n", "START\r\nSTOP\r\n"),
-        ("START # 开始".encode(), "START # 开始"),
-        ("START # 开始".encode("gb18030"), "START # 开始"),
-    ],
+    ("text", "kind"),
+    [("pcdc block create\n", "a PCDC script"), ("import hpcdem\nhpcdem.run()\n", "a plain Python program")],
 )
-def test_scripts_from_other_editors_are_read(tmp_path, data, text):
-    from hpcdem.halo.comm import SerialComm
+def test_other_kinds_of_script_are_refused_by_name(launch, tmp_path, text, kind):
+    (tmp_path / "a.py").write_text(text)
+    done = launch(1, "a.py", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and f"hpcdem: a.py: this is {kind}" in done.stderr
 
-    (tmp_path / "a.py").write_bytes(data)
-    assert cli.read_script(SerialComm(), tmp_path / "a.py") == text
+
+SHORT = """\
+START
+BOX left 0.0 right 100.0 bottom 0.0 height 100.0
+BALL id 1 x 50.0 y 50.0 rad 1.0
+PROP density 2000.0 shear 1e9 poiss 0.2 hertz
+SET dt 0.001 gravity 0.0 -9.8
+CYC 100
+STOP
+"""
+
+
+def test_check_runs_nothing(launch, tmp_path):
+    (tmp_path / "a.py").write_text(SHORT)
+    done = launch(1, "--check", "a.py", cwd=tmp_path, timeout=60)
+    assert done.returncode == 0 and "100" in done.stdout
+    assert [p.name for p in tmp_path.iterdir()] == ["a.py"]
+
+
+def test_a_run_from_script_to_figure(launch, tmp_path):
+    (tmp_path / "a.py").write_text(SHORT)
+    done = launch(1, "a.py", cwd=tmp_path, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("hpcdem ") and "steps/s" in done.stdout
+    figure = done.stdout.splitlines()[-1].removeprefix("figure: ")
+    assert (tmp_path / figure).stat().st_size > 1000
+
+
+def test_the_run_does_not_load_what_only_the_figure_needs(tmp_path):
+    (tmp_path / "a.py").write_text(SHORT)
+    code = (
+        "import sys; from hpcdem.cli import main\nsys.argv[1:] = ['a.py', '--no-figure']\n"
+        "try: main()\nexcept SystemExit: pass\n"
+        "print([m for m in ('matplotlib', 'vtk', 'pyvista', 'scipy.sparse') if m in sys.modules])"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True, cwd=tmp_path)
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr

@@ -16,7 +16,7 @@ def outcome(error: BaseException | None) -> int:
         if error is not None:
             raise error
 
-    return ending.run_together(SerialComm(), work)
+    return ending.run_together(SerialComm(), work).code
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,7 @@ comm = launch.start_mpi()
 def work():
     {work}
 
-code = ending.run_together(comm, work)
-ending.leave(code)
+ending.leave(ending.run_together(comm, work))
 """
 
 

@@ -207,7 +207,7 @@ def test_all_ranks_see_each_other(launch):
         "places = comm.allgather(launch.place(launch.cores(), 1))\n"
         "launch.patient_barrier(comm)\n"
         "comm.rank or print(launch.start_report(places, launch.mpi_library()))\n"
-        "ending.leave(0)\n"
+        "ending.leave(ending.Ending())\n"
     )
     done = launch.python(3, "-c", program, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -99,7 +99,7 @@ def test_a_signal_to_one_rank_is_seen_by_all_on_the_same_poll(launch, tmp_path):
         "        sys.stdout.write(f'{comm.rank} {poll} {answer} {stop.reason}\\n')\n"
         "    if answer == 'stop':\n"
         "        break\n"
-        "ending.leave(0)\n"
+        "ending.leave(ending.Ending())\n"
     )
     done = launch.python(3, program, timeout=60)
     assert done.returncode == 0, done.stderr

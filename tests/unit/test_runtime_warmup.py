@@ -150,6 +150,16 @@ def test_the_key_knows_the_settings_of_the_compiler(monkeypatch):
     assert warmup.cache_key() != key
 
 
+def test_runs_with_threads_have_a_folder_of_their_own(monkeypatch):
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
+    key = warmup.cache_key()
+    keys = []
+    for n in ("2", "8"):
+        monkeypatch.setenv("NUMBA_NUM_THREADS", n)
+        keys.append(warmup.cache_key())
+    assert keys[0] == keys[1] != key
+
+
 def test_folders_that_nobody_uses_are_removed(base):
     base.mkdir()
     now = time.time()

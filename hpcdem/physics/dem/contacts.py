@@ -24,6 +24,14 @@ KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
 LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 
 
+@njit(cache=True)
+def _direction(dx, dy, d):
+    """Unit vector from the earlier to the later partner; +x for two centres in one place (rows that start at one corner)."""
+    if d == 0.0:
+        return 1.0, 0.0
+    return dx / d, dy / d
+
+
 @njit(cache=True, nogil=True)
 def _block(
     t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
@@ -62,8 +70,7 @@ def _block(
                 fs[k] = 0.0
                 continue
             d = math.sqrt(d2)
-            nx = dx / d
-            ny = dy / d
+            nx, ny = _direction(dx, dy, d)
             u = reach - d
             la = ri - 0.5 * u
             lb = rj - 0.5 * u
@@ -159,8 +166,7 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
             if kind == 0 and d2 > reach * reach:
                 continue
             d = math.sqrt(d2)
-            nx = dx / d
-            ny = dy / d
+            nx, ny = _direction(dx, dy, d)
             u = reach - d
             two_rt = 4.0 * ri * rj / reach
             q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]

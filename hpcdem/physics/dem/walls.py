@@ -34,9 +34,9 @@ def closest(wall, x, y):
     rx, ry = x - wall[P1X], y - wall[P1Y]
     along = rx * ex + ry * ey
     h = ex * ry - ey * rx
-    if along < 0.0:
+    if along <= 0.0:
         return END1, h, wall[P1X], wall[P1Y]
-    if along > length:
+    if along >= length:
         return END2, h, wall[P2X], wall[P2Y]
     return FACE, h, wall[P1X] + along * ex, wall[P1Y] + along * ey
 
@@ -67,16 +67,19 @@ def _geometry(wall, x, y, r, side):
     d = math.sqrt(dx * dx + dy * dy)
     if d >= r or d == 0.0:
         return NONE, 0.0, 0.0, 0.0, 0.0, qx, qy
-    return where, side, dx / d, dy / d, r - d, qx, qy
+    return where, 0.0, dx / d, dy / d, r - d, qx, qy  # round the end it may come to the other side
 
 
 @njit(cache=True)
 def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
-    """True if the end point (px, py) of slot k is also met by another wall: a face there, or an earlier end."""
+    """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that passes
+    through this point, or by an end there that comes earlier."""
     for q in range(first, last):
         if q == k:
             continue
         where, _, _, _, _, qx, qy = _geometry(walls[slot_wall[q]], x, y, r, slot_side[q])
+        if where == FACE:
+            _, _, qx, qy = closest(walls[slot_wall[q]], px, py)
         if where != NONE and abs(qx - px) <= 1e-9 * r and abs(qy - py) <= 1e-9 * r and (where == FACE or q < k):
             return True
     return False

@@ -1,0 +1,357 @@
+"""Walls as the loop sees them: sides, ends, joints, deep penetration, motion, the BOX."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hpcdem import observe
+from hpcdem.commands import particles, properties, walls
+from hpcdem.errors import CommandError
+from hpcdem.physics.dem import walls as kernels
+from hpcdem.runtime.progress import Log
+from tests.support import at_wall, carry, force, model, only, position, steps, value, velocity
+
+R, K = 1.0, 1e6
+"""Radius [m], stiffness of particle and wall in series [N/m]."""
+
+
+def held(folder, x: float, y: float, *segments, wallside: str = "both", fric: float = 0.0):
+    """A held ball and walls 0, 1, ... of the linear law."""
+    sim = model(folder, wallside=wallside)
+    particles.ball(sim, 0, x, y, R)
+    properties.prop(sim, kn=2.0 * K, ks=2.0 * K, fric=1.0)
+    properties.fix(sim, ("x", "y", "spin"))
+    for number, nodes in enumerate(segments):
+        walls.wall(sim, number, nodes, kn=2.0 * K, ks=2.0 * K, fric=fric)
+    steps(sim, 1)
+    return sim
+
+
+def put(sim, x: float, y: float, n: int = 1) -> None:
+    """Carry the ball to a place in n equal steps."""
+    dx, dy = np.array([x, y]) - position(sim)
+    carry(sim, 0, x=dx, y=dy, n=n)
+
+
+# ---- geometry ---------------------------------------------------------------------------------------------------------
+
+
+coordinate = st.floats(-50.0, 50.0)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(coordinate, coordinate, coordinate, coordinate, coordinate, coordinate)
+def test_closest_point(x1, y1, x2, y2, x, y):
+    """No point of the segment is nearer; the signed distance is positive to the left of P1 -> P2."""
+    p1, p2, p = np.array([x1, y1]), np.array([x2, y2]), np.array([x, y])
+    length = math.dist(p1, p2)
+    if length < 1e-3:
+        return
+    wall = np.array([x1, y1, x2, y2, 0.0, 0.0, 0.0, 0.0])
+    where, h, qx, qy = kernels.closest(wall, x, y)
+    found = math.dist((qx, qy), p)
+    share = np.clip((p - p1) @ (p2 - p1) / length**2, 0.0, 1.0)
+    assert found == pytest.approx(np.hypot(*(p1 + share * (p2 - p1) - p)), abs=1e-9)
+    assert min(np.hypot(*(p1 + s * (p2 - p1) - p)) for s in np.linspace(0.0, 1.0, 11)) >= found - 1e-9
+    cross = (x2 - x1) * (y - y1) - (y2 - y1) * (x - x1)
+    assert h == pytest.approx(cross / length, abs=1e-9)
+    if where == kernels.FACE:
+        assert found == pytest.approx(abs(h), abs=1e-9)
+    else:
+        assert (qx, qy) == ((x1, y1) if where == kernels.END1 else (x2, y2))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("angle", [0.0, 40.0, 90.0, 200.0])
+def test_a_face_pushes_to_the_side_of_the_centre(tmp_path, angle, side):
+    t = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
+    n = np.array([-t[1], t[0]])
+    sim = held(tmp_path, *(side * 0.9 * n), (tuple(-4.0 * t), tuple(5.0 * t)))
+    assert force(sim)[:2] == pytest.approx(side * 0.1 * K * n, abs=1e-6)
+    assert observe.wall_forces(sim)[0] == pytest.approx(-side * 0.1 * K * n, abs=1e-6), "and the wall back"
+    contact = at_wall(sim)
+    assert (contact.x, contact.y) == pytest.approx(tuple(-side * 0.05 * n), abs=1e-12), "R - U/2 from the centre"
+
+
+@pytest.mark.parametrize("around", [10.0, 45.0, 90.0, 135.0, 170.0])
+def test_an_end_is_a_point_obstacle(tmp_path, around):
+    """Beyond P2 = (3, 0) of a wall along x: n from end to centre, U = R - |x - P2|. Angles from the direction of the wall."""
+    n = np.array([math.cos(math.radians(around)), math.sin(math.radians(around))])
+    sim = held(tmp_path, *(np.array([3.0, 0.0]) + 0.8 * n), ((-3.0, 0.0), (3.0, 0.0)))
+    if around < 90.0:
+        assert force(sim)[:2] == pytest.approx(0.2 * K * n, rel=1e-9, abs=1e-6)
+    else:  # above the segment: its face
+        assert force(sim)[:2] == pytest.approx([0.0, (1.0 - 0.8 * n[1]) * K], rel=1e-9, abs=1e-6)
+
+
+def test_the_force_is_continuous_around_an_end(tmp_path):
+    """Along the face, over the end and away, at a constant distance from the segment: constant push."""
+    sim = held(tmp_path, 0.0, 0.9, ((-3.0, 0.0), (3.0, 0.0)))
+    for s in np.linspace(0.0, 6.0, 61):
+        if s <= 3.0:
+            x, y = s, 0.9
+        else:
+            a = (s - 3.0) / 0.9
+            x, y = 3.0 + 0.9 * math.sin(a), 0.9 * math.cos(a)
+        put(sim, x, y)
+        assert math.hypot(*force(sim)[:2]) == pytest.approx(0.1 * K, rel=1e-9)
+
+
+def test_round_the_end_to_the_other_side(tmp_path):
+    """A ball that rolls over the tip of an upright wall is pushed to the new side, not back through the wall."""
+    sim = held(tmp_path, -0.97, 9.5, ((0.0, 0.0), (0.0, 10.0)))
+    assert force(sim)[0] == pytest.approx(-0.03 * K, rel=1e-9)
+    for a in np.linspace(math.pi, 0.0, 201):
+        put(sim, 0.97 * math.cos(a), 10.0 + 0.97 * math.sin(a))
+    put(sim, 0.97, 9.5)
+    assert force(sim)[:2] == pytest.approx([0.03 * K, 0.0], rel=1e-9)
+
+
+# ---- joints -----------------------------------------------------------------------------------------------------------
+
+
+JOINED = {
+    "ends meet": (((-5.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (5.0, 0.0))),
+    "starts meet": (((0.0, 0.0), (-5.0, 0.0)), ((0.0, 0.0), (5.0, 0.0))),
+    "one begins inside the other": (((-5.0, 0.0), (0.2, 0.0)), ((0.0, 0.0), (5.0, 0.0))),
+    "a dead end from below": (((-5.0, 0.0), (5.0, 0.0)), ((0.0, -3.0), (0.0, 0.0))),
+}
+
+
+@pytest.mark.parametrize("which", [k for k in JOINED if "inside" not in k])
+def test_a_floor_of_two_pieces_is_a_floor(tmp_path, which):
+    """No double push and no sideways push near the joint, nor at it."""
+    sim = held(tmp_path, -1.0, 0.95, *JOINED[which])
+    for x in (-0.5, -0.3, -0.1, -1e-3, 0.0, 1e-3, 0.05, 0.2, 0.4):
+        put(sim, x, 0.95)
+        assert force(sim)[:2] == pytest.approx([0.0, 0.05 * K], abs=1e-6), f"x = {x}"
+
+
+def test_overlapping_pieces_are_two_walls(tmp_path):
+    """Where two segments lie on each other both push; their ends do not."""
+    sim = held(tmp_path, -1.0, 0.95, *JOINED["one begins inside the other"])
+    for x, times in ((-0.1, 1.0), (0.1, 2.0), (0.3, 1.0)):
+        put(sim, x, 0.95)
+        assert force(sim)[:2] == pytest.approx([0.0, times * 0.05 * K], abs=1e-6)
+
+
+def test_an_outward_corner_pushes_once(tmp_path):
+    """Two walls meet in a ridge at the origin; a ball beyond both ends meets one point, not two."""
+    sim = held(tmp_path, 0.0, 0.9, ((-5.0, -5.0), (0.0, 0.0)), ((0.0, 0.0), (5.0, -5.0)))
+    assert force(sim)[:2] == pytest.approx([0.0, 0.1 * K], abs=1e-6)
+    n = np.array([math.sin(0.3), math.cos(0.3)])
+    put(sim, *(0.9 * n))
+    assert force(sim)[:2] == pytest.approx(0.1 * K * n, abs=1e-6)
+    put(sim, *(0.9 * np.array([math.sqrt(0.5), math.sqrt(0.5)]) + np.array([0.1, -0.1])))  # over the right face
+    assert force(sim)[:2] == pytest.approx(0.1 * K * np.array([math.sqrt(0.5), math.sqrt(0.5)]), abs=1e-6)
+
+
+def test_an_inward_corner_pushes_twice(tmp_path):
+    """In the corner of floor and side wall both faces act, their common end does not."""
+    sim = held(tmp_path, 0.9, 0.8, ((0.0, 5.0), (0.0, 0.0)), ((0.0, 0.0), (5.0, 0.0)))
+    assert force(sim)[:2] == pytest.approx([0.1 * K, 0.2 * K], abs=1e-6)
+    assert len(observe.wall_rows(sim)[0]) == 2
+
+
+def test_a_gap_between_two_pieces_has_ends(tmp_path):
+    """Ends that do not touch another wall act: the ball sinks into the gap, held by both."""
+    sim = held(tmp_path, 0.0, 0.8, ((-5.0, 0.0), (-0.3, 0.0)), ((0.3, 0.0), (5.0, 0.0)))
+    d = math.hypot(0.3, 0.8)
+    assert force(sim)[:2] == pytest.approx([0.0, 2.0 * (1.0 - d) * K * 0.8 / d], rel=1e-9, abs=1e-6)
+
+
+def test_a_step_between_two_pieces_has_a_corner(tmp_path):
+    """The right piece lies 0.5 m lower: its neighbour's end acts on a ball beside it."""
+    sim = held(tmp_path, 0.8, 0.45, ((-5.0, 0.0), (0.0, 0.0)), ((0.0, -0.5), (5.0, -0.5)))
+    d = math.hypot(0.8, 0.45)
+    end = (1.0 - d) * K * np.array([0.8, 0.45]) / d
+    assert force(sim)[:2] == pytest.approx(end + [0.0, 0.05 * K], rel=1e-9)
+
+
+# ---- sides ------------------------------------------------------------------------------------------------------------
+
+
+def test_deep_penetration_keeps_its_side(tmp_path):
+    """Pressed through a two-sided wall to four radii beyond it and back: the push stays on the side where contact began,
+    through many rebuilds of the lists."""
+    sim = held(tmp_path, 0.0, 0.95, ((-5.0, 0.0), (5.0, 0.0)))
+    before = sim.rebuilds
+    for y in (0.5, 0.0, -0.5, -1.0, -2.0, -4.0, -1.5, 0.3, 0.99):
+        put(sim, 0.0, y, n=40)
+        assert force(sim)[:2] == pytest.approx([0.0, (1.0 - y) * K], rel=1e-9, abs=1e-5), f"y = {y}"
+    assert sim.rebuilds > before + 10
+    put(sim, 0.0, 1.01, n=5)
+    assert at_wall(sim) is None and not force(sim).any()
+    put(sim, 0.0, 5.0, n=50)
+    put(sim, 9.0, 5.0, n=50)
+    put(sim, 9.0, -5.0, n=50)
+    put(sim, 0.0, -5.0, n=50)
+    put(sim, 0.0, -0.9, n=50)
+    assert force(sim)[1] == pytest.approx(-0.1 * K, rel=1e-9), "a new contact from below"
+
+
+def test_a_one_sided_wall_expels_to_its_left(tmp_path):
+    """SET wallside left: contact if -R < h < R, the push always to the left of P1 -> P2; beyond R on the right nothing."""
+    for y, push in ((0.9, 0.1), (0.2, 0.8), (-0.4, 1.4), (-0.99, 1.99), (-1.01, 0.0), (1.01, 0.0)):
+        sim = held(tmp_path, 0.0, y, ((-5.0, 0.0), (5.0, 0.0)), wallside="left")
+        assert force(sim)[:2] == pytest.approx([0.0, push * K], rel=1e-9, abs=1e-6)
+    sim = held(tmp_path, 0.0, 0.9, ((5.0, 0.0), (-5.0, 0.0)), wallside="left")
+    assert force(sim)[1] == pytest.approx(-1.9 * K, rel=1e-9), "the other way round, left is below"
+
+
+def test_wallside_belongs_to_walls_made_after_it(tmp_path):
+    """Two-sided is the default."""
+    sim = held(tmp_path, 0.0, -0.9, ((-5.0, 0.0), (5.0, 0.0)))
+    assert force(sim)[1] == pytest.approx(-0.1 * K, rel=1e-9)
+
+
+# ---- moving, replaced, soft walls ---------------------------------------------------------------------------------------
+
+
+def test_a_moving_wall_drags_and_pushes(tmp_path):
+    """P += v dt; the shear of the contact takes the wall's velocity, the overlap its way."""
+    sim = held(tmp_path, 0.0, 1.0, ((-5.0, 0.0), (5.0, 0.0)), fric=1.0)
+    walls.wall(sim, 0, xv=0.5, yv=2.0)
+    steps(sim, 10)
+    assert sim.walls.p1[0] == pytest.approx([-4.995, 0.02]) and sim.walls.p2[0] == pytest.approx([5.005, 0.02])
+    assert force(sim)[:2] == pytest.approx([0.005 * K, 0.02 * K], rel=1e-9)
+    assert force(sim)[2] == pytest.approx(0.005 * K * (1.0 - 0.01), rel=1e-2)
+    walls.wall(sim, 0, xv=0.0, yv=0.0)
+    steps(sim, 5)
+    assert force(sim)[:2] == pytest.approx([0.005 * K, 0.02 * K], rel=1e-9)
+
+
+def test_a_wall_that_comes_from_afar_is_not_missed(tmp_path):
+    """It crosses 40 m of empty space before it meets the ball."""
+    sim = held(tmp_path, 0.0, 1.0, ((-5.0, -40.0), (5.0, -40.0)))
+    walls.wall(sim, 0, yv=100.0)
+    steps(sim, 399)
+    assert at_wall(sim) is None
+    steps(sim, 2)
+    assert force(sim)[1] == pytest.approx(0.1 * K, rel=1e-6)
+
+
+def test_friction_and_stiffness_can_be_changed_and_nodes_replaced(tmp_path):
+    sim = held(tmp_path, 0.0, 0.9, ((-5.0, 0.0), (5.0, 0.0)), fric=1.0)
+    properties.prop(sim, xv=-1.0)
+    steps(sim, 20)
+    assert at_wall(sim).fs == pytest.approx(0.02 * K, rel=1e-9)
+    walls.wall(sim, 0, fric=0.1)
+    steps(sim, 1)
+    assert at_wall(sim).fs == pytest.approx(0.1 * 0.1 * K, rel=1e-9)
+    walls.wall(sim, 0, kn=6.0 * K)
+    steps(sim, 1)
+    assert at_wall(sim).fn == pytest.approx(0.1 * 1.5 * K, rel=1e-9)
+    properties.prop(sim, xv=0.0)
+    walls.wall(sim, 0, ((-5.0, -0.05), (5.0, -0.05)), kn=2.0 * K)
+    steps(sim, 1)
+    assert at_wall(sim).fn == pytest.approx(0.05 * K, rel=1e-9) and at_wall(sim).fs == 0.0, "a new wall, no memory"
+
+
+def test_wall_stiffness_counts_for_linear_particles_only(tmp_path):
+    """kn = 0 makes a wall invisible for linear particles; Hertz ones bring their own moduli."""
+    sim = model(tmp_path)
+    particles.ball(sim, 0, 0.0, 0.9, R)
+    particles.ball(sim, 1, 3.0, 0.9, R)
+    properties.prop(sim, only(0), kn=2.0 * K)
+    properties.prop(sim, only(1), shear=1e6, poiss=0.25, hertz=True)
+    properties.fix(sim, ("x", "y", "spin"))
+    walls.wall(sim, 0, ((-5.0, 0.0), (5.0, 0.0)))
+    steps(sim, 1)
+    assert force(sim, 0)[1] == 0.0
+    assert force(sim, 1)[1] == pytest.approx(2.0 * 1e6 * math.sqrt(2.0) / (3.0 * 0.75) * 0.1**1.5, rel=1e-9)
+
+
+def test_wall_forces_are_sums(tmp_path):
+    sim = held(tmp_path, 0.0, 0.9, ((-50.0, 0.0), (50.0, 0.0)), ((0.0, 2.0), (0.0, 9.0)))
+    for gid in range(1, 8):
+        particles.ball(sim, gid, 3.0 * gid, 0.9, R)
+    properties.prop(sim, kn=2.0 * K, ks=2.0 * K)
+    properties.fix(sim, ("x", "y", "spin"))
+    steps(sim, 1)
+    assert observe.wall_forces(sim) == pytest.approx(np.array([[0.0, -0.8 * K], [0.0, 0.0]]), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"id": -1, "nodes": ((0.0, 0.0), (1.0, 0.0))}, "must not be negative"),
+        ({"id": 1, "nodes": ((2.0, 3.0), (2.0, 3.0))}, "zero length"),
+        ({"id": 1, "fric": 0.3}, "no wall with id 1"),
+        ({"id": 1, "nodes": ((0.0, 0.0), (1.0, 0.0)), "kn": -1.0}, "kn must not be negative"),
+    ],
+)
+def test_walls_that_make_no_sense(tmp_path, given, message):
+    with pytest.raises(CommandError, match=message):
+        walls.wall(model(tmp_path), **given)
+
+
+# ---- the BOX ----------------------------------------------------------------------------------------------------------
+
+
+def boxed(folder, kn: float = 2.0 * K):
+    """A BOX from (-10, -5) to (10, 5) without particles, and its log."""
+    sim = model(folder)
+    said = io.StringIO()
+    sim.log = Log(stream=said)
+    walls.box(sim, -10.0, 10.0, -5.0, 10.0, kn=kn, ks=kn)
+    return sim, said
+
+
+@pytest.mark.parametrize(
+    ("place", "push"),
+    [((-9.2, 0.0), (0.2, 0.0)), ((9.2, 0.0), (-0.2, 0.0)), ((0.0, -4.3), (0.0, 0.3)), ((9.2, 4.3), (-0.2, -0.3))],
+)
+def test_the_box_pushes_inward(tmp_path, place, push):
+    sim, _ = boxed(tmp_path)
+    particles.ball(sim, 0, *place, R)
+    properties.prop(sim, kn=2.0 * K)
+    properties.fix(sim, ("x", "y", "spin"))
+    steps(sim, 1)
+    assert force(sim)[:2] == pytest.approx(np.array(push) * K, rel=1e-9, abs=1e-6)
+
+
+def test_particles_that_leave_the_box_are_deleted(tmp_path):
+    """Walls of no stiffness let linear particles through; ids and places stand in the log; the others stay."""
+    sim, said = boxed(tmp_path, kn=0.0)
+    particles.ball(sim, 3, 8.0, 2.0, R)
+    particles.ball(sim, 5, 0.0, 0.0, R)
+    particles.ball(sim, 8, 0.0, -3.0, R)
+    properties.prop(sim, density=1.0, kn=2.0 * K)
+    properties.prop(sim, only(3), xv=50.0)
+    properties.prop(sim, only(8), yv=-30.0)
+    steps(sim, 200)
+    assert sim.particles["gid"].tolist() == [5] and value(sim, "x", 5) == 0.0
+    assert "left the BOX" in said.getvalue() and "3 at (10" in said.getvalue() and "8 at (0, -5" in said.getvalue()
+
+
+def test_a_box_that_holds(tmp_path):
+    """Twelve balls fly about in it for many reflections; none is lost, and the energy is what it was."""
+    sim, said = boxed(tmp_path)
+    random = np.random.default_rng(2)
+    for gid in range(12):
+        particles.ball(sim, gid, -8.25 + 3.0 * (gid % 6), -2.5 + 4.0 * (gid // 6), R)
+        properties.prop(sim, only(gid), xv=random.uniform(-5, 5), yv=random.uniform(-5, 5))
+    properties.prop(sim, density=1000.0, kn=2.0 * K)
+    steps(sim, 1)
+    before = observe.kinetic_energy(sim)
+    steps(sim, 5000)
+    assert len(sim.particles) == 12 and "BOX" not in said.getvalue()
+    p = sim.particles
+    potential = 0.0
+    for rows in (observe.contact_rows(sim)[0], observe.wall_rows(sim)[0]):
+        potential += (0.5 * rows[:, observe.FN] * rows[:, observe.OVERLAP]).sum()
+    assert observe.kinetic_energy(sim) + potential == pytest.approx(before, rel=0.02)
+    assert (np.abs(p["x"]) < 10.0).all() and (np.abs(p["y"]) < 5.0).all()
+    assert not p["spin"].any() and velocity(sim, 0).any()
+
+
+def test_an_empty_box_is_an_error(tmp_path):
+    with pytest.raises(CommandError, match="BOX is empty"):
+        walls.box(model(tmp_path), 0.0, 0.0, 0.0, 1.0)
