@@ -57,8 +57,13 @@ def wall_forces(sim: Simulation) -> np.ndarray:
     force = np.concatenate([f for _, f in parts])
     for w in np.unique(wall):
         mine = force[wall == w]
-        total[w] = -math.fsum(mine[:, 0]), -math.fsum(mine[:, 1])
+        total[w] = -_fsum(mine[:, 0]), -_fsum(mine[:, 1])
     return total
+
+
+def _fsum(values: np.ndarray) -> float:
+    """Exact sum; NaN where a value is not finite (fsum would raise, and a broken state must still be written)."""
+    return math.fsum(values) if np.isfinite(values).all() else math.nan
 
 
 def kinetic_energy(sim: Simulation) -> float:

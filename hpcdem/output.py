@@ -163,7 +163,7 @@ def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
     """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
     restarted one cuts what lies after its step."""
     path = folder(sim) / name
-    since = None if name in sim.series_open else sim.clock.step if sim.restarted else 0
+    since = None if name in sim.series_open else sim.restart_step
     append_rows(path, header, rows, since, sim.comm)
     sim.series_open.add(name)
 

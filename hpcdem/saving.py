@@ -135,7 +135,7 @@ def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, n
     sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
     sim.bonds = state["bonds"]
     sim._longest2 = state["longest2"]
-    sim.restarted = True
+    sim.restart_step = sim.clock.step
     if sim.comm.rank == 0:
         sim.breaks[:] = state["breaks"]
     origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)

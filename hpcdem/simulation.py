@@ -108,7 +108,7 @@ class Simulation:
         self.progress: dict | None = None
         self.last_frame: tuple[int, bool] | None = None
         self.series_open: set[str] = set()
-        self.restarted = False
+        self.restart_step = 0
         self.lattice = Lattice()
         self._hist: Histories | None = Histories.empty(0)
         self._lists: neighbours.ContactLists | None = None
@@ -508,7 +508,11 @@ class Simulation:
         speed = np.hypot(p["vx"], p["vy"])
         with np.errstate(invalid="ignore"):
             bad = ~np.isfinite(hot[:, :5]).all(axis=1) | ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
-        mine = [(int(p["gid"][c]), *map(float, hot[c, :4]), self.comm.rank) for c in np.flatnonzero(bad)[:10]]
+        mine = []
+        for c in np.flatnonzero(bad)[:10]:
+            known = np.isfinite(hot[c, :2]).all()  # else tell where it was when the lists were built
+            x, y = hot[c, :2] if known else self.origin[c]
+            mine.append((int(p["gid"][c]), float(x), float(y), float(p["vx"][c]), float(p["vy"][c]), self.comm.rank))
         rows = sorted(row for part in self.comm.allgather(mine) for row in part)[:10]
         total = self.count(int(bad.sum()))
         what = "a number is not finite" if broken else "a particle moves over half its radius per step"
@@ -516,7 +520,7 @@ class Simulation:
             f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}"
             for g, x, y, vx, vy, rank in rows
         )
-        raise PhysicsError(
-            f"step {self.clock.step}: {what} ({total} particles); the time step {dt:g} s is probably too large, "
-            f"or particles were made overlapping\n{places}"
-        )
+        guess = f"the time step {dt:g} s is probably too large, or particles were made overlapping"
+        if broken and np.isnan(self.pair_laws[:, contacts.MODEL]).any():
+            guess = "there are particles of the Hertz law and of the linear one, and a pair of both has no law"
+        raise PhysicsError(f"step {self.clock.step}: {what} ({total} particles); {guess}\n{places}")

@@ -108,8 +108,8 @@ def carry(sim: Simulation, gid: int, x: float = 0.0, y: float = 0.0, angle: floa
 
 
 def held_for_a_step(sim: Simulation) -> None:
-    """One step in which nothing moves, so that contact forces are in place when the particles are let go: a new particle's
-    first step sees none."""
+    """One step in which nothing moves, so that contact forces are in place when the particles are let go: a new
+    particle's first step sees none."""
     dofs = ("x", "y", "spin")
     properties.fix(sim, dofs)
     steps(sim, 1)

@@ -83,8 +83,8 @@ def ball(
     sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
 ) -> None:
     """BALL: one particle. gid None takes the next free id."""
-    if rad <= 0.0:
-        raise CommandError(f"rad must be positive, got {rad:g}")
+    if not (rad > 0.0 and np.isfinite([x, y, rad]).all()):
+        raise CommandError(f"a particle needs finite x, y and a positive rad, got {x:g}, {y:g}, {rad:g}")
     if gid is not None:
         if gid < 0:
             raise CommandError(f"id must not be negative, got {gid}")

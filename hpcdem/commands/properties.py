@@ -63,7 +63,7 @@ def prop(
         k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None
     }
     for name in NOT_NEGATIVE:
-        if given.get(name, 0.0) < 0.0:
+        if not given.get(name, 0.0) >= 0.0:
             raise CommandError(f"{name} must not be negative, got {given[name]:g}")
     if not -1.0 < given.get("poiss", 0.0) <= 0.5:
         raise CommandError(f"poiss must lie in (-1, 0.5], got {poiss:g}")

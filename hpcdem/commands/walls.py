@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hpcdem.errors import CommandError
 from hpcdem.model.walls import BOX_IDS
 from hpcdem.simulation import Simulation
@@ -21,6 +23,8 @@ def wall(
     """Make a wall (with nodes) or change one. SI units; kn, ks act on particles of the linear law only."""
     if id < 0:
         raise CommandError(f"wall id must not be negative, got {id}")
+    if nodes is not None and not np.isfinite(nodes).all():
+        raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
     if nodes is not None:
         forget(sim, sim.walls.find(id))
         sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")

@@ -12,8 +12,8 @@ from hpcdem.io.files import explain
 def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: int | None, comm: Any) -> None:
     """Collective. Add rows to the file.
 
-    since: None to append; a step number at the first call of a run: what the file has after that step is cut off (0: it
-    starts anew). Raises HpcdemError on all ranks if it cannot be written.
+    since: None to append; at the first call of a run the step it starts from: what the file has after that step is cut
+    off (0: it starts anew). Raises HpcdemError on all ranks if it cannot be written.
     """
     error = None
     if comm.rank == 0:
@@ -33,7 +33,7 @@ def _cut(path: str | os.PathLike, header: str, since: int) -> None:
         with open(path, encoding="utf-8") as file:
             for line in file.read().splitlines()[1:]:
                 step = re.match(r"\d+", line)
-                if step is not None and int(step[0]) < since:
+                if step is not None and int(step[0]) <= since:
                     kept.append(line)
     temporary = f"{os.fspath(path)}.tmp"
     with open(temporary, "w", encoding="utf-8") as file:

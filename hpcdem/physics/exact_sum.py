@@ -44,7 +44,7 @@ def rounded(bins: np.ndarray) -> float:
     try:  # int / int is correctly rounded in Python
         return float(total << exponent) if exponent >= 0 else total / (1 << -exponent)
     except OverflowError:
-        return math.copysign(math.inf, total)
+        return math.inf if total > 0 else -math.inf
 
 
 def exact_sum(values: np.ndarray, comm: Any) -> float:

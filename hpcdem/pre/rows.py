@@ -15,6 +15,7 @@ def row(p1: tuple[float, float], p2: tuple[float, float], rad: float, cratio: fl
     spacing = 2.0 * rad * cratio
     length = math.dist(p1, p2)
     n = math.floor(length / spacing + 1e-9) + 1
-    along = np.arange(n) * (spacing / length if length > 0.0 else 0.0)
-    start, way = np.array(p1), np.array(p2) - np.array(p1)
-    return start + along[:, None] * way
+    start = np.array(p1, dtype=np.float64)
+    way = np.array(p2, dtype=np.float64) - start
+    direction = way / length if length > 0.0 else way
+    return start + (spacing * np.arange(n))[:, None] * direction

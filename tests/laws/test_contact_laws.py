@@ -1,4 +1,5 @@
-"""The scalar contact laws: one formula, one test. Written out a second time, in the form in which the sources print them."""
+"""The scalar contact laws: one formula, one test. Written out a second time, in the form in which the sources print
+them."""
 
 from __future__ import annotations
 
@@ -35,8 +36,8 @@ def test_springs_in_series(ka, kb):
 
 
 def test_springs_in_series_published_values():
-    """11e9 with 11e9 gives 5.5e9 (Li et al. 2018), 1.5e4 with 1.5e4 7.5e3 (Li et al. 2021); a spring that is missing carries
-    nothing."""
+    """11e9 with 11e9 gives 5.5e9 (Li et al. 2018), 1.5e4 with 1.5e4 7.5e3 (Li et al. 2021); a spring that is
+    missing carries nothing."""
     assert laws.series_stiffness(11e9, 11e9) == 5.5e9
     assert laws.series_stiffness(1.5e4, 1.5e4) == 7.5e3
     assert laws.series_stiffness(0.0, 1e9) == laws.series_stiffness(1e9, 0.0) == laws.series_stiffness(0.0, 0.0) == 0.0
@@ -89,7 +90,8 @@ def test_tangent_is_the_derivative(part, r):
     a, u = 1e9, part * r
     h = 1e-4 * u
     force = [laws.contact(laws.HERTZ, a, 0.0, 2.0 * r, x)[0] for x in (u - h, u + h)]
-    assert laws.tangent_normal_stiffness(laws.HERTZ, a, 2.0 * r, u) == pytest.approx((force[1] - force[0]) / (2.0 * h), rel=1e-7)
+    slope = (force[1] - force[0]) / (2.0 * h)
+    assert laws.tangent_normal_stiffness(laws.HERTZ, a, 2.0 * r, u) == pytest.approx(slope, rel=1e-7)
 
 
 def test_touching_is_no_force():

@@ -67,6 +67,8 @@ def test_order_and_ranks_do_not_matter(values, random, ranks):
         ([1e308, 1e308, -1e308], 1e308),
         ([1e308, 1e308], math.inf),
         ([-1e308, -1e308], -math.inf),
+        ([1.0, 1e308, 1e308], math.inf),
+        ([-1.0, -1e308, -1e308], -math.inf),
         ([5e-324, 5e-324], 1e-323),
         ([1e300, 1.0, -1e300, -1.0, 3.0], 3.0),
         ([1.0, 2.0**-53], 1.0),

@@ -34,12 +34,12 @@ def held(folder, x: float, y: float, *segments, wallside: str = "both", fric: fl
 
 
 def put(sim, x: float, y: float, n: int = 1) -> None:
-    """Carry the ball to a place in n equal steps."""
+    """Carry the ball to a place in n equal steps, or as many as its radius asks for."""
     dx, dy = np.array([x, y]) - position(sim)
-    carry(sim, 0, x=dx, y=dy, n=n)
+    carry(sim, 0, x=dx, y=dy, n=max(n, math.ceil(math.hypot(dx, dy) / (0.3 * R))))
 
 
-# ---- geometry ---------------------------------------------------------------------------------------------------------
+# ---- geometry ----------------------------------------------------------------------------------------------------
 
 
 coordinate = st.floats(-50.0, 50.0)
@@ -81,7 +81,8 @@ def test_a_face_pushes_to_the_side_of_the_centre(tmp_path, angle, side):
 
 @pytest.mark.parametrize("around", [10.0, 45.0, 90.0, 135.0, 170.0])
 def test_an_end_is_a_point_obstacle(tmp_path, around):
-    """Beyond P2 = (3, 0) of a wall along x: n from end to centre, U = R - |x - P2|. Angles from the direction of the wall."""
+    """Beyond P2 = (3, 0) of a wall along x: n from end to centre, U = R - |x - P2|. Angles from the direction of
+    the wall."""
     n = np.array([math.cos(math.radians(around)), math.sin(math.radians(around))])
     sim = held(tmp_path, *(np.array([3.0, 0.0]) + 0.8 * n), ((-3.0, 0.0), (3.0, 0.0)))
     if around < 90.0:
@@ -91,15 +92,13 @@ def test_an_end_is_a_point_obstacle(tmp_path, around):
 
 
 def test_the_force_is_continuous_around_an_end(tmp_path):
-    """Along the face, over the end and away, at a constant distance from the segment: constant push."""
+    """Along the face, over the end and back below, at a constant distance from the segment: constant push."""
     sim = held(tmp_path, 0.0, 0.9, ((-3.0, 0.0), (3.0, 0.0)))
-    for s in np.linspace(0.0, 6.0, 61):
-        if s <= 3.0:
-            x, y = s, 0.9
-        else:
-            a = (s - 3.0) / 0.9
-            x, y = 3.0 + 0.9 * math.sin(a), 0.9 * math.cos(a)
-        put(sim, x, y)
+    half = 0.9 * math.pi
+    for s in np.linspace(0.0, 6.0 + half, 101):
+        a = min(max(s - 3.0, 0.0) / 0.9, math.pi)
+        along = s if s < 3.0 else 6.0 + half - s if s > 3.0 + half else 3.0
+        put(sim, along + 0.9 * math.sin(a), 0.9 * math.cos(a))
         assert math.hypot(*force(sim)[:2]) == pytest.approx(0.1 * K, rel=1e-9)
 
 
@@ -113,7 +112,7 @@ def test_round_the_end_to_the_other_side(tmp_path):
     assert force(sim)[:2] == pytest.approx([0.03 * K, 0.0], rel=1e-9)
 
 
-# ---- joints -----------------------------------------------------------------------------------------------------------
+# ---- joints ------------------------------------------------------------------------------------------------------
 
 
 JOINED = {
@@ -174,12 +173,12 @@ def test_a_step_between_two_pieces_has_a_corner(tmp_path):
     assert force(sim)[:2] == pytest.approx(end + [0.0, 0.05 * K], rel=1e-9)
 
 
-# ---- sides ------------------------------------------------------------------------------------------------------------
+# ---- sides -------------------------------------------------------------------------------------------------------
 
 
 def test_deep_penetration_keeps_its_side(tmp_path):
-    """Pressed through a two-sided wall to four radii beyond it and back: the push stays on the side where contact began,
-    through many rebuilds of the lists."""
+    """Pressed through a two-sided wall to four radii beyond it and back: the push stays on the side where contact
+    began, through many rebuilds of the lists."""
     sim = held(tmp_path, 0.0, 0.95, ((-5.0, 0.0), (5.0, 0.0)))
     before = sim.rebuilds
     for y in (0.5, 0.0, -0.5, -1.0, -2.0, -4.0, -1.5, 0.3, 0.99):
@@ -197,7 +196,8 @@ def test_deep_penetration_keeps_its_side(tmp_path):
 
 
 def test_a_one_sided_wall_expels_to_its_left(tmp_path):
-    """SET wallside left: contact if -R < h < R, the push always to the left of P1 -> P2; beyond R on the right nothing."""
+    """SET wallside left: contact if -R < h < R, the push always to the left of P1 -> P2; beyond R on the right
+    nothing."""
     for y, push in ((0.9, 0.1), (0.2, 0.8), (-0.4, 1.4), (-0.99, 1.99), (-1.01, 0.0), (1.01, 0.0)):
         sim = held(tmp_path, 0.0, y, ((-5.0, 0.0), (5.0, 0.0)), wallside="left")
         assert force(sim)[:2] == pytest.approx([0.0, push * K], rel=1e-9, abs=1e-6)
@@ -211,7 +211,7 @@ def test_wallside_belongs_to_walls_made_after_it(tmp_path):
     assert force(sim)[1] == pytest.approx(-0.1 * K, rel=1e-9)
 
 
-# ---- moving, replaced, soft walls ---------------------------------------------------------------------------------------
+# ---- moving, replaced, soft walls --------------------------------------------------------------------------------
 
 
 def test_a_moving_wall_drags_and_pushes(tmp_path):
@@ -292,7 +292,7 @@ def test_walls_that_make_no_sense(tmp_path, given, message):
         walls.wall(model(tmp_path), **given)
 
 
-# ---- the BOX ----------------------------------------------------------------------------------------------------------
+# ---- the BOX -----------------------------------------------------------------------------------------------------
 
 
 def boxed(folder, kn: float = 2.0 * K):

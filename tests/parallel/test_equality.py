@@ -1,17 +1,18 @@
 """The same bits on any number of ranks and threads, with moving borders and without, and across a restart.
 
-The model does everything that could spoil the order: particles fall, bonds break, the wall pushes them across borders, some
-are eroded away, others rain down in mid-run, and a few leave the BOX.
+The model does everything that could spoil the order: particles fall, bonds break, the wall pushes them across borders,
+some are eroded away, others rain down in mid-run.
 """
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import Launcher
-from tests.short_push import assert_same_end, contents
+from tests.short_push import contents
 
 BUSY = """\
 START
@@ -84,7 +85,7 @@ def assert_same_files(one: Path, other: Path) -> None:
 
 
 def test_the_model_is_busy(reference: Path) -> None:
-    """The run is worth comparing: bonds broke both ways, particles came, went and left the BOX."""
+    """The run is worth comparing: bonds broke both ways, particles came and went."""
     last = sorted((reference / "data").glob("*.sav"))[-1]
     state = contents(last)
     text = str(state["@state"])
@@ -103,22 +104,20 @@ def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_pat
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2, 3])
-@pytest.mark.parametrize("checkpoint", ["first", "middle", "last"])
+@pytest.mark.parametrize(("checkpoint", "ranks"), [("first", 2), ("middle", 1), ("middle", 3), ("last", 2)])
 def test_resumed_run_equals_the_uninterrupted_one(
     reference: Path, launch: Launcher, tmp_path: Path, ranks: int, checkpoint: str
 ) -> None:
-    """Take a checkpoint of the one-rank run, forget what came after it, and go on with another number of ranks."""
+    """A run that was killed some time after a checkpoint, and goes on from there with another number of ranks: every
+    file, time series too, is as if nothing had happened."""
     saves = sorted((reference / "data").glob("*.sav"))
-    start = {"first": saves[0], "middle": saves[len(saves) // 2], "last": saves[-2]}[checkpoint]
+    start = {"first": 0, "middle": len(saves) // 2, "last": len(saves) - 2}[checkpoint]
     folder = tmp_path / "resumed"
-    (folder / "data").mkdir(parents=True)
-    (folder / "data" / start.name).write_bytes(start.read_bytes())
+    shutil.copytree(reference, folder)
+    for path in saves[start + 1 :]:
+        (folder / "data" / path.name).unlink()
     busy(launch, folder, ranks, resume=True)
-    assert_same_end(reference, folder, patterns=("*.vtkhdf",))
-    last = saves[-1].name
-    a, b = contents(reference / "data" / last), contents(folder / "data" / last)
-    assert not [k for k in a if a[k].tobytes() != b[k].tobytes()]
+    assert_same_files(reference, folder)
 
 
 @pytest.mark.mpi

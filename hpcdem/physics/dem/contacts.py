@@ -26,7 +26,7 @@ LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 
 @njit(cache=True)
 def _direction(dx, dy, d):
-    """Unit vector from the earlier to the later partner; +x for two centres in one place (rows that start at one corner)."""
+    """Unit vector from the earlier to the later partner; +x if both centres are in one place (rows from one corner)."""
     if d == 0.0:
         return 1.0, 0.0
     return dx / d, dy / d
@@ -202,7 +202,8 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
 
 @njit(cache=True, nogil=True)
 def stiffness(t, hot, ihot, blocks, ptr, partner, pairs, n_mat, n_left, out):
-    """Add the tangent normal stiffness of every touching pair of block t to its owned particles, out (n_own,) f8 [N/m]."""
+    """Add the tangent normal stiffness of every touching pair of block t to its owned particles, out (n_own,) f8
+    [N/m]."""
     cut, lo, _, poff, _ = blocks
     a, b = cut[t], cut[t + 1]
     p = poff[t] - lo[t]

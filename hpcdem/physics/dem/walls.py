@@ -72,8 +72,8 @@ def _geometry(wall, x, y, r, side):
 
 @njit(cache=True)
 def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
-    """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that passes
-    through this point, or by an end there that comes earlier."""
+    """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that
+    passes through this point, or by an end there that comes earlier."""
     for q in range(first, last):
         if q == k:
             continue

@@ -5,8 +5,9 @@ With the pair stiffnesses kn, ks of the linear law (two equal springs in series,
     Fn = kn U for either sign of U, breaks if -Fn > N: at the gap N / kn nothing is left
     Fs = ks x way, no slip while bonded; breaks if |Fs| > S; then mu Fn is left if Fn > 0, else nothing
 
-Between Hertz particles the springs of the open bond are the tangents at the overlap U0 at which it was made, 3/2 K sqrt(U0) and
-that of Mindlin; U0 is not taken below Rt / 1000, so that a bond of just touching particles has a stiffness.
+Between Hertz particles the springs of the open bond are the tangents at the overlap U0 at which it was made, 3/2 K
+sqrt(U0) and that of Mindlin; U0 is not taken below Rt / 1000, so that a bond of just touching particles has a
+stiffness.
 """
 
 from __future__ import annotations
@@ -67,7 +68,8 @@ def test_v21_shear(tmp_path, u, sense):
     assert sim.broken() == (0, 1)
     left = contact(sim)
     if u > 0.0:
-        assert left.fn == pytest.approx(0.5 * KN * u, rel=1e-9) and sense * left.fs == pytest.approx(MU * left.fn, rel=1e-9)
+        assert left.fn == pytest.approx(0.5 * KN * u, rel=1e-9)
+        assert sense * left.fs == pytest.approx(MU * left.fn, rel=1e-9)
     else:
         assert left is None or (left.fn == pytest.approx(0.0, abs=1e-6) and left.fs == pytest.approx(0.0, abs=1e-6))
 

@@ -8,8 +8,8 @@ Bond of cross-section A = pi Rt^2 (between disks: 2 Rt x 1 m), Rt = 2 Ra Rb / (R
     breaks in tension if -Fn > T A, that is at the gap T L / E: nothing is left
     breaks in shear if |Fs| > C A + mu max(Fn, 0): min(|Fs|, mu max(Fn, 0)) is left
 
-Numbers for R = 60 m, E = 200 MPa, T = 20 MPa, C = 40 MPa: A = 11309.7 m^2, E A / L = 1.88496e10 N/m, T A = 2.26195e11 N,
-gap 12 m; C A = 4.52389e11 N.
+Numbers for R = 60 m, E = 200 MPa, T = 20 MPa, C = 40 MPa: A = 11309.7 m^2, E A / L = 1.88496e10 N/m, T A =
+2.26195e11 N, gap 12 m; C A = 4.52389e11 N.
 """
 
 from __future__ import annotations

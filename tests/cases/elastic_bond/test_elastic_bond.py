@@ -60,7 +60,8 @@ def test_a_broken_bond_does_not_heal(tmp_path):
 
 
 def test_a_long_bond_is_not_lost_by_the_search(tmp_path):
-    """Stretched to 270 m between centres, more than twice what touching spheres have; bystanders fill the plane between."""
+    """Stretched to 270 m between centres, more than twice what touching spheres have; bystanders fill the plane
+    between."""
     sim = bonded(tmp_path, tstrength=1e9)
     for gid, (x, y) in enumerate([(60.0, 250.0), (-150.0, 0.0), (420.0, 10.0), (150.0, -200.0)], start=2):
         particles.ball(sim, gid, x, y, exact.RADIUS)
@@ -117,7 +118,8 @@ def test_v20_shear_of_a_pressed_pair(tmp_path, u, sense):
     assert sim.broken() == (0, 1) and sim.bonds_left() == 0
     left = pair(sim)
     assert left.fn == pytest.approx(fn, rel=1e-10)
-    assert sense * left.fs == pytest.approx(0.3 * fn, rel=0.005) and abs(left.fs) == pytest.approx(exact.MU * fn, rel=1e-12)
+    assert sense * left.fs == pytest.approx(0.3 * fn, rel=0.005)
+    assert abs(left.fs) == pytest.approx(exact.MU * fn, rel=1e-12)
     shear(sim, way * 0.1)
     assert pair(sim).fs == left.fs, "it slides"
 

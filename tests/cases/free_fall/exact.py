@@ -6,8 +6,8 @@ From rest the first step sees v = 0, hence a = -g (1 + alpha); from then on v < 
     v(n) = -g dt [ (1 + alpha) + (n - 1) (1 - alpha) ]
     y(n) = y0 + dt sum v = y0 - g dt^2 [ (1 + alpha) n + (1 - alpha) n (n - 1) / 2 ]
 
-With alpha = 0 this is y0 - g dt^2 n (n + 1) / 2: below the law y0 - g t^2 / 2 by g dt t / 2, because velocity stands at half
-steps and the start is taken as one. Mass does not enter.
+With alpha = 0 this is y0 - g dt^2 n (n + 1) / 2: below the law y0 - g t^2 / 2 by g dt t / 2, because velocity
+stands at half steps and the start is taken as one. Mass does not enter.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """V18: two free balls collide with friction; momentum and angular momentum stay what they were.
 
-Forces come in equal and opposite pairs, so sum(m v) cannot change. Both act at one point on the line of centres, l_a and l_b
-from them with l_a + l_b = d: the torques Fs l_a + Fs l_b and the moment of the pair of forces, -Fs d, cancel. For the
-leap-frog the angular momentum sum(m x(n) x v(n - 1/2) + I w(n - 1/2)) is the one that is kept: going on by a step adds
-dt (m x(n) x a + I w') + m dt v x v = 0.
+Forces come in equal and opposite pairs, so sum(m v) cannot change. Both act at one point on the line of centres,
+l_a and l_b from them with l_a + l_b = d: the torques Fs l_a + Fs l_b and the moment of the pair of forces, -Fs d,
+cancel. For the leap-frog the angular momentum sum(m x(n) x v(n - 1/2) + I w(n - 1/2)) is the one that is kept:
+going on by a step adds dt (m x(n) x a + I w') + m dt v x v = 0.
 """
 
 from __future__ import annotations

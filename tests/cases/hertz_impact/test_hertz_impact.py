@@ -75,3 +75,16 @@ def test_the_scheme_is_of_second_order(tmp_path):
         a, b, c = u[k - 1 : k + 2]
         errors.append(abs(b - (a - c) ** 2 / (8.0 * (a - 2.0 * b + c)) - exact.WALL.overlap))
     assert np.log(errors[0] / errors[1]) / np.log(4.0) == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_thousand_collisions(tmp_path):
+    """A sphere to and fro between two walls, about 60 steps per collision: no drift of its speed."""
+    sim = model(tmp_path, dt=0.02, disk="off")
+    walls.wall(sim, 0, ((-200.0, 0.0), (200.0, 0.0)))
+    walls.wall(sim, 1, ((-200.0, 120.2), (200.0, 120.2)))
+    particles.ball(sim, 0, 0.0, exact.RADIUS, exact.RADIUS)
+    elastic(sim, yv=-exact.V)
+    v = watch(sim, 71000, lambda sim: float(sim.particles["vy"][0]))
+    assert np.count_nonzero(v[1:] * v[:-1] < 0.0) >= 1000, "each collision turns it round once"
+    free = np.abs(v[1:-1])[(v[1:-1] == v[:-2]) & (v[1:-1] == v[2:])]
+    assert free**2 == pytest.approx(exact.V**2, rel=0.01)

@@ -1,7 +1,7 @@
 """V3, V4: a ball runs into a fixed one, linear contact, with and without lattice-solid damping.
 
-After Li et al. 2018, tests 1 and 2. x is the way of the moving ball since it touched (negative: overlap), k = kn / 2 the two
-equal springs in series, eta the viscous damping of the moving ball, w^2 = k / m, b = eta / (2 m):
+After Li et al. 2018, tests 1 and 2. x is the way of the moving ball since it touched (negative: overlap), k = kn /
+2 the two equal springs in series, eta the viscous damping of the moving ball, w^2 = k / m, b = eta / (2 m):
 
     m x'' = -k x - eta x',  x(0) = 0, x'(0) = -v0
     x(t) = -(v0 / wd) exp(-b t) sin(wd t),   wd^2 = w^2 - b^2

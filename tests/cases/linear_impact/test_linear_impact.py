@@ -38,8 +38,8 @@ def test_v3_undamped(tmp_path):
 
 
 def test_v4_lattice_solid_damping(tmp_path):
-    """The figures are those of the continuous law; the program comes to 1 % of all of them at dt = 1e-4 (see the next test for
-    dt = 1e-3)."""
+    """The figures are those of the continuous law; the program comes to 1 % of all of them at dt = 1e-4 (see the
+    next test for dt = 1e-3)."""
     t, x, v = impact(tmp_path, 1e-4, ETA)
     expected = exact.Exact(ETA)
     ends = crossing(t, x)

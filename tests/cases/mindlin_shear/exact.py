@@ -6,8 +6,8 @@ Fn = 2 G sqrt(2 Rt) / (3 (1 - nu)) U^(3/2). With U constant it is a constant, so
     Fs = ks d                             up to mu Fn (Cundall & Strack 1979), then Fs = mu Fn
     and back: Fs = mu Fn - ks d'          down to -mu Fn, d' being the way back.
 
-Numbers: R = 60 m, G = 2.9 GPa, nu = 0.2, U = 1 m, mu = 0.3: Fn = 2.64733e10 N, ks = 0.8889 x 1.5 x 2.64733e10 = 3.52977e10 N/m;
-slip begins at d = 0.225 m = 0.3 / (0.8889 x 1.5) U, whatever G and R.
+Numbers: R = 60 m, G = 2.9 GPa, nu = 0.2, U = 1 m, mu = 0.3: Fn = 2.64733e10 N, ks = 0.8889 x 1.5 x 2.64733e10 =
+3.52977e10 N/m; slip begins at d = 0.225 m = 0.3 / (0.8889 x 1.5) U, whatever G and R.
 """
 
 from __future__ import annotations

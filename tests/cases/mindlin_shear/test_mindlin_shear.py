@@ -58,7 +58,8 @@ def test_v13_wall_under_a_sphere(tmp_path):
 
 @pytest.mark.parametrize("turning", [0, 1])
 def test_v13_turning_spheres(tmp_path, turning):
-    """One of two pressed spheres turns on the spot: the geometry stays exactly as it is. The surfaces meet U/2 inside."""
+    """One of two pressed spheres turns on the spot: the geometry stays exactly as it is. The surfaces meet U/2
+    inside."""
     sim = model(tmp_path, DT, disk="off")
     particles.ball(sim, 0, 0.0, 0.0, exact.RADIUS)
     particles.ball(sim, 1, 2.0 * exact.RADIUS - exact.OVERLAP, 0.0, exact.RADIUS)

@@ -5,8 +5,9 @@ moment and its impulse mu times the normal one (Whittaker; Maw, Barber & Fawcett
 
     change of vt = -mu (1 + e) vn,   change of spin = -(mu (1 + e) m vn) l / I,   l = R up to half the overlap
 
-The surface still slides at the end if vt exceeds mu (1 + e) vn (1 + m R^2 / I): 3.5 mu 2 vn for spheres, 3 mu 2 vn for disks.
-Numbers: R = 1, mu = 0.3, vn = 0.01, vt = 0.05 > 0.021. Contact time 200 steps; largest overlap vn / w = 6e-4 R.
+The surface still slides at the end if vt exceeds mu (1 + e) vn (1 + m R^2 / I): 3.5 mu 2 vn for spheres, 3 mu 2 vn
+for disks. Numbers: R = 1, mu = 0.3, vn = 0.01, vt = 0.05 > 0.021. Contact time 200 steps; largest overlap vn / w =
+6e-4 R.
 """
 
 from __future__ import annotations

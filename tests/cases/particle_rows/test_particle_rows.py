@@ -1,8 +1,9 @@
 """V23: rows of particles made by GLINE, and bonds between nearest neighbours only.
 
-Centres stand at P1 + k s e, s = 2 R c, k = 0 .. floor(|P2 - P1| / s + 1e-9), c = cratio. Pairs k apart have the distance k s and
-touch if k s <= 2 R, that is k c <= 1. A bond command with rext = c looks for k s <= 2 R c = s: k = 1 alone, N - 1 bonds; with
-rext = 1 it takes every k <= 1 / c, sum over k of (N - k): for c = 0.4 the first and second neighbours, 2 N - 3 bonds.
+Centres stand at P1 + k s e, s = 2 R c, k = 0 .. floor(|P2 - P1| / s + 1e-9), c = cratio. Pairs k apart have the
+distance k s and touch if k s <= 2 R, that is k c <= 1. A bond command with rext = c looks for k s <= 2 R c = s: k =
+1 alone, N - 1 bonds; with rext = 1 it takes every k <= 1 / c, sum over k of (N - k): for c = 0.4 the first and
+second neighbours, 2 N - 3 bonds.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def test_v23_only_nearest_neighbours_are_bonded(tmp_path, angle, rext, neighbour
     _, ids = observe.contact_rows(sim)
     bonded = ids[ids[:, 2] > 0]
     assert set(map(tuple, bonded[:, :2])) == {(i, i + k) for k in range(1, neighbours + 1) for i in range(n - k)}
-    # Overlapping neighbours push with the full radii whether they are bonded or not: first (k = 1) and second (k = 2) ones.
+    # Overlapping neighbours (k = 1 and 2) push with the full radii whether they are bonded or not.
     k_hertz = 2.0 * 2.9e9 * math.sqrt(160.0) / (3.0 * 0.8)
     end = k_hertz * ((160.0 - 64.0) ** 1.5 + (160.0 - 128.0) ** 1.5)
     assert force(sim, 0)[:2] == pytest.approx(-end * e, rel=1e-9, abs=1e-9 * end)

@@ -1,8 +1,8 @@
 """V5, V6: a ball pressed against a wall, pushed along it: it sticks, slips, stops and swings back.
 
-After Li et al. 2018, tests 3 and 4. The ball can only move along the wall (y); its overlap U stays as it is, so
-Fn = k U is constant, with k = kn / 2 for normal and shear alike (equal springs of ball and wall in series).
-w^2 = k / m, b = eta / (2 m), wd^2 = w^2 - b^2; friction carries at most mu Fn, reached at the stretch ys = mu Fn / k = mu U.
+After Li et al. 2018, tests 3 and 4. The ball can only move along the wall (y); its overlap U stays as it is, so Fn
+= k U is constant, with k = kn / 2 for normal and shear alike (equal springs of ball and wall in series). w^2 = k /
+m, b = eta / (2 m), wd^2 = w^2 - b^2; friction carries at most mu Fn, reached at the stretch ys = mu Fn / k = mu U.
 
     stick   m y'' = -k y - eta y':         y = (v0 / wd) exp(-b t) sin(wd t)        until y = ys, at t1 with speed v1
     slip    m y'' = -mu Fn - eta y':       v = v1 - a s                              (eta = 0; a = mu Fn / m = w^2 ys)

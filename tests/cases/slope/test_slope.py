@@ -16,7 +16,8 @@ DT, W = 1e-3, 200.0
 
 
 def on_slope(folder, angle: float, mu: float, disk: str, damp: float = 0.0, fix: tuple[str, ...] = ()):
-    """A ball laid on a wall that falls to the right, pressed in so far that it carries the ball; returns also "down"."""
+    """A ball laid on a wall that falls to the right, pressed in so far that it carries the ball; returns also
+    "down"."""
     down, out = np.array([math.cos(angle), -math.sin(angle)]), np.array([math.sin(angle), math.cos(angle)])
     sim = model(folder, DT, disk=disk, gravity=(0.0, -exact.GRAVITY))
     walls.wall(sim, 0, (tuple(-5.0 * down), tuple(50.0 * down)), fric=mu)
@@ -73,7 +74,8 @@ def test_v16_rolling(tmp_path, disk, ratio, limit, share):
     acceleration(sim, down, 300)
     assert acceleration(sim, down, 1500) == pytest.approx(exact.rolling(angle, ratio), rel=0.005)
     arm = exact.RADIUS - 0.5 * at_wall(sim).overlap
-    assert velocity(sim) @ down == pytest.approx(-value(sim, "spin") * arm, rel=0.005), "it rolls clockwise, without slip"
+    rolled = -value(sim, "spin") * arm
+    assert velocity(sim) @ down == pytest.approx(rolled, rel=0.005), "it rolls clockwise, without slip"
 
 
 def test_too_steep_to_roll(tmp_path):

@@ -1,8 +1,9 @@
 """V24: runs along the way of a wall: numbers of steps, files and their names, and a ball in free flight meanwhile.
 
-A wall of speed 2 m/s with dt = 0.05 s goes 0.1 m per step: 3000 m are 30 000 steps, output every 1000 m is every 10 000 steps,
-counted from the start of IMPLE. Free flight: x = x0 + v n dt. Files (ZDEM manual 6.3.2): the step in ten digits; `_ini` at the
-start of each CYC and IMPLE; one at the end of IMPLE; CYC writes at steps that are multiples of the interval, counted from 0.
+A wall of speed 2 m/s with dt = 0.05 s goes 0.1 m per step: 3000 m are 30 000 steps, output every 1000 m is every 10
+000 steps, counted from the start of IMPLE. Free flight: x = x0 + v n dt. Files (ZDEM manual 6.3.2): the step in ten
+digits; `_ini` at the start of each CYC and IMPLE; one at the end of IMPLE; CYC writes at steps that are multiples
+of the interval, counted from 0.
 """
 
 from __future__ import annotations
