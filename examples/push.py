@@ -4,7 +4,7 @@
 #           6 km in front of it, with beds folded over both ramps
 # model     20 km long, 2.4 km thick, about 5600 spheres of radius 45 and 60 m
 # run       ./scripts/run examples/push.py       (under a minute on two cores)
-# results   examples/data: a frame per kilometre of shortening, walls.csv (the
+# results   examples/data: a frame every 1.5 km of shortening, walls.csv (the
 #           force on the wall), checkpoints, a figure of the last frame
 # -----------------------------------------------------------------------------
 START
@@ -51,5 +51,5 @@ PROP color gb     range y 2100.0 9999.0
 WALL id 0 fric 0.1
 WALL id 1 fric 0.1 xv 2.0
 WALL id 2 fric 0.1
-IMPLE wall id 1 xmove 6000.0 print 1000.0 save 3000.0
+IMPLE wall id 1 xmove 6000.0 print 1500.0 save 3000.0
 STOP

@@ -95,7 +95,8 @@ def go_on(sim: Simulation, script: Script, log: Log) -> bool:
     from hpcdem import saving
     from hpcdem.lang.zdem import execute
 
-    for path in checkpoints(sim.comm, sim.outdir):
+    named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
+    for path in checkpoints(sim.comm, [sim.outdir, *named.values()]):
         try:
             found = saving.restore(sim, path)
         except CommandError as error:
@@ -103,10 +104,13 @@ def go_on(sim: Simulation, script: Script, log: Log) -> bool:
             continue
         log.info(f"going on from {path}, step {sim.clock.step}")
         sim.progress = found["progress"]
+        for index, folder in named.items():
+            if index <= found["position"]:
+                sim.outdir = folder
         log.script_started(script.file, *planned_steps(script, found["position"], sim))
         execute.Interpreter(script).run(sim, resume=found["position"], saved_script=found["script"])
         return True
-    log.info(f"no checkpoint in {sim.outdir}: starting at the beginning")
+    log.info(f"no checkpoint in {' or '.join(map(str, [sim.outdir, *named.values()]))}: starting at the beginning")
     return False
 
 
@@ -122,9 +126,13 @@ def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, 
     return sum(run.steps or 0 for run in runs), before + inside
 
 
-def checkpoints(comm: SerialComm, folder: Path) -> list[Path]:
-    """Collective: the .sav files of a folder, the one written last first."""
-    found = sorted(folder.glob("*.sav"), key=lambda p: p.stat().st_mtime_ns, reverse=True) if comm.rank == 0 else []
+def checkpoints(comm: SerialComm, folders: list[Path]) -> list[Path]:
+    """Collective: the .sav files of some folders, the one written last first."""
+    found = []
+    if comm.rank == 0:
+        found = sorted(
+            {path for folder in folders for path in folder.glob("*.sav")}, key=lambda p: -p.stat().st_mtime_ns
+        )
     return comm.bcast(found)
 
 

@@ -82,7 +82,8 @@ def critical_dt(sim: Simulation) -> float:
     stiffness = np.zeros(len(p))
     for t in range(lists.n_blocks):
         contacts.stiffness(
-            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, sim.pair_laws, len(sim.materials), p.n_left, stiffness
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, sim.pair_laws, len(sim.materials), p.n_left,
+            stiffness,
         )  # fmt: skip
     wout, wiout = wall_rows(sim)
     order = np.argsort(p["gid"])

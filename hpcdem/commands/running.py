@@ -168,7 +168,7 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
 
 
 def _warn_about_the_time_step(sim: Simulation) -> None:
-    """Once: dt beyond the estimate of the critical step, or lattice-solid damping that reverses a velocity in one step."""
+    """Once: dt beyond the estimate of the critical step, or lattice-solid damping that reverses a velocity in a step."""
     critical, dt = observe.critical_dt(sim), sim.clock.dt
     free = sim.particles["fix"] != 7
     light = np.array([sim.body[free, 0].min() if free.any() else math.inf])
@@ -178,8 +178,8 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     if dt > critical:
         sim.log.warn_once(
             "critical time step",
-            f"the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = {critical:.4g} s; "
-            "results may be noisy, and a run that blows up should be repeated with a smaller one",
+            f"the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
+            f"{critical:.4g} s; results may be noisy, and a run that blows up should be repeated with a smaller one",
         )
     if damping > 1.0:
         sim.log.warn_once("damping", f"SET damp lsm: eta dt / m is {damping:.3g} for the lightest particle, above 1")

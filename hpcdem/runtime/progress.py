@@ -7,6 +7,7 @@ another rank knows has to be brought to rank 0 first.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -114,8 +115,13 @@ class Log:
         if self._bar is not None:
             self._bar.print(text)
         else:
-            self._stream.write(f"{text}\n")  # in one piece: launchers pass on pieces
-            self._stream.flush()
+            try:
+                self._stream.write(f"{text}\n")  # in one piece: launchers pass on pieces
+                self._stream.flush()
+            except OSError:  # a closed pipe, a lost terminal, a full disk under the log: the run matters more
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, self._stream.fileno())
+                os.close(nowhere)
 
     # -- progress --------------------------------------------------------------------------------------------
 

@@ -7,6 +7,9 @@
 | second SIGINT | stop at once, nothing is saved |
 | time limit or end of the Slurm job | save and stop, early enough for the save to finish |
 
+srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1, and SIGTERM and SIGINT
+with MPICH, SIGUSR2 with Open MPI (as tried with MPICH 5.0 and Open MPI 5.0).
+
 A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
 seen it. The step loop puts `local_request()` into a maximum that it takes over the ranks anyway, and hands the
 result to `decide()`.

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from .conftest import LAST_FRAME, PILE
+from tests.conftest import is_open_mpi
+from tests.faults.conftest import LAST_FRAME, PILE
 
 SECONDS = 20.0
 """Longest time from an accident to the end of the job."""
@@ -154,7 +155,8 @@ def test_a_signal_to_the_launcher_reaches_the_ranks(launch, script, undisturbed,
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), 120, "the first checkpoint")
-    job.send_signal(signal.SIGTERM)
+    # Open MPI's mpiexec answers SIGTERM by killing the ranks, MPICH's dies of SIGUSR2; each passes on the other.
+    job.send_signal(signal.SIGUSR2 if is_open_mpi() else signal.SIGTERM)
     code, _, err = end_of(job)
     assert code == 85, err
     finish(launch, 2, script, undisturbed)
@@ -222,3 +224,13 @@ def test_resume_without_a_checkpoint_begins_at_the_beginning(launch, script, und
     done = launch(1, script, "--resume", "--no-figure", cwd=script.parent)
     assert done.returncode == 0 and "starting at the beginning" in done.stdout
     assert (script.parent / "data" / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_resume_finds_the_folder_that_the_script_names(launch, script, undisturbed):
+    script.write_text(PILE.replace("SET dt", "SET outdir results\nSET dt"))
+    done = launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent)
+    assert done.returncode == 85
+    done = launch(1, script, "--resume", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0 and "going on from" in done.stdout
+    assert (script.parent / "results" / LAST_FRAME).read_bytes() == undisturbed
+    assert not (script.parent / "data").exists()

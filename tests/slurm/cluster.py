@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from getpass import getuser
 from pathlib import Path
 
+from tests.conftest import mpi_environment
+
 PROGRAMS = ("munged", "slurmctld", "slurmd", "srun", "sbatch", "scontrol", "scancel", "sinfo", "squeue")
 CPUS = 4
 """CPUs the node claims to have, whatever the machine has: the tests are about ranks, not about speed."""
@@ -171,7 +173,8 @@ class Cluster:
 
     def env(self, **more: str) -> dict[str, str]:
         """The environment in which Slurm's commands find this cluster and none other."""
-        env = {name: value for name, value in os.environ.items() if not name.startswith(("SLURM_", "SBATCH_", "SRUN_"))}
+        ours = mpi_environment().items()
+        env = {name: value for name, value in ours if not name.startswith(("SLURM_", "SBATCH_", "SRUN_"))}
         return env | {"SLURM_CONF": str(self.folder / "slurm.conf")} | more
 
     def _ask(self, name: str, *args: str) -> str:
@@ -221,6 +224,10 @@ class Cluster:
         """Send a signal to all tasks of a job's steps (not to its batch script), as the queue itself would."""
         self._ask("scancel", f"--signal={name}", str(number))
 
-    def start_now(self, number: int) -> None:
-        """Slurm lets a requeued job rest for two minutes; the tests do not."""
+    def start_again(self, number: int) -> None:
+        """Slurm lets a requeued job rest for two minutes; the tests wait only until the node has forgotten it."""
+        deadline = time.monotonic() + 60
+        while self.job(number).state != "PENDING" and time.monotonic() < deadline:
+            time.sleep(0.2)
+        time.sleep(3)  # slurmd turns down what looks like the job it has just ended: it compares whole seconds
         self._ask("scontrol", "update", f"JobId={number}", "StartTime=now")

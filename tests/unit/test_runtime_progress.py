@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import subprocess
+import sys
 
 import pytest
 
@@ -205,3 +207,20 @@ def test_a_terminal_gets_a_bar_with_lines_above(clock):
     assert "warning: something [odd]" in text
     assert text.count("step 50 |") == 1
     assert "stage" in text
+
+
+def test_a_reader_that_goes_away_does_not_end_the_run():
+    """`hpcdem push.py | head`, a terminal that was closed, a full disk under the log file."""
+    code = (
+        "import sys\nfrom hpcdem.runtime.progress import Log\nlog = Log()\n"
+        "sys.stdin.read()\n"
+        "for _ in range(3): log.info('a line')\n"
+        "print('still here', file=sys.stderr)\n"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        process.stdout.close()
+        process.stdin.close()
+        err = process.stderr.read()
+        assert process.wait(60) == 0
+    assert err == "still here\n"
