@@ -78,7 +78,6 @@ class Simulation:
         self.comm = comm if comm is not None else SerialComm()
         self.threads = threads
         self.outdir = Path(outdir)
-        self.run_folder = self.outdir.parent
         self.folder_made = False
         self.log, self.stop = log, stop
         self.balance_on = balance_on

@@ -54,6 +54,7 @@ def mpi_environment() -> dict[str, str]:
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         env.setdefault("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        env.setdefault("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe")  # the same for Open MPI 5
         env.setdefault("OMPI_MCA_hwloc_base_binding_policy", "none")
         # More ranks than cores: a waiting rank must let go of its core.
         env.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")

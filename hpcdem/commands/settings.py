@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from hpcdem.errors import CommandError
@@ -44,7 +45,7 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
             raise CommandError(f"SET seed must not be negative, got {value}")
         s.seed = int(value)
     elif name == "outdir":
-        sim.outdir, sim.folder_made = sim.run_folder / str(value), False
+        sim.outdir, sim.folder_made = Path(value), False
     else:
         raise CommandError(f"SET knows no option {name}")
     sim.tables_changed()
