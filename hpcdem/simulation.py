@@ -15,13 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem import guards
 from hpcdem.clock import Clock
-from hpcdem.decomp import balance, strips
-from hpcdem.errors import CommandError, PhysicsError, UsageError
-from hpcdem.fields import FX, RADIUS, TORQUE, X, Y
+from hpcdem.decomp import strips
+from hpcdem.errors import CommandError, PhysicsError
+from hpcdem.fields import FX, TORQUE, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
+from hpcdem.halo.ownership import Ownership
 from hpcdem.model.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.model.particles import Particles
 from hpcdem.model.settings import Settings
@@ -37,8 +39,6 @@ SHORT_LIVED, LONG_LIVED = 60, 200
 """Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
 LONGEST_WATCH = 64
 """Most steps between two looks at how far particles have moved."""
-LARGEST_STRIDE = 0.5
-"""A particle that moves more than this fraction of its radius in one step stops the run."""
 
 
 @dataclass
@@ -111,13 +111,10 @@ class Simulation:
         self.lattice = Lattice()
         self._hist: Histories | None = Histories.empty(0)
         self._lists: neighbours.ContactLists | None = None
-        self.borders = np.zeros(0, np.int64)
+        self.ownership = Ownership(self.comm, self.balance_on)
         self.origin = np.empty((0, 2))
         self.rebuilds = 0
-        self._wants_balance = True
-        self._busy_mark, self._balance_step = 0.0, 0
         self._longest2 = 0.0
-        self._border_side = 1.0
         self._tables_stale = True
 
     def release(self) -> None:
@@ -172,8 +169,10 @@ class Simulation:
         motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, found)
         found[4] = self.stop.local_request() if self.stop is not None else 0
         self.comm.max_into(found)
-        if found[motion.BROKEN] or found[motion.STRIDE] > LARGEST_STRIDE:
-            self._stop_on_runaway(bool(found[motion.BROKEN]))
+        if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
+            mixed_laws = bool(np.isnan(self.pair_laws[:, contacts.MODEL]).any())
+            broken = bool(found[motion.BROKEN])
+            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed_laws, self.comm)
         wall_speed = float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), wall_speed) * dt
@@ -273,7 +272,7 @@ class Simulation:
             hot, cold = p.hot[order], p.cold[order]
             hist = self.hist.take(order)
         with self.timers("halo"):
-            storage, self.halo = connect(self.comm, hot, cx[order], self.borders)
+            storage, self.halo = connect(self.comm, hot, cx[order], self.ownership.borders)
         with self.timers("neighbour"):
             p.place(storage, cold, self.halo.n_left)
             cx, cy = strips.cells(storage[:, X], storage[:, Y], lattice.side)
@@ -326,18 +325,13 @@ class Simulation:
         box = self.walls.box()
         if box is None:
             return
-        left, right, bottom, top = box
-        x, y = self.particles["x"], self.particles["y"]
-        inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
-        if not self.comm.any(not inside.all()):
+        gone = guards.outside(self.particles, box)
+        if not self.comm.any(bool(gone.any())):
             return
-        p = self.particles
-        gone = [(int(g), float(a), float(b)) for g, a, b in zip(p["gid"][~inside], x[~inside], y[~inside], strict=True)]
-        everyone = sorted(row for part in self.comm.allgather(gone) for row in part)
-        self.remove(~inside)
+        names = guards.places(self.particles, gone, self.comm)
+        number = self.remove(gone)
         if self.log is not None:
-            some = "; ".join(f"{g} at ({a:g}, {b:g})" for g, a, b in everyone[:10])
-            self.log.info(f"step {self.clock.step}: {len(everyone)} particles left the BOX and were deleted: {some}")
+            self.log.info(f"step {self.clock.step}: {number} particles left the BOX and were deleted: {names}")
 
     def remove(self, which: np.ndarray) -> int:
         """Delete the flagged owned particles (n_own,) bool and all memory of them. The model must be open. Collective.
@@ -350,7 +344,7 @@ class Simulation:
         self.hist = self.hist.take(np.flatnonzero(~which))
         self.hist = self.hist.keep(~np.isin(self.hist.partner, gone))
         self.particles.keep(~which)
-        self._wants_balance = True
+        self.ownership.wanted = True
         return len(gone)
 
     def _share_out(self) -> None:
@@ -358,60 +352,15 @@ class Simulation:
         p, side = self.particles, self.lattice.side
         cx, _ = strips.cells(p["x"], p["y"], side)
         with self.timers("balance"):
-            self._move_borders(cx)
+            box = self.walls.box()
+            room = None if box is None else (box[0], box[1])
+            self.ownership.renew(cx, side, self.clock.step, self.timers.seconds(), room)
         with self.timers("migrate"):
-            migration = Migration(self.comm, strips.owner_of(cx, self.borders))
+            migration = Migration(self.comm, self.ownership.owner_of(cx))
             if migration.nobody:
                 return
             self.hist = Histories.from_rows(*migration.move_ragged(self.hist.counts(), self.hist.rows()))
             p.set_owned(migration.move(p.hot[p.owned]), migration.move(p.cold))
-
-    def _move_borders(self, cx: np.ndarray) -> None:
-        """Choose strip borders. Wall-clock timings enter here and only here: borders never change a result."""
-        comm, side, now = self.comm, self.lattice.side, self.clock.step
-        if comm.size == 1:
-            self.borders, self._border_side = np.array([0, 1]), side
-            return
-        if not len(self.borders):
-            self._wants_balance = True
-        elif self._border_side != side:
-            self.borders = strips.separate(np.rint(self.borders * (self._border_side / side)).astype(np.int64))
-        self._border_side = side
-        weight = 1.0
-        if not self._wants_balance:
-            if not self.balance_on or now - self._balance_step < balance.PATIENCE:
-                return
-            busy = self.timers.seconds() - self._busy_mark
-            measured = np.array(comm.allgather((busy, len(cx))))
-            self._busy_mark, self._balance_step = self.timers.seconds(), now
-            if balance.imbalance(measured[:, 0]) < balance.TOLERANCE:
-                return
-            weight = float(balance.cost_per_particle(measured[:, 0], measured[:, 1])[comm.rank])
-        ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
-        comm.max_into(ends)
-        first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
-        if columns < 1:
-            first, columns = 0, 1
-        self._refuse_too_many_ranks(first, columns)
-        cost = np.zeros(min(columns, 1 << 24))
-        np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)
-        comm.sum_into(cost)
-        self.borders = strips.cut(comm.bcast(cost), first, comm.size)
-        self._wants_balance = False
-        self._busy_mark, self._balance_step = self.timers.seconds(), now
-
-    def _refuse_too_many_ranks(self, first: int, columns: int) -> None:
-        """A rank without a column of its own in the whole model is a mistake of the launch."""
-        if self.rebuilds:
-            return
-        box, side = self.walls.box(), self.lattice.side
-        if box is not None:
-            columns = max(columns, math.ceil(box[1] / side) - math.floor(box[0] / side))
-        if columns < self.comm.size:
-            raise UsageError(
-                f"{self.comm.size} ranks are too many for this model: it is {columns} columns of {side:g} m wide "
-                f"(largest contact or bond plus skin), so at most {columns} ranks fit; start it with fewer"
-            )
 
     def broken(self) -> tuple[int, int]:
         """Bonds broken so far in tension and in shear. Collective."""
@@ -499,27 +448,3 @@ class Simulation:
         if name not in self.groups:
             self.groups.append(name)
         return self.groups.index(name)
-
-    def _stop_on_runaway(self, broken: bool) -> None:
-        """Name the particles that cannot be right, and stop on all ranks."""
-        p, dt = self.particles, self.clock.dt
-        hot = p.hot[p.owned]
-        speed = np.hypot(p["vx"], p["vy"])
-        with np.errstate(invalid="ignore"):
-            bad = ~np.isfinite(hot[:, :5]).all(axis=1) | ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
-        mine = []
-        for c in np.flatnonzero(bad)[:10]:
-            known = np.isfinite(hot[c, :2]).all()  # else tell where it was when the lists were built
-            x, y = hot[c, :2] if known else self.origin[c]
-            mine.append((int(p["gid"][c]), float(x), float(y), float(p["vx"][c]), float(p["vy"][c]), self.comm.rank))
-        rows = sorted(row for part in self.comm.allgather(mine) for row in part)[:10]
-        total = self.count(int(bad.sum()))
-        what = "a number is not finite" if broken else "a particle moves over half its radius per step"
-        places = "\n".join(
-            f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}"
-            for g, x, y, vx, vy, rank in rows
-        )
-        guess = f"the time step {dt:g} s is probably too large, or particles were made overlapping"
-        if broken and np.isnan(self.pair_laws[:, contacts.MODEL]).any():
-            guess = "there are particles of the Hertz law and of the linear one, and a pair of both has no law"
-        raise PhysicsError(f"step {self.clock.step}: {what} ({total} particles); {guess}\n{places}")

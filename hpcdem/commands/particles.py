@@ -227,6 +227,6 @@ def _add(
             color=color, material=material, birth=sim.clock.step,
         )  # fmt: skip
         sim.hist = sim.hist.extended(count)
-    sim._wants_balance = True
+    sim.ownership.wanted = True
     sim.look_soon()
     return len(rows)

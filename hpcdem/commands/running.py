@@ -168,7 +168,7 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
 
 
 def _warn_about_the_time_step(sim: Simulation) -> None:
-    """Once: dt beyond the estimate of the critical step, or lattice-solid damping that reverses a velocity in a step."""
+    """Once: dt beyond the estimate of the critical step, or lattice-solid damping that reverses a velocity."""
     critical, dt = observe.critical_dt(sim), sim.clock.dt
     free = sim.particles["fix"] != 7
     light = np.array([sim.body[free, 0].min() if free.any() else math.inf])

@@ -124,10 +124,10 @@ def test_chain_of_jobs_equals_one_run(
 
 @pytest.mark.slow
 def test_the_end_of_the_job_is_seen_coming(submit: Callable[..., int], slurm: Cluster, tmp_path: Path) -> None:
-    """Slurm's limit of one minute stops the run with a checkpoint, without any signal being set up."""
+    """Slurm's limit of one minute stops the run with a checkpoint, without a signal that means anything."""
     folder = tmp_path / "job"
     script = write_push(folder, steps=100_000_000).name
-    number = submit("one_node.sh", folder, script, "--no-figure", options=("--time=1", "--signal=0@0"))
+    number = submit("one_node.sh", folder, script, "--no-figure", options=("--time=1", "--signal=URG@1"))
     job = slurm.wait(number)
     assert (job.state, job.exit_code) == ("FAILED", 85), log_of(folder, number)
     assert list((folder / "data").glob("*.sav"))

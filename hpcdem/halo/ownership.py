@@ -1,0 +1,91 @@
+"""Which rank owns which columns: the strip borders over the life of a model, and when they move.
+
+Borders decide who computes, never what. That is why wall-clock timings may enter here, and only here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hpcdem.decomp import balance, strips
+from hpcdem.errors import UsageError
+
+MOST_COLUMNS = 1 << 24
+
+
+class Ownership:
+    """Strip borders (ranks + 1,) i8 in columns of width `side` [m]; none before the first `renew`.
+
+    balance_on: borders follow the measured load; otherwise they move only when asked to (`wanted`).
+    """
+
+    def __init__(self, comm: Any, balance_on: bool) -> None:
+        self.comm, self.balance_on = comm, balance_on
+        self.borders = np.zeros(0, np.int64)
+        self.side = 1.0
+        self.wanted = True
+        """Particles came or went: cut anew at the next chance, whatever was measured."""
+        self._busy, self._step = 0.0, 0
+
+    def owner_of(self, cx: np.ndarray) -> np.ndarray:
+        """Rank that owns each column index."""
+        return strips.owner_of(cx, self.borders)
+
+    def renew(self, cx: np.ndarray, side: float, step: int, busy: float, room: tuple[float, float] | None) -> None:
+        """Choose borders for particles in columns cx (n,) i8 of this rank. Collective.
+
+        busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known.
+        UsageError at the first call when there are more ranks than columns.
+        """
+        first_time = not len(self.borders)
+        if self.comm.size == 1:
+            self.borders, self.side = np.array([0, 1]), side
+            return
+        if not first_time and self.side != side:
+            self.borders = strips.separate(np.rint(self.borders * (self.side / side)).astype(np.int64))
+        self.side = side
+        weight = 1.0
+        if not (self.wanted or first_time):
+            found = self._uneven(len(cx), step, busy)
+            if found is None:
+                return
+            weight = found
+        first, columns = self._span(cx)
+        if first_time:
+            self._refuse_too_many_ranks(columns, room)
+        cost = np.zeros(min(columns, MOST_COLUMNS))
+        np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)
+        self.comm.sum_into(cost)
+        self.borders = strips.cut(self.comm.bcast(cost), first, self.comm.size)
+        self.wanted = False
+        self._busy, self._step = busy, step
+
+    def _uneven(self, owned: int, step: int, busy: float) -> float | None:
+        """Relative cost of a particle of this rank if the load is uneven, else None. Collective when it is due."""
+        if not self.balance_on or step - self._step < balance.PATIENCE:
+            return None
+        measured = np.array(self.comm.allgather((busy - self._busy, owned)))
+        self._busy, self._step = busy, step
+        if balance.imbalance(measured[:, 0]) < balance.TOLERANCE:
+            return None
+        return float(balance.cost_per_particle(measured[:, 0], measured[:, 1])[self.comm.rank])
+
+    def _span(self, cx: np.ndarray) -> tuple[int, int]:
+        """First occupied column and number of columns to the last one, over all ranks."""
+        ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
+        self.comm.max_into(ends)
+        first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
+        return (first, columns) if columns > 0 else (0, 1)
+
+    def _refuse_too_many_ranks(self, columns: int, room: tuple[float, float] | None) -> None:
+        """A rank without a column of its own in the whole model is a mistake of the launch."""
+        if room is not None:
+            ends, _ = strips.cells(np.array(room), np.zeros(2), self.side)
+            columns = max(columns, int(ends[1] - ends[0]) + 1)
+        if columns < self.comm.size:
+            raise UsageError(
+                f"{self.comm.size} ranks are too many for this model: it is {columns} columns of {self.side:g} m wide "
+                f"(largest contact or bond plus skin), so at most {columns} ranks fit; start it with fewer"
+            )
