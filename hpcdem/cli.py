@@ -77,7 +77,7 @@ def run(comm: SerialComm, options: Options, log: Log) -> None:
         sim.release()
     log.stages(sim.timers, comm)
     if options.figure and comm.rank == 0:
-        draw_last_state(sim.outdir, log)
+        draw_last_state(sim, log)
 
 
 def rehearse(*threads: int) -> None:
@@ -160,14 +160,13 @@ def refuse_other_languages(kind: str, file: str) -> None:
     raise UsageError(f"{file}: this is {name}; this version runs ZDEM command scripts only, others come later")
 
 
-def draw_last_state(folder: Path, log: Log) -> None:
-    """The figure of the newest frame in the folder, if there is one. Serial."""
-    from hpcdem.io.frames import list_frames, read_frame
+def draw_last_state(sim: Simulation, log: Log) -> None:
+    """The figure of the newest frame of this run, if there is one. Serial."""
+    from hpcdem.io.frames import frame_name, read_frame
     from hpcdem.post import plots
 
-    frames = list_frames(folder) if folder.is_dir() else []
-    if frames:
-        last = frames[-1].path
+    if sim.last_frame is not None:
+        last = sim.outdir / frame_name(sim.last_frame[0], ".vtkhdf", sim.last_frame[1])
         log.info(f"figure: {plots.plot_frame(read_frame(last, ('particles',)), last.with_suffix('.jpg'))}")
 
 

@@ -160,7 +160,7 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
     prepare(sim)
     sim.progress = {
         "name": name, "first": sim.clock.step, "last": sim.clock.step + n, "origin": origin,
-        "intervals": intervals, "final_frame": final_frame, "position": sim.position,
+        "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
     }  # fmt: skip
     _warn_about_the_time_step(sim)
     output.Snapshot(sim, initial=True).write_print()
@@ -187,15 +187,17 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
 
 @dataclass
 class Task:
-    """Something to do at the steps origin + k * every, k > 0."""
+    """Something to do at the steps origin + k * every, k > 0, and at the step `also`."""
 
     every: int
     origin: int
     run: Callable[[output.Snapshot], object]
+    also: int = -1
 
     def next_after(self, step: int) -> int:
         """The first step after `step` at which it is due."""
-        return self.origin + ((step - self.origin) // self.every + 1) * self.every
+        regular = self.origin + ((step - self.origin) // self.every + 1) * self.every
+        return min(regular, self.also) if self.also > step else regular
 
 
 def _tasks(sim: Simulation) -> list[Task]:
@@ -207,7 +209,7 @@ def _tasks(sim: Simulation) -> list[Task]:
     for ident, (every, _) in sorted(sim.history_wishes.items()):
         tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
     bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
-    tasks.append(Task(bar, progress["first"], partial(output.report, sim)))
+    tasks.append(Task(bar, progress["first"], partial(output.report, sim), also=progress["last"]))
     shot = output.Snapshot
     for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
         if intervals[kind] > 0:
@@ -225,8 +227,7 @@ def _run(sim: Simulation) -> None:
     if sim.log is not None:
         sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step)
     tasks = _tasks(sim)
-    clock, began = sim.clock, sim.clock.step
-    counted = began
+    clock, counted = sim.clock, sim.clock.step
     try:
         while clock.step < last:
             event = min([last, *(task.next_after(clock.step) for task in tasks)])
@@ -252,8 +253,8 @@ def _run(sim: Simulation) -> None:
             sim.log.command_finished()
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
+    _warn_about_late_lists(sim, progress)
     sim.progress = None
-    _warn_about_late_lists(sim, first)
 
 
 def _answer(sim: Simulation, request: int) -> None:
@@ -270,10 +271,10 @@ def _answer(sim: Simulation, request: int) -> None:
         sim.log.info(f"step {sim.clock.step}: checkpoint {path} written on request")
 
 
-def _warn_about_late_lists(sim: Simulation, first: int) -> None:
-    if sim.lattice.late and sim.log is not None:
-        sim.log.warn_once(
-            "late lists",
-            f"between steps {first} and {sim.clock.step} particles outran the contact search {sim.lattice.late} times; "
-            "a contact may have begun a few steps late. A smaller time step avoids it",
+def _warn_about_late_lists(sim: Simulation, progress: dict) -> None:
+    late = sim.lattice.late - progress["late"]
+    if late and sim.log is not None:
+        sim.log.warn(
+            f"between steps {progress['first']} and {sim.clock.step} particles outran the contact search {late} times; "
+            "a contact may have begun a few steps late. A smaller time step avoids it"
         )

@@ -1,11 +1,18 @@
 """The communicator: one set of verbs for one rank and for many.
 
 `SerialComm` does nothing where nothing needs doing, so that no other module asks how many ranks there are.
-Only this file and `exchange.py` call MPI.
+
+MPI libraries wait by spinning, which is the fastest way while every rank has a core of its own. With more ranks than
+cores on a host, a spinning rank keeps the core from the one it waits for, and a step takes milliseconds instead of
+microseconds. There `MpiComm` asks and sleeps in turn; only calls that do not block make that possible, so all of its
+verbs are built on them.
 """
 
 from __future__ import annotations
 
+import os
+import pickle
+import time
 from typing import Any
 
 import numpy as np
@@ -69,6 +76,10 @@ class SerialComm:
         raise SystemExit(code)
 
 
+NAP = 2e-5
+"""Sleep between two questions on a crowded host [s]; the kernel adds some 50 us."""
+
+
 class MpiComm(SerialComm):
     """The same verbs over an mpi4py communicator."""
 
@@ -76,18 +87,45 @@ class MpiComm(SerialComm):
         self.mpi = mpi
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
+        self.crowded = _more_ranks_than_cores(mpi)
+
+    def wait(self, *requests: Any) -> None:
+        """Until all these requests are done."""
+        from mpi4py import MPI
+
+        if not self.crowded:
+            MPI.Request.Waitall(list(requests))
+            return
+        while not MPI.Request.Testall(list(requests)):
+            time.sleep(NAP)
 
     def barrier(self) -> None:
-        self.mpi.Barrier()
+        self.wait(self.mpi.Ibarrier())
 
     def bcast(self, obj: Any, root: int = 0) -> Any:
-        return self.mpi.bcast(obj, root=root)
+        payload = _pickled(obj) if self.rank == root else np.empty(0, np.uint8)
+        count = np.array([len(payload)], np.int64)
+        self.wait(self.mpi.Ibcast(count, root))
+        if self.rank != root:
+            payload = np.empty(int(count[0]), np.uint8)
+        self.wait(self.mpi.Ibcast(payload, root))
+        return obj if self.rank == root else pickle.loads(payload.data)
 
     def gather(self, obj: Any) -> list | None:
-        return self.mpi.gather(obj, root=0)
+        payload = _pickled(obj)
+        counts = np.empty(self.size, np.int64)
+        self.wait(self.mpi.Iallgather(np.array([len(payload)], np.int64), counts))
+        received = np.empty(int(counts.sum()) if self.rank == 0 else 0, np.uint8)
+        self.wait(self.mpi.Igatherv(payload, [received, (counts, _starts(counts))] if self.rank == 0 else None, 0))
+        return _unpickled(received, counts) if self.rank == 0 else None
 
     def allgather(self, obj: Any) -> list:
-        return self.mpi.allgather(obj)
+        payload = _pickled(obj)
+        counts = np.empty(self.size, np.int64)
+        self.wait(self.mpi.Iallgather(np.array([len(payload)], np.int64), counts))
+        received = np.empty(int(counts.sum()), np.uint8)
+        self.wait(self.mpi.Iallgatherv(payload, [received, (counts, _starts(counts))]))
+        return _unpickled(received, counts)
 
     def any(self, flag: bool) -> bool:
         return bool(self.max_into(np.array([1 if flag else 0], dtype=np.int64))[0])
@@ -95,7 +133,10 @@ class MpiComm(SerialComm):
     def _reduce_into(self, array: np.ndarray, op: Any) -> np.ndarray:
         from mpi4py import MPI
 
-        self.mpi.Allreduce(MPI.IN_PLACE, array, op=op)
+        if self.crowded:
+            self.wait(self.mpi.Iallreduce(MPI.IN_PLACE, array, op=op))
+        else:
+            self.mpi.Allreduce(MPI.IN_PLACE, array, op=op)
         return array
 
     def max_into(self, array: np.ndarray) -> np.ndarray:
@@ -114,7 +155,9 @@ class MpiComm(SerialComm):
         return self._reduce_into(array, MPI.SUM)
 
     def exscan(self, count: int) -> int:
-        return int(sum(self.mpi.allgather(int(count))[: self.rank]))
+        counts = np.empty(self.size, np.int64)
+        self.wait(self.mpi.Iallgather(np.array([count], np.int64), counts))
+        return int(counts[: self.rank].sum())
 
     def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
         from mpi4py import MPI
@@ -125,13 +168,12 @@ class MpiComm(SerialComm):
         width = dtype.itemsize * int(np.prod(tail, dtype=np.int64))
         out = np.array([len(p) for p in parts], dtype=np.int64)
         into = np.empty_like(out)
-        self.mpi.Alltoall(out, into)
+        self.wait(self.mpi.Ialltoall(out, into))
         recv = np.empty((int(into.sum()), *tail), dtype=dtype)
         # One MPI item is one row, so counts stay far from the 2**31 limit of MPI's int arguments.
         row = MPI.BYTE.Create_contiguous(width).Commit()
         try:
-            displs = [np.concatenate(([0], np.cumsum(c)[:-1])) for c in (out, into)]
-            self.mpi.Alltoallv([send, (out, displs[0]), row], [recv, (into, displs[1]), row])
+            self.wait(self.mpi.Ialltoallv([send, (out, _starts(out)), row], [recv, (into, _starts(into)), row]))
         finally:
             row.Free()
         return np.split(recv, np.cumsum(into)[:-1])
@@ -139,8 +181,31 @@ class MpiComm(SerialComm):
     def agree(self, error: str | None) -> None:
         if not self.any(error is not None):
             return
-        first = next(e for e in self.mpi.allgather(error) if e is not None)
-        raise HpcdemError(first)
+        raise HpcdemError(next(e for e in self.allgather(error) if e is not None))
 
     def abort(self, code: int) -> None:
         self.mpi.Abort(code)
+
+
+def _more_ranks_than_cores(mpi: Any) -> bool:
+    """Whether any host has more ranks than cores that they may use between them."""
+    from mpi4py import MPI
+
+    host = mpi.Split_type(MPI.COMM_TYPE_SHARED)
+    mine = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set(range(os.cpu_count() or 1))
+    cores = set().union(*host.allgather(mine))
+    crowded = host.Get_size() > len(cores)
+    host.Free()
+    return bool(mpi.allreduce(crowded, op=MPI.LOR))
+
+
+def _pickled(obj: Any) -> np.ndarray:
+    return np.frombuffer(pickle.dumps(obj, protocol=pickle.HIGHEST_PROTOCOL), dtype=np.uint8)
+
+
+def _unpickled(payload: np.ndarray, counts: np.ndarray) -> list:
+    return [pickle.loads(part.data) for part in np.split(payload, np.cumsum(counts)[:-1])]
+
+
+def _starts(counts: np.ndarray) -> np.ndarray:
+    return np.cumsum(counts) - counts

@@ -34,8 +34,7 @@ class Halo:
         self.right = comm.rank + 1 if comm.rank + 1 < comm.size else MPI.PROC_NULL
         counts = np.zeros(2, np.int64)
         out = np.array([first, last], np.int64)
-        comm.mpi.Sendrecv(out[0:1], self.left, TO_LEFT, counts[1:2], self.right, TO_LEFT)
-        comm.mpi.Sendrecv(out[1:2], self.right, TO_RIGHT, counts[0:1], self.left, TO_RIGHT)
+        self._swap(counts[0:1], out[0:1], out[1:2], counts[1:2])
         self.n_left, self.n_right = int(counts[0]), int(counts[1])
 
     def _pieces(self, rows: np.ndarray) -> tuple:
@@ -46,9 +45,16 @@ class Halo:
         """Set the ghost rows of any storage-ordered array (n, ...) from their owners. Collective."""
         if self.comm.mpi is None:
             return
-        from_left, to_left, to_right, from_right = self._pieces(rows)
-        self.comm.mpi.Sendrecv(_bytes(to_left), self.left, TO_LEFT, _bytes(from_right), self.right, TO_LEFT)
-        self.comm.mpi.Sendrecv(_bytes(to_right), self.right, TO_RIGHT, _bytes(from_left), self.left, TO_RIGHT)
+        self._swap(*(_bytes(piece) for piece in self._pieces(rows)))
+
+    def _swap(self, from_left: np.ndarray, to_left: np.ndarray, to_right: np.ndarray, from_right: np.ndarray) -> None:
+        mpi = self.comm.mpi
+        self.comm.wait(
+            mpi.Irecv(from_left, self.left, TO_RIGHT),
+            mpi.Irecv(from_right, self.right, TO_LEFT),
+            mpi.Isend(to_left, self.left, TO_LEFT),
+            mpi.Isend(to_right, self.right, TO_RIGHT),
+        )
 
     def keep_fresh(self, rows: np.ndarray) -> None:
         """From now on `refresh` renews the ghost rows of this array; its memory must stay where it is."""
@@ -71,7 +77,7 @@ class Halo:
             from mpi4py import MPI
 
             MPI.Prequest.Startall(self.requests)
-            MPI.Request.Waitall(self.requests)
+            self.comm.wait(*self.requests)
 
     def close(self) -> None:
         """Give the requests back to MPI."""

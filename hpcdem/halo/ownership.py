@@ -53,7 +53,9 @@ class Ownership:
                 return
             weight = found
         first, columns = self._span(cx)
-        if first_time:
+        if columns == 0:
+            first, columns = 0, 1
+        elif first_time:
             self._refuse_too_many_ranks(columns, room)
         cost = np.zeros(min(columns, MOST_COLUMNS))
         np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)
@@ -73,11 +75,11 @@ class Ownership:
         return float(balance.cost_per_particle(measured[:, 0], measured[:, 1])[self.comm.rank])
 
     def _span(self, cx: np.ndarray) -> tuple[int, int]:
-        """First occupied column and number of columns to the last one, over all ranks."""
+        """First occupied column and number of columns to the last one, over all ranks; (0, 0) without particles."""
         ends = np.array([-cx.min(), cx.max()] if len(cx) else [-strips.FARTHEST, -strips.FARTHEST])
         self.comm.max_into(ends)
         first, columns = -int(ends[0]), int(ends[1] + ends[0]) + 1
-        return (first, columns) if columns > 0 else (0, 1)
+        return (first, columns) if columns > 0 else (0, 0)
 
     def _refuse_too_many_ranks(self, columns: int, room: tuple[float, float] | None) -> None:
         """A rank without a column of its own in the whole model is a mistake of the launch."""

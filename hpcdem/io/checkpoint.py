@@ -1,8 +1,8 @@
 """`.sav` files: HDF5, in the order of ids, free of ranks and threads.
 
 Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
-one dataset per column, each with the attribute `sum` (its 64-bit words added up modulo 2^64), which is compared after
-writing, before the file gets its name, and again on reading.
+one dataset per column. The root attribute `sums` (JSON) holds the 64-bit words of each dataset added up modulo 2^64; it
+is compared after writing, before the file gets its name, and again on reading.
 """
 
 from __future__ import annotations

@@ -23,4 +23,3 @@ class Settings:
     seed: int = 1
     wallside: str = "both"
     gentry: float = 2.75
-    outdir: str = "data"
