@@ -223,7 +223,7 @@ def _run(sim: Simulation) -> None:
     """Steps up to the end of the running command (sim.progress)."""
     progress = sim.progress
     assert progress is not None
-    first, last = progress["first"], progress["last"]
+    last = progress["last"]
     if sim.log is not None:
         sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step)
     tasks = _tasks(sim)
