@@ -10,7 +10,7 @@
 #SBATCH --exclusive              # the slowest rank sets the pace: no neighbours on the nodes
 #SBATCH --distribution=block     # neighbouring strips on the same node, so that few messages cross the network
 #SBATCH --time=24:00:00
-#SBATCH --signal=USR1@300        # five minutes before the end: write a checkpoint and go on
+#SBATCH --signal=USR1@300        # five minutes before the end: write a checkpoint and stop
 #SBATCH --output=%x-%j.out
 ##SBATCH --partition=...         # as your cluster calls it
 ##SBATCH --hint=nomultithread    # hyper-threads do not pay

@@ -7,7 +7,7 @@
 #SBATCH --ntasks=32              # ranks: as many as the node has cores; some 5 000 particles per rank or more pay
 #SBATCH --cpus-per-task=1
 #SBATCH --time=12:00:00
-#SBATCH --signal=USR1@300        # five minutes before the end: write a checkpoint and go on
+#SBATCH --signal=USR1@300        # five minutes before the end: write a checkpoint and stop
 #SBATCH --output=%x-%j.out
 ##SBATCH --partition=...         # as your cluster calls it
 ##SBATCH --hint=nomultithread    # hyper-threads do not pay

@@ -9,7 +9,7 @@
 #SBATCH --ntasks=32
 #SBATCH --cpus-per-task=1
 #SBATCH --time=04:00:00          # one link of the chain; hpcdem asks Slurm for the end of the job by itself
-#SBATCH --signal=USR2@300        # a second reminder, five minutes before the end: write a checkpoint and stop
+#SBATCH --signal=USR1@300        # a second reminder, five minutes before the end: write a checkpoint and stop
 #SBATCH --requeue                # the job may be put back, by itself or after a node has failed
 #SBATCH --open-mode=append       # all links write into one log
 #SBATCH --output=%x-%j.out

@@ -2,13 +2,13 @@
 
 | what | then |
 |---|---|
-| SIGUSR1 | save a checkpoint and go on |
-| SIGUSR2, SIGTERM, first SIGINT (Ctrl-C) | save a checkpoint and stop, exit code 85 |
+| SIGUSR1, SIGTERM, first SIGINT (Ctrl-C) | save a checkpoint and stop, exit code 85 |
+| SIGUSR2 | save a checkpoint and go on |
 | second SIGINT | stop at once, nothing is saved |
 | time limit or end of the Slurm job | save and stop, early enough for the save to finish |
 
-srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1, and SIGTERM and SIGINT
-with MPICH, SIGUSR2 with Open MPI (as tried with MPICH 5.0 and Open MPI 5.0).
+srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1 with either MPI, SIGTERM and
+SIGINT with MPICH only, SIGUSR2 with Open MPI only (as tried with MPICH 5.0 and Open MPI 5.0).
 
 A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
 seen it. The step loop puts `local_request()` into a maximum that it takes over the ranks anyway, and hands the
@@ -35,9 +35,9 @@ NONE, SAVE, STOP = 0, 1, 2
 
 Decision = Literal["none", "save", "stop"]
 
-HANDLED = ("SIGUSR1", "SIGUSR2", "SIGTERM", "SIGINT")
+HANDLED = ("SIGUSR2", "SIGUSR1", "SIGTERM", "SIGINT")
 SAME_REQUEST = 2.0
-"""A SIGUSR1 this soon [s] after a save was sent to all ranks at once and is answered already."""
+"""A SIGUSR2 this soon [s] after a save was sent to all ranks at once and is answered already."""
 
 
 def parse_limit(text: str) -> float:
@@ -100,7 +100,7 @@ class StopRequests:
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         """Only sets a flag: the state may be in the middle of a step."""
         name = signal.Signals(number).name
-        if name == "SIGUSR1":
+        if name == "SIGUSR2":
             self._save = self._save or time.monotonic() - self._last_saved > SAME_REQUEST
             return
         if name == "SIGINT":

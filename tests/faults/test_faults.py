@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import is_open_mpi
 from tests.faults.conftest import LAST_FRAME, PILE
 
 SECONDS = 20.0
@@ -123,7 +122,7 @@ def test_more_ranks_than_fit(launch, script):
 # -- requests ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR2", "SIGINT"])
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1", "SIGINT"])
 def test_a_signal_saves_and_stops(launch, script, undisturbed, wait_until, name):
     data = script.parent / "data"
     job = launch.start(1, script, "--no-figure", cwd=script.parent)
@@ -155,20 +154,20 @@ def test_a_signal_to_the_launcher_reaches_the_ranks(launch, script, undisturbed,
     data = script.parent / "data"
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), 120, "the first checkpoint")
-    # Open MPI's mpiexec answers SIGTERM by killing the ranks, MPICH's dies of SIGUSR2; each passes on the other.
-    job.send_signal(signal.SIGUSR2 if is_open_mpi() else signal.SIGTERM)
+    # Open MPI's mpiexec answers SIGTERM by killing the ranks, MPICH's dies of SIGUSR2; both pass on SIGUSR1.
+    job.send_signal(signal.SIGUSR1)
     code, _, err = end_of(job)
     assert code == 85, err
     finish(launch, 2, script, undisturbed)
 
 
 @pytest.mark.mpi
-def test_sigusr1_saves_and_goes_on(launch, script, undisturbed, wait_until, rank_process):
+def test_sigusr2_saves_and_goes_on(launch, script, undisturbed, wait_until, rank_process):
     data = script.parent / "data"
     script.write_text(PILE.replace(" save 1000", "").replace(" save 20.0", ""))
     job = launch.start(2, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: list(data.glob("all_*_ini.dat")), 120, "the first frame")
-    os.kill(rank_process(script.parent, 1), signal.SIGUSR1)
+    os.kill(rank_process(script.parent, 1), signal.SIGUSR2)
     out, err = job.communicate(timeout=120)
     assert job.returncode == 0, err
     assert out.count("written on request") == 1 and len(checkpoints(data)) == 1

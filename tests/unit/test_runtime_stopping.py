@@ -36,14 +36,14 @@ def test_nothing_is_asked_for_at_first(stop):
     assert stop.poll(SerialComm()) == "none"
 
 
-def test_sigusr1_saves_once_and_goes_on(stop):
-    send("SIGUSR1")
+def test_sigusr2_saves_once_and_goes_on(stop):
+    send("SIGUSR2")
     assert stop.local_request() == SAVE
     assert stop.poll(SerialComm()) == "save"
     assert stop.poll(SerialComm()) == "none"
 
 
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR2", "SIGINT"])
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGUSR1", "SIGINT"])
 def test_the_others_stop_and_stay_stopped(stop, name):
     send(name)
     assert stop.local_request() == STOP
@@ -52,7 +52,7 @@ def test_the_others_stop_and_stay_stopped(stop, name):
 
 
 def test_stop_wins_over_save(stop):
-    send("SIGUSR1")
+    send("SIGUSR2")
     send("SIGTERM")
     assert stop.poll(SerialComm()) == "stop"
 
@@ -67,7 +67,7 @@ def test_the_second_ctrl_c_interrupts_at_once(stop):
 def test_a_signal_to_all_ranks_makes_one_checkpoint(stop):
     """A rank that got the signal just after another rank's request had been answered."""
     assert stop.decide(SAVE) == "save"
-    send("SIGUSR1")
+    send("SIGUSR2")
     assert stop.local_request() == NONE
 
 
@@ -93,7 +93,7 @@ def test_a_signal_to_one_rank_is_seen_by_all_on_the_same_poll(launch, tmp_path):
         "stop = stopping.StopRequests().install()\n"
         "for poll in range(100):\n"
         "    if comm.rank == 1 and poll in (3, 6):\n"
-        "        os.kill(os.getpid(), signal.SIGUSR1 if poll == 3 else signal.SIGTERM)\n"
+        "        os.kill(os.getpid(), signal.SIGUSR2 if poll == 3 else signal.SIGTERM)\n"
         "    answer = stop.poll(comm)\n"
         "    if answer != 'none':\n"
         "        sys.stdout.write(f'{comm.rank} {poll} {answer} {stop.reason}\\n')\n"
