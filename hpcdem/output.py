@@ -86,6 +86,7 @@ def write_checkpoint(sim: Simulation, _: Snapshot | None = None) -> Path:
 def write_last_words(sim: Simulation) -> None:
     """A frame of a state that makes no sense any more, for the user to look at."""
     with np.errstate(all="ignore"):
+        sim.refresh_tables()
         Snapshot(sim).write_print()
 
 
