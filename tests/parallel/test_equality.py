@@ -120,16 +120,27 @@ def test_resumed_run_equals_the_uninterrupted_one(
     assert_same_files(reference, folder)
 
 
+def short_push(launch: Launcher, scripts: Path, folder: Path, ranks: int, *options: str) -> None:
+    """Run the short variant of the manual's push.py in a new folder."""
+    folder.mkdir()
+    (folder / "push.py").write_text((scripts / "short" / "push.py").read_text())
+    done = launch(ranks, folder / "push.py", "--no-figure", *options, cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def pushed(manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The short push on one rank and one thread."""
+    folder = tmp_path_factory.mktemp("push") / "one"
+    short_push(Launcher(), manual_scripts, folder, 1)
+    return folder
+
+
 @pytest.mark.mpi
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_short_push_of_the_manual(launch: Launcher, manual_scripts: Path, tmp_path: Path, case: str) -> None:
-    """The short variant of the manual's push.py, on one rank and otherwise."""
+def test_short_push_of_the_manual(
+    pushed: Path, launch: Launcher, manual_scripts: Path, tmp_path: Path, case: str
+) -> None:
     ranks, options = CASES[case]
-    for name, n, words in (("one", 1, []), ("other", ranks, options)):
-        folder = tmp_path / name
-        folder.mkdir()
-        (folder / "push.py").write_text((manual_scripts / "short" / "push.py").read_text())
-        done = launch(n, folder / "push.py", "--no-figure", *words, cwd=folder)
-        assert done.returncode == 0, done.stdout + done.stderr
-    assert_same_files(tmp_path / "one", tmp_path / "other")
+    short_push(launch, manual_scripts, tmp_path / "other", ranks, *options)
+    assert_same_files(pushed, tmp_path / "other")
