@@ -11,7 +11,6 @@ import numpy as np
 
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.model.walls import BOX_IDS
 from hpcdem.physics.dem import contacts, mass
 from hpcdem.physics.dem import walls as wall_kernels
 from hpcdem.physics.exact_sum import exact_sum
@@ -50,7 +49,11 @@ def wall_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 def wall_forces(sim: Simulation) -> np.ndarray:
     """Force on each wall (n_walls, 2) [N], exactly summed. Collective."""
-    out, iout = wall_rows(sim)
+    return _sum_by_wall(sim, *wall_rows(sim))
+
+
+def _sum_by_wall(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> np.ndarray:
+    """The opposite of the forces in wall rows of all ranks, exactly summed per wall (n_walls, 2) [N]. Collective."""
     total = np.zeros((len(sim.walls), 2))
     parts = sim.comm.allgather((iout[:, 1].copy(), out[:, FORCE_X : FORCE_Y + 1].copy()))
     wall = np.concatenate([w for w, _ in parts])
@@ -97,8 +100,7 @@ def frame(sim: Simulation) -> Frame:
     """Everything that is written at an output time. The model must be closed. Collective."""
     p, s, comm = sim.particles, sim.settings, sim.comm
     columns: dict[str, np.ndarray] = {
-        name: p[name].copy()
-        for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "angle", "fx", "fy", "torque", "birth")
+        name: p[name].copy() for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "angle", "birth")
     }
     force = sim.lists.owned_forces()
     columns["fx"], columns["fy"], columns["torque"] = force[:, 0].copy(), force[:, 1].copy(), force[:, 2].copy()
@@ -139,13 +141,10 @@ def frame(sim: Simulation) -> Frame:
     w = sim.walls
     names = ("id", "p1", "p2", "kn", "ks", "fric", "color", "v")
     walls = {name: getattr(w, name)[output_order] for name in names}
-    walls["force"] = wall_forces(sim)[output_order]
+    walls["force"] = _sum_by_wall(sim, wout, wiout)[output_order]
     box = w.box() or (math.nan,) * 4
     settings: dict[str, float | str] = {
         "left": box[0], "right": box[1], "bottom": box[2], "height": box[3] - box[2],
         "gx": s.gx, "gy": s.gy, "disk": s.disk, "frac": s.frac, "lsm": s.lsm,
     }  # fmt: skip
     return Frame(sim.clock.step, sim.clock.time, sim.clock.dt, settings, walls, tables, list(sim.groups))
-
-
-__all__ = ["BOX_IDS", "contact_rows", "critical_dt", "frame", "kinetic_energy", "wall_forces", "wall_rows"]

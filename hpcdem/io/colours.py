@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-NAMES = ("lg", "green", "yellow", "red", "white", "black", "mg", "blue", "gb", "violet")
-"""Name of each colour number: light grey, ..., medium grey, ..., green-blue, violet."""
-
 RGB = np.array(
     [
         [0.85, 0.85, 0.85],

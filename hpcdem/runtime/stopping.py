@@ -152,10 +152,6 @@ class StopRequests:
             return 2.0 * self._last_save_took + 1.0
         return max((margin for _, margin, _ in self._limits), default=0.0)
 
-    def seconds_left(self) -> float | None:
-        """Seconds to the nearest limit; None without one."""
-        return min((end for end, _, _ in self._limits), default=np.inf) - time.monotonic() if self._limits else None
-
 
 def slurm_end_time(environ: Mapping[str, str] = os.environ, ask: Callable[..., Any] = subprocess.run) -> float | None:
     """The end of this Slurm job [s since 1970]: SLURM_JOB_END_TIME, else what squeue says; None outside a job.

@@ -153,11 +153,6 @@ def test_the_end_of_the_job_is_a_limit_too():
     assert "Slurm" in stop.reason or (stop.poll(SerialComm()) == "stop" and "Slurm" in stop.reason)
 
 
-def test_seconds_left():
-    assert StopRequests().seconds_left() is None
-    assert StopRequests(time_limit=100.0).seconds_left() == pytest.approx(100.0, abs=1.0)
-
-
 # -- Slurm -------------------------------------------------------------------------------------------------------
 
 

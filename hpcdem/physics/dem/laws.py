@@ -15,7 +15,7 @@ import math
 from numba import njit
 
 LINEAR, HERTZ = 0, 1
-NO_BOND, ELASTIC_BOND, CONTACT_BOND = 0, 1, 2
+ELASTIC_BOND, CONTACT_BOND = 1, 2  # 0: no bond
 HOLDS, BREAKS_IN_TENSION, BREAKS_IN_SHEAR = 0, 1, 2
 
 

@@ -19,7 +19,7 @@ from hpcdem.physics.dem import laws
 from hpcdem.physics.dem.contacts import MODEL, MU, A, B
 
 # Columns of the wall table used by the kernels.
-P1X, P1Y, P2X, P2Y, WVX, WVY, ONE_SIDED, SPARE = range(8)
+P1X, P1Y, P2X, P2Y, WVX, WVY, ONE_SIDED = range(7)
 
 NONE, FACE, END1, END2 = 0, 1, 2, 3
 
