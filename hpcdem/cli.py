@@ -8,16 +8,19 @@ and HDF5 are loaded, and thousands of processes should not load what only the la
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from hpcdem.errors import EXIT_OK, EXIT_USAGE, CommandError, HpcdemError, StoppedWithCheckpoint, UsageError
+from hpcdem.errors import EXIT_OK, EXIT_USAGE, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import ending, launch
+from hpcdem.session import Session, greet, rehearse
+from hpcdem.session import enter as enter_session
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -41,53 +44,81 @@ class Options:
     outdir: Path | None = None
     figure: bool = True
     balance: bool = True
+    arguments: tuple[str, ...] = ()
 
 
-def run(comm: SerialComm, options: Options, log: Log) -> None:
-    """Collective: read, check and run a script, then draw its last state. The same text on any number of ranks."""
+def run(session: Session, options: Options) -> None:
+    """Collective: read and carry out a script, then draw its last state. The same text on any number of ranks."""
     from hpcdem.lang import detect
-    from hpcdem.lang.zdem import check, execute, parser, plan
-    from hpcdem.runtime.stopping import StopRequests, slurm_end_time
-    from hpcdem.runtime.warmup import prepare_kernels
 
-    stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
-    name, source = str(options.script), read_script(comm, options.script)
-    refuse_other_languages(detect.kind(source, name), name)
+    name, source = str(options.script), read_script(session.comm, options.script)
+    kind = detect.kind(source, name)
+    if kind == "python":
+        run_python(session, options, source)
+    elif kind == "zdem":
+        run_zdem(session, options, source)
+    else:
+        raise UsageError(f"{name}: this is a PCDC script; this version runs ZDEM scripts and Python, PCDC comes later")
+
+
+def run_zdem(session: Session, options: Options, source: bytes) -> None:
+    """Collective: check a script of ZDEM commands and run it, from its beginning or from its newest checkpoint."""
+    from hpcdem.lang.zdem import check, execute, parser, plan
+
+    name, log = str(options.script), session.log
+    if options.arguments:
+        raise UsageError(f"{options.arguments[0]}: a ZDEM script takes no arguments, a Python program does")
     script = parser.parse_text(source, name)
     if options.check:
         log.info(check.summary(script))
         return
     execute.refuse_unexecuted(script.statements)
-
-    threads = options.threads or 1
-    prepare_kernels(comm, log, lambda: rehearse(threads))
-    from hpcdem.simulation import Simulation  # brings the kernels with it
-
-    outdir = options.outdir or options.script.parent / "data"
-    sim = Simulation(comm, threads, outdir, log, stop.install(), balance_on=options.balance)
+    sim = session.simulation(log=log)
     try:
         if not (options.resume and go_on(sim, script, log)):
             log.script_started(name, plan.expected_steps(script.statements) or 0)
             execute.Interpreter(script).run(sim)
     except StoppedWithCheckpoint:  # on all ranks at the same step
-        log.stages(sim.timers, comm)
+        log.stages(sim.timers, session.comm)
         raise
-    finally:
-        stop.uninstall()
-        sim.release()
-    log.stages(sim.timers, comm)
-    if options.figure and comm.rank == 0:
-        draw_last_state(sim, log)
+    except BaseException:
+        session.close(failed=True)
+        raise
+    session.close()
 
 
-def rehearse(*threads: int) -> None:
-    """Call every kernel once for each number of threads. Imports them: the cache must be settled before."""
-    from hpcdem.commands import rehearsal
-    from hpcdem.io import textnum
+def run_python(session: Session, options: Options, source: bytes) -> None:
+    """Collective: run a Python program on every rank; the simulations it makes belong to this session."""
+    name = str(options.script)
+    for given, option in ((options.check, "--check"), (options.resume, "--resume")):
+        if given:
+            raise UsageError(f"{name}: {option} is for ZDEM scripts; a Python program uses Simulation.resume() itself")
+    session.text = source.decode("utf-8", errors="replace")
+    session.ends_with_frame = True
+    enter_session(session)
+    session.log.script_started(name, 0)
+    sys.argv = [name, *options.arguments]
+    sys.path.insert(0, str(options.script.resolve().parent))
+    try:
+        exec(compile(source, name, "exec"), {"__name__": "__main__", "__file__": name, "__builtins__": __builtins__})
+    except SystemExit as leaving:
+        if leaving.code not in (None, EXIT_OK):
+            session.close(failed=True)
+            raise
+    except BaseException as error:
+        session.close(failed=True)
+        if isinstance(error, (HpcdemError, KeyboardInterrupt)):
+            raise
+        raise HpcdemError(f"{name} ended with an error\n{own_traceback(error, name)}") from None
+    session.close()
 
-    for n in threads:
-        rehearsal.rehearse(n)
-    textnum.warm_up()
+
+def own_traceback(error: BaseException, file: str) -> str:
+    """The traceback of a user's program without the frames that started it."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_frame.f_code.co_filename != file:
+        trace = trace.tb_next
+    return "".join(traceback.format_exception(type(error), error, trace or error.__traceback__)).rstrip()
 
 
 def go_on(sim: Simulation, script: Script, log: Log) -> bool:
@@ -96,22 +127,16 @@ def go_on(sim: Simulation, script: Script, log: Log) -> bool:
     from hpcdem.lang.zdem import execute
 
     named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
-    for path in checkpoints(sim.comm, [sim.outdir, *named.values()]):
-        try:
-            found = saving.restore(sim, path)
-        except CommandError as error:
-            log.warn(f"{error}; trying the checkpoint before it")
-            continue
-        log.info(f"going on from {path}, step {sim.clock.step}")
-        sim.progress = found["progress"]
-        for index, folder in named.items():
-            if index <= found["position"]:
-                sim.outdir = folder
-        log.script_started(script.file, *planned_steps(script, found["position"], sim))
-        execute.Interpreter(script).run(sim, resume=found["position"], saved_script=found["script"])
-        return True
-    log.info(f"no checkpoint in {' or '.join(map(str, [sim.outdir, *named.values()]))}: starting at the beginning")
-    return False
+    found = saving.restore_newest(sim, [sim.outdir, *named.values()])
+    if found is None:
+        return False
+    sim.progress = found["progress"]
+    for index, folder in named.items():
+        if index <= found["position"]:
+            sim.outdir = folder
+    log.script_started(script.file, *planned_steps(script, found["position"], sim))
+    execute.Interpreter(script).run(sim, resume=found["position"], saved_script=found["script"])
+    return True
 
 
 def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, int]:
@@ -124,16 +149,6 @@ def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, 
     before = sum(run.steps or 0 for run in runs if run.index < position)
     inside = sim.clock.step - sim.progress["first"] if sim.progress is not None else 0
     return sum(run.steps or 0 for run in runs), before + inside
-
-
-def checkpoints(comm: SerialComm, folders: list[Path]) -> list[Path]:
-    """Collective: the .sav files of some folders, the one written last first."""
-    found = []
-    if comm.rank == 0:
-        found = sorted(
-            {path for folder in folders for path in folder.glob("*.sav")}, key=lambda p: -p.stat().st_mtime_ns
-        )
-    return comm.bcast(found)
 
 
 def read_script(comm: SerialComm, path: Path) -> bytes:
@@ -150,24 +165,6 @@ def read_script(comm: SerialComm, path: Path) -> bytes:
     if error is not None:
         raise UsageError(error)
     return source
-
-
-def refuse_other_languages(kind: str, file: str) -> None:
-    """UsageError, by name, for the kinds of script that this version cannot run."""
-    if kind == "zdem":
-        return
-    name = {"pcdc": "a PCDC script", "python": "a plain Python program"}.get(kind, f"of an unknown kind ({kind})")
-    raise UsageError(f"{file}: this is {name}; this version runs ZDEM command scripts only, others come later")
-
-
-def draw_last_state(sim: Simulation, log: Log) -> None:
-    """The figure of the newest frame of this run, if there is one. Serial."""
-    from hpcdem.io.frames import frame_name, read_frame
-    from hpcdem.post import plots
-
-    if sim.last_frame is not None:
-        last = sim.outdir / frame_name(sim.last_frame[0], ".vtkhdf", sim.last_frame[1])
-        log.info(f"figure: {plots.plot_frame(read_frame(last, ('particles',)), last.with_suffix('.jpg'))}")
 
 
 # -- the command line --------------------------------------------------------------------------------------------
@@ -224,6 +221,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     "or script not understood, 85 stopped on request with a checkpoint (go on with --resume).",
 )
 @click.argument("script", type=click.Path(path_type=Path))
+@click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")
 @click.option(
     "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
 )
@@ -237,7 +235,10 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 @click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
 @click.version_option(launch.version(), "-v", "--version", prog_name="hpcdem", message="%(prog)s %(version)s")
 def hpcdem(**options: Any) -> None:
-    """Run a discrete-element SCRIPT (ZDEM commands), alone or under mpiexec or srun."""
+    """Run a discrete-element SCRIPT (ZDEM commands, or Python that uses hpcdem), alone or under mpiexec or srun.
+
+    ARGUMENTS are for a Python script, in sys.argv.
+    """
 
 
 @click.command(context_settings=HELP)
@@ -272,14 +273,16 @@ def main() -> NoReturn:
 
     def work() -> None:
         from hpcdem.runtime.progress import Log
+        from hpcdem.runtime.stopping import StopRequests, slurm_end_time
 
         log = Log(comm.rank)
         if not options.check:
-            places = comm.allgather(launch.place(cores_before, threads))
-            log.info(launch.start_report(places, launch.mpi_library() if comm.mpi is not None else None))
-            for warning in warnings + launch.start_warnings(places):
-                log.warn(warning)
-        run(comm, replace(options, threads=threads), log)
+            greet(comm, log, cores_before, threads, warnings)
+        stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
+        session = Session(
+            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance
+        )
+        run(session, options)
 
     ending.leave(ending.run_together(comm, work))
 

@@ -116,6 +116,30 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     return {name: state[name] for name in ("script", "position", "progress")}
 
 
+def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | None:
+    """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. Collective.
+
+    Returns what `restore` returns, and "path". A damaged file is named in the log and the one before it is tried.
+    """
+    found = []
+    if sim.comm.rank == 0:
+        names = {path for folder in folders for path in folder.glob("*.sav")}
+        found = sorted(names, key=lambda path: -path.stat().st_mtime_ns)
+    for path in sim.comm.bcast(found):
+        try:
+            state = restore(sim, path)
+        except CommandError as error:
+            if sim.log is not None:
+                sim.log.warn(f"{error}; trying the checkpoint before it")
+            continue
+        if sim.log is not None:
+            sim.log.info(f"going on from {path}, step {sim.clock.step}")
+        return {**state, "path": path}
+    if sim.log is not None:
+        sim.log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
+    return None
+
+
 def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
     sim.clear()
     sim.clock = Clock(**state["clock"])

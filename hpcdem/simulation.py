@@ -9,6 +9,7 @@ see `Lattice`.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,11 +60,22 @@ class Lattice:
     late: int = 0
 
 
+@dataclass
+class Watcher:
+    """Somebody who wants to look at the model, and perhaps to act on it, at the steps that are multiples of `every`.
+
+    call: returns True to end the running CYC or IMPLE.
+    """
+
+    every: int
+    call: Callable[[], object]
+
+
 class Simulation:
     """One model on one communicator.
 
     comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
-    stopped).
+    stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint.
     """
 
     def __init__(
@@ -80,6 +92,8 @@ class Simulation:
         self.outdir = Path(outdir)
         self.folder_made = False
         self.log, self.stop = log, stop
+        self.watchers: list[Watcher] = []
+        self.goes_on_with = "--resume"
         self.balance_on = balance_on
         self.timers = Timers()
         self.script = ""
@@ -441,7 +455,8 @@ class Simulation:
         self.comm.max_into(ends)
         if not np.isfinite(ends).all():
             raise CommandError("{left}, {right}, {bottom}, {top} need at least one free particle")
-        return {"left": -ends[0], "right": ends[1], "bottom": -ends[2], "top": ends[3]}
+        left, right, bottom, top = (float(v) for v in ends * (-1.0, 1.0, -1.0, 1.0))
+        return {"left": left, "right": right, "bottom": bottom, "top": top}
 
     def group_number(self, name: str) -> int:
         """Row of a group name, made if need be (on all ranks alike)."""

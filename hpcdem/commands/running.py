@@ -157,6 +157,10 @@ def time_step(sim: Simulation) -> float:
 
 def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str, int], final_frame: bool) -> None:
     """Write the `_ini` frame and run n steps."""
+    if sim.progress is not None:
+        raise CommandError(
+            f"{name} cannot be used by a function that is called in the middle of {sim.progress['name']}"
+        )
     prepare(sim)
     sim.progress = {
         "name": name, "first": sim.clock.step, "last": sim.clock.step + n, "origin": origin,
@@ -191,7 +195,7 @@ class Task:
 
     every: int
     origin: int
-    run: Callable[[output.Snapshot], object]
+    run: Callable[..., object]
     also: int = -1
 
     def next_after(self, step: int) -> int:
@@ -230,7 +234,7 @@ def _run(sim: Simulation) -> None:
     clock, counted = sim.clock, sim.clock.step
     try:
         while clock.step < last:
-            event = min([last, *(task.next_after(clock.step) for task in tasks)])
+            event = min([last, *(task.next_after(clock.step) for task in [*tasks, *_calls(sim)])])
             request = 0
             while clock.step < event:
                 request = sim.step()
@@ -238,6 +242,9 @@ def _run(sim: Simulation) -> None:
                     break
             sim.timers.count(clock.step - counted, len(sim.particles))
             counted = clock.step
+            if _call_watchers(sim):
+                last = progress["last"] = clock.step
+                tasks = _tasks(sim)
             moment = output.Snapshot(sim)
             for task in tasks:
                 if task.next_after(clock.step - 1) == clock.step:
@@ -249,12 +256,36 @@ def _run(sim: Simulation) -> None:
         output.write_last_words(sim)
         raise
     finally:
+        sim.progress = None
         if sim.log is not None:
             sim.log.command_finished()
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     _warn_about_late_lists(sim, progress)
-    sim.progress = None
+
+
+def _calls(sim: Simulation) -> list[Task]:
+    """The moments at which watchers are called; asked for anew each time, as they may come and go."""
+    return [Task(watcher.every, 0, watcher.call) for watcher in sim.watchers]
+
+
+def _call_watchers(sim: Simulation) -> bool:
+    """Call those who want to see this step, before anything of it is written: a checkpoint then has what they did.
+
+    They may have added particles or changed a wall, so the model is made ready again. Returns True if one of them, on
+    any rank, wants the command to end here.
+    """
+    step, enough = sim.clock.step, False
+    due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
+    for task in due:
+        enough |= bool(task.run())
+    if not due:
+        return False
+    if sim.closed:
+        sim.refresh_tables()
+    else:
+        prepare(sim, dt_known=True)
+    return sim.comm.any(enough)
 
 
 def _answer(sim: Simulation, request: int) -> None:
@@ -265,7 +296,8 @@ def _answer(sim: Simulation, request: int) -> None:
     path = output.write_checkpoint(sim)
     if what == "stop":
         raise StoppedWithCheckpoint(
-            f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, go on with --resume"
+            f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
+            f"go on with {sim.goes_on_with}"
         )
     if sim.log is not None:
         sim.log.info(f"step {sim.clock.step}: checkpoint {path} written on request")

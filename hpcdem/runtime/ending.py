@@ -59,14 +59,23 @@ def run_together(comm: Any, work: Callable[[], None]) -> Ending:
 
     If only some ranks fail, the lowest of them prints and the job is aborted; this function does not return then.
     """
-    failure = None
-    knock = comm.mpi.Dup() if comm.mpi is not None else None
+    knock = private_channel(comm)
     try:
         work()
     except BaseException as error:  # KeyboardInterrupt and SystemExit too: the other ranks must not wait for this one
-        failure = describe(error)
-        if failure.code == EXIT_OK:
-            failure = None
+        return come_together(comm, knock, describe(error))
+    return come_together(comm, knock, None)
+
+
+def private_channel(comm: Any) -> Any:
+    """Collective, at the start of a run: what the ranks will use to find each other at its end."""
+    return comm.mpi.Dup() if comm.mpi is not None else None
+
+
+def come_together(comm: Any, knock: Any, failure: Failure | None) -> Ending:
+    """The end of a run on this rank; see `run_together`. knock: of `private_channel`."""
+    if failure is not None and failure.code == EXIT_OK:
+        failure = None
     flush()
     if knock is None:
         return Ending(report(failure, 0, 1))
@@ -125,6 +134,11 @@ def leave(end: Ending) -> NoReturn:
     The exit code of a failed job is rank 0's, and it leaves last: launchers kill what still runs when a process
     leaves with an error, and may then report the kill instead of the code.
     """
+    sys.exit(end_mpi(end))  # not os._exit: MPICH says goodbye to its launcher in an exit handler
+
+
+def end_mpi(end: Ending) -> int:
+    """End MPI and return the exit code of this process: that of the job on rank 0, which waits for the others."""
     flush()
     if "mpi4py.MPI" in sys.modules:  # HDF5 may have started it too
         from mpi4py import MPI
@@ -136,9 +150,9 @@ def leave(end: Ending) -> NoReturn:
         if MPI.Is_initialized() and not MPI.Is_finalized():
             MPI.Finalize()
     if end.rank > 0:
-        sys.exit(EXIT_OK)
+        return EXIT_OK
     wait_for_end_of(end.others if end.code != EXIT_OK else ())
-    sys.exit(end.code)  # not os._exit: MPICH says goodbye to its launcher in an exit handler
+    return end.code
 
 
 def wait_for_end_of(others: tuple[tuple[str, int], ...]) -> None:

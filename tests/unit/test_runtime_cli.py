@@ -117,14 +117,23 @@ def test_a_missing_script_is_said_once(launch, tmp_path):
     assert done.returncode == 2 and done.stderr.count("no such script") == 1
 
 
-@pytest.mark.parametrize(
-    ("text", "kind"),
-    [("pcdc block create\n", "a PCDC script"), ("import hpcdem\nhpcdem.run()\n", "a plain Python program")],
-)
-def test_other_kinds_of_script_are_refused_by_name(launch, tmp_path, text, kind):
-    (tmp_path / "a.py").write_text(text)
+def test_a_pcdc_script_is_refused_by_name(launch, tmp_path):
+    (tmp_path / "a.py").write_text("pcdc block create\n")
     done = launch(1, "a.py", cwd=tmp_path, timeout=60)
-    assert done.returncode == 2 and f"hpcdem: a.py: this is {kind}" in done.stderr
+    assert done.returncode == 2 and "hpcdem: a.py: this is a PCDC script" in done.stderr
+
+
+@pytest.mark.parametrize("option", ["--check", "--resume"])
+def test_options_for_zdem_scripts_are_refused_for_python(launch, tmp_path, option):
+    (tmp_path / "a.py").write_text("import hpcdem\n")
+    done = launch(1, option, "a.py", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and f"hpcdem: a.py: {option} is for ZDEM scripts" in done.stderr
+
+
+def test_a_zdem_script_takes_no_arguments(launch, tmp_path):
+    (tmp_path / "a.py").write_text("START\nSTOP\n")
+    done = launch(1, "a.py", "0.3", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and "0.3: a ZDEM script takes no arguments" in done.stderr
 
 
 SHORT = """\

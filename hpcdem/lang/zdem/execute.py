@@ -6,11 +6,12 @@ The verbs know nothing of lines and files; an error of theirs leaves here with t
 from __future__ import annotations
 
 import importlib
+import os.path
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import CommandError, ScriptError, UsageError
+from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.zdem.parser import Script, parse_text
 from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2
 from hpcdem.lang.zdem.statement import Statement
@@ -35,6 +36,28 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
             )
 
 
+def refuse_lost_files(script: Script, outdir: Path | None = None) -> None:
+    """ScriptError at the first EXP or SAV that could not write its file, long before the run comes to it; looks at the
+    disk.
+
+    outdir: folder of the results where the script does not name one; it and what lies in it need not exist yet.
+    """
+    results = [script.directory, script.directory / "data" if outdir is None else outdir]
+    for statement in script.statements:
+        if statement.get("outdir"):
+            folder = script.directory / statement.get("outdir")
+            results.append(folder)
+            if folder.exists() and not folder.is_dir():
+                raise statement.error(f"outdir {statement.get('outdir')} is not a folder")
+        if statement.command not in ("EXP", "SAV"):
+            continue
+        path = script.directory / statement.get("file")
+        if path.is_dir():
+            raise statement.error(f"{statement.get('file')} is a folder, expected a file name")
+        if not path.parent.is_dir() and os.path.normpath(path.parent) not in map(os.path.normpath, results):
+            raise statement.error(f"there is no folder {path.parent} to write {path.name} into")
+
+
 class Interpreter:
     """Runs a script on a simulation.
 
@@ -56,6 +79,7 @@ class Interpreter:
         saved_script: text of the script that wrote it; UsageError if the two differ in what was done so far.
         """
         refuse_unexecuted(self.script.statements)
+        self._refuse_lost_files(sim)
         sim.script = self.script.text
         if resume is not None:
             if saved_script:
@@ -63,9 +87,21 @@ class Interpreter:
             self._take_up(sim, resume)
             start_at = resume + 1
         for index in range(start_at, len(self.script.statements)):
-            self._carry_out(sim, index)
+            self.carry_out(sim, index)
         if self.script.statements[-1].command != "STOP":
             self.verbs.running.stop(sim)
+
+    def _refuse_lost_files(self, sim: Any) -> None:
+        """Rank 0 looks, so that all ranks agree."""
+        comm, error = getattr(sim, "comm", None), None
+        if comm is None or comm.rank == 0:
+            try:
+                refuse_lost_files(self.script, getattr(sim, "outdir", None))
+            except ScriptError as found:
+                error = found.file, found.line, found.message
+        error = comm.bcast(error) if comm is not None else error
+        if error is not None:
+            raise ScriptError(*error)
 
     def _take_up(self, sim: Any, index: int) -> None:
         if not 0 <= index < len(self.script.statements):
@@ -78,7 +114,7 @@ class Interpreter:
         if statement.command in ("CYC", "IMPLE"):
             self._guarded(statement, lambda: self.verbs.running.resume(sim))
 
-    def _carry_out(self, sim: Any, index: int) -> None:
+    def carry_out(self, sim: Any, index: int) -> None:
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
         self._guarded(statement, lambda: _VERBS[statement.command](_Call(self, sim, statement)))
@@ -89,6 +125,11 @@ class Interpreter:
             work()
         except CommandError as error:
             raise statement.error(str(error)) from error
+        except HpcdemError as error:
+            if type(error) is not HpcdemError:
+                raise
+            # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
+            raise HpcdemError(str(statement.error(str(error)))) from error
 
 
 def check_same_beginning(script: Script, saved_text: str, position: int) -> None:

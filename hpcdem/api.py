@@ -1,0 +1,620 @@
+"""The Python interface: the verbs of the ZDEM language as methods, the state as numpy arrays.
+
+Everything ends in the functions of `hpcdem.commands`, as a script does, so both give the same results to the last
+bit. Under mpiexec or srun every rank runs the same program, and every method is collective: call it on all ranks.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hpcdem import session
+from hpcdem.errors import CommandError, ScriptError
+from hpcdem.fields import FIELDS, FIX_BITS
+from hpcdem.lang.zdem.execute import Interpreter, Verbs, find
+from hpcdem.lang.zdem.parser import parse_text
+from hpcdem.lang.zdem.table import COLORS
+from hpcdem.model.materials import MATERIAL
+from hpcdem.selection import Selection
+
+PACKAGE = str(Path(__file__).resolve().parent)
+SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
+"""Fields that a program may write."""
+MATERIAL_FIELDS = MATERIAL.names or ()
+Point = tuple[float, float]
+Where = str | Selection | None
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+def _place() -> tuple[str, int]:
+    """File and line of the user's program that is being carried out."""
+    frame: Any = sys._getframe(1)
+    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame = frame.f_back
+    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
+
+
+def _verb(method: Method) -> Method:
+    """Errors of a verb leave with file and line of the program; values of a wrong kind too."""
+
+    @functools.wraps(method)
+    def call(self: Simulation, *values: Any, **options: Any) -> Any:
+        place = _place()
+        self.engine.line = place[1]
+        try:
+            return method(self, *values, **options)
+        except CommandError as error:
+            raise ScriptError(*place, f"{method.__name__}: {error}") from error
+        except (TypeError, ValueError) as error:
+            if _raised_by_the_user(error):
+                raise
+            raise ScriptError(*place, f"{method.__name__}: {error}; see help(hpcdem.Simulation)") from error
+
+    return call  # type: ignore[return-value]
+
+
+def _raised_by_the_user(error: BaseException) -> bool:
+    """Whether a function of the program, called by us, raised it: then it is the program's affair."""
+    trace, inside = error.__traceback__, False
+    while trace is not None:
+        ours = trace.tb_frame.f_code.co_filename.startswith(PACKAGE)
+        if inside and not ours and "site-packages" not in trace.tb_frame.f_code.co_filename:
+            return True
+        inside, trace = inside or ours, trace.tb_next
+    return False
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall as it is now: end points, velocity [m/s], stiffnesses [N/m] (linear particles), friction."""
+
+    p1: Point
+    p2: Point
+    v: Point
+    kn: float
+    ks: float
+    fric: float
+
+
+class Call:
+    """A function that is called every so many steps; `cancel` ends that."""
+
+    def __init__(self, sim: Simulation, watcher: Any) -> None:
+        self._sim, self._watcher = sim, watcher
+
+    def cancel(self) -> None:
+        """Do not call it any more."""
+        if self._watcher in self._sim.engine.watchers:
+            self._sim.engine.watchers.remove(self._watcher)
+
+
+class Simulation:
+    """A model and its run. Born empty, as after START.
+
+    outdir: folder of the results (default: ``data`` beside the program); threads: per rank (default: what ``-j`` or
+    ``srun -c`` gives, else 1); log: print progress and the table of stages. Relative file names, here and in all
+    methods, begin at `directory`: where the program lies, or the present folder in a conversation.
+
+    where: the particles that a method acts on, as the text of a RANGE (``"y 0 1000 and group rock"``,
+    ``"y {top}-500 {top}"``) or an object of `hpcdem.selection`; left out, all of them. color: a name or number of the
+    manual's table (lg green yellow red white black mg blue gb violet). Units are SI.
+    """
+
+    def __init__(self, outdir: str | Path | None = None, threads: int | None = None, log: bool = True) -> None:
+        self._session = session.current(threads)
+        self.directory = self._session.directory
+        folder = None if outdir is None else self.directory / outdir
+        self.engine = self._session.simulation(folder, self._session.log if log else None)
+        self.engine.goes_on_with = "Simulation.resume()"
+        self._do = Verbs()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, kind: Any, *rest: Any) -> None:
+        if kind is None:
+            self.finish()
+
+    # ---- who is there ----------------------------------------------------------------------------------------------
+
+    @_verb
+    def start(self) -> None:
+        """START: forget everything and begin a new, empty model."""
+        self._do.particles.start(self.engine)
+
+    @_verb
+    def box(
+        self,
+        left: float,
+        right: float,
+        bottom: float,
+        height: float,
+        kn: float = 0.0,
+        ks: float = 0.0,
+        fric: float = 0.0,
+    ) -> None:
+        """BOX: four walls around the space of the model; particles that leave it are deleted."""
+        self._do.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
+
+    @_verb
+    def wall(
+        self,
+        id: int,
+        nodes: tuple[Point, Point] | None = None,
+        *,
+        kn: float | None = None,
+        ks: float | None = None,
+        fric: float | None = None,
+        color: str | int | None = None,
+        xv: float | None = None,
+        yv: float | None = None,
+    ) -> None:
+        """WALL: make a wall from node to node, or change the one with this id."""
+        self._do.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
+
+    @_verb
+    def ball(
+        self, x: float, y: float, rad: float, id: int | None = None, color: str | int = 0, group: str = "***"
+    ) -> None:
+        """BALL: one particle; without an id it gets the next free one."""
+        self._do.particles.ball(self.engine, id, x, y, rad, _color(color), group)
+
+    @_verb
+    def gen(self, num: int, rad: Iterable[float], x: Point, y: Point, color: str | int = 0, group: str = "***") -> int:
+        """GEN num: random insertion without overlap into the rectangle x, y, radii drawn from `rad`; how many fitted
+        in."""
+        return self._do.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
+
+    @_verb
+    def gen_grid(
+        self,
+        rad: Iterable[float],
+        x: Point,
+        y: Point,
+        idmin: int | None = None,
+        color: str | int = 0,
+        group: str = "***",
+    ) -> int:
+        """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad); how many were made."""
+        return self._do.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
+
+    @_verb
+    def gline(
+        self,
+        p1: Point,
+        p2: Point,
+        rad: float,
+        cratio: float = 1.0,
+        *,
+        kn: float | None = None,
+        ks: float | None = None,
+        fric: float | None = None,
+        color: str | int = 0,
+        group: str = "***",
+    ) -> int:
+        """GLINE: a row of particles from p1 towards p2, their distance over the sum of radii is `cratio`; how many."""
+        return self._do.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
+
+    @_verb
+    def load(self, file: str | Path, scale: float = 1.0, x: Point | None = None, y: Point | None = None) -> int:
+        """LOAD: a new model from rows ``x y r [group]``; x, y: window in the numbers of the file; how many."""
+        return self._do.particles.load(self.engine, self._existing(file), scale, x, y)
+
+    @_verb
+    def delete(self, where: Where = None) -> int:
+        """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
+        return self._do.particles.delete(self.engine, _selection(where))
+
+    @_verb
+    def export(self, file: str | Path, group: bool = False, where: Where = None) -> None:
+        """EXP: rows ``x y r [group]`` in the order of ids."""
+        self._do.particles.export(self.engine, self.directory / file, group, _selection(where))
+
+    # ---- what it is made of ----------------------------------------------------------------------------------------
+
+    @_verb
+    def prop(
+        self,
+        where: Where = None,
+        *,
+        density: float | None = None,
+        fric: float | None = None,
+        shear: float | None = None,
+        poiss: float | None = None,
+        damp: float | None = None,
+        hertz: bool = False,
+        kn: float | None = None,
+        ks: float | None = None,
+        xv: float | None = None,
+        yv: float | None = None,
+        spin: float | None = None,
+        color: str | int | None = None,
+        group: str | None = None,
+    ) -> None:
+        """PROP: properties, velocities, colour and group of particles; what is left out stays."""
+        self._do.properties.prop(
+            self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
+            hertz=hertz, kn=kn, ks=ks, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
+        )  # fmt: skip
+
+    @_verb
+    def bond(
+        self,
+        where: Where = None,
+        *,
+        ebmod: float | None = None,
+        gbmod: float | None = None,
+        tstrength: float | None = None,
+        sstrength: float | None = None,
+        n_bond: float | None = None,
+        s_bond: float | None = None,
+        tolerate: float | None = None,
+        rext: float | None = None,
+        fric: float | None = None,
+    ) -> int:
+        """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new."""
+        return self._do.bonds.bond(
+            self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
+            n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric,
+        )  # fmt: skip
+
+    @_verb
+    def break_bonds(self, where: Where = None) -> int:
+        """BOND break: remove the bonds with both ends in `where`; how many."""
+        return self._do.bonds.break_bonds(self.engine, _selection(where))
+
+    @_verb
+    def fix(self, *dofs: str, where: Where = None) -> None:
+        """FIX: these of "x", "y", "spin" keep the velocity they have."""
+        self._do.properties.fix(self.engine, _degrees(dofs), where=_selection(where))
+
+    @_verb
+    def free(self, *dofs: str, where: Where = None) -> None:
+        """FREE: undo `fix`."""
+        self._do.properties.free(self.engine, _degrees(dofs), where=_selection(where))
+
+    @_verb
+    def set(self, **options: Any) -> None:
+        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, wallside, outdir, and the
+        steps between outputs: print, ps, vtk, save, stepbar."""
+        for name, value in options.items():
+            value = self.directory / value if name == "outdir" else value
+            self._do.settings.set_option(self.engine, name, value)
+
+    # ---- running ---------------------------------------------------------------------------------------------------
+
+    @_verb
+    def cycle(self, n: int) -> None:
+        """CYC: n steps, with output at the SET intervals."""
+        self._do.running.cycle(self.engine, int(n))
+
+    @_verb
+    def imple(
+        self,
+        wall: int,
+        xmove: float | None = None,
+        ymove: float | None = None,
+        *,
+        save: float | None = None,
+        print: float | None = None,
+        ps: float | None = None,
+        vtk: float | None = None,
+    ) -> None:
+        """IMPLE: step until the wall has gone this far [m]; outputs at these ways of the wall [m]."""
+        self._do.running.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
+
+    def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
+        """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
+
+        It may look at everything and use all methods but those that step. If it returns True (on any rank), the
+        running cycle ends with this step. A function that only looks changes nothing in the run.
+        """
+        from hpcdem.simulation import Watcher
+
+        if int(steps) != steps or steps < 1:
+            raise ScriptError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
+        watcher = Watcher(int(steps), lambda: function(self))
+        self.engine.watchers.append(watcher)
+        return Call(self, watcher)
+
+    @_verb
+    def save(self, file: str | Path) -> None:
+        """SAV: the whole state to a checkpoint."""
+        self._do.saving.save(self.engine, self.directory / file)
+
+    @_verb
+    def restore(self, file: str | Path) -> None:
+        """RES: the whole state of a checkpoint, written on any number of ranks."""
+        self._do.saving.restore(self.engine, self._existing(file))
+
+    @_verb
+    def resume(self) -> bool:
+        """Take up the newest whole checkpoint of `outdir` and finish the cycle in which it was written; False if there
+        is none. Functions of `every` must have been given before."""
+        from hpcdem import saving
+
+        found = saving.restore_newest(self.engine, [self.engine.outdir])
+        if found is None:
+            return False
+        self.engine.progress = found["progress"]
+        self._do.running.resume(self.engine)
+        return True
+
+    @_verb
+    def hist(self, id: int, interval: int, what: str) -> None:
+        """HIST: append kinetic, step, time, unbalanced, contacts or bonds to hist_<id>.dat every `interval` steps."""
+        self._do.history.hist(self.engine, id, interval, what)
+
+    @_verb
+    def plot(self, y: int, x: int) -> None:
+        """PLOT: at `finish`, write history y against history x."""
+        self._do.history.plot_hist(self.engine, y, x)
+
+    @_verb
+    def command(self, text: str) -> None:
+        """Carry out lines of the ZDEM language on this model."""
+        begins = text.split()[:1] and text.split()[0][:3].lower() in ("sta", "res", "loa")
+        name, line = _place()
+        try:
+            script = parse_text(text if begins else "RES model\n" + text, str(self.directory / "command"))
+            interpreter = Interpreter(script, self._do)
+            for index in range(0 if begins else 1, len(script.statements)):
+                interpreter.carry_out(self.engine, index)
+        except ScriptError as error:
+            raise ScriptError(name, line, f"command: {error.message}") from error
+        finally:
+            self.engine.script, self.engine.position = self._session.text, 0
+
+    @_verb
+    def finish(self) -> None:
+        """The end: histories closed, the table of stages printed, the last frame drawn. Without it, all this happens
+        when the program ends."""
+        self._do.running.stop(self.engine)
+        self._session.finish(self.engine)
+
+    # ---- output of one moment --------------------------------------------------------------------------------------
+
+    @_verb
+    def write_frame(self) -> None:
+        """Write ``all_<step>.vtkhdf`` and ``.dat`` now."""
+        from hpcdem import output
+
+        self._ready()
+        output.Snapshot(self.engine).write_print()
+
+    # ---- looking ---------------------------------------------------------------------------------------------------
+
+    def __len__(self) -> int:
+        """Particles of this rank."""
+        return len(self.engine.particles)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A field of this rank's own particles (n,), read-only; valid until the next method that changes or steps.
+
+        The names are those of `hpcdem.fields` (x y vx vy spin radius gid angle fx fy torque fix color group birth),
+        of materials (density fric shear poiss damp kn ks hertz), and mass, inertia.
+        """
+        p, engine = self.engine.particles, self.engine
+        if name == "group":
+            values = np.array(engine.groups)[p["group"]]
+        elif name in ("fx", "fy", "torque") and engine.closed:
+            values = engine.lists.owned_forces()[:, ("fx", "fy", "torque").index(name)]
+        elif name in FIELDS:
+            values = p[name].view()
+        elif name in MATERIAL_FIELDS:
+            values = engine.materials.rows[name][p["material"]]
+        elif name in ("mass", "inertia"):
+            self._ready()
+            values = engine.body[:, ("mass", "inertia").index(name)].view()
+        else:
+            raise ScriptError(*_place(), f"there is no field '{name}'; fields are {', '.join(FIELDS)}")
+        values.flags.writeable = False
+        return values
+
+    def __setitem__(self, name: str, values: Any) -> None:
+        """Set a field of this rank's own particles: ``sim["vx"] = 0.0``. Collective."""
+        if name not in SETTABLE:
+            raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(SETTABLE)}")
+        engine = self.engine
+        if name in ("x", "y", "radius"):
+            engine.open()
+        values = np.asarray(values)
+        if name == "group":
+            names = np.unique(np.concatenate([np.unique(v) for v in engine.comm.allgather(values.astype(str))]))
+            number = {group: engine.group_number(str(group)) for group in names}
+            values = np.array([number[group] for group in np.atleast_1d(values.astype(str))])
+        elif name == "radius" and engine.comm.any(bool((values <= 0.0).any())):
+            raise ScriptError(*_place(), "radius must be positive")
+        if engine.comm.any(values.dtype.kind == "f" and not bool(np.isfinite(values).all())):
+            raise ScriptError(*_place(), f"field '{name}' must be finite")
+        try:
+            engine.particles[name][:] = values
+        except ValueError as error:
+            raise ScriptError(*_place(), f"field '{name}' has {len(self)} values on this rank: {error}") from error
+        engine.look_soon()
+        if name == "radius":
+            engine.tables_changed()
+
+    def gather(self, *names: str) -> Any:
+        """Fields of all particles, on every rank, in the order of ids: one array, or a tuple of them."""
+        columns = [np.concatenate(self.engine.comm.allgather(np.array(self[name]))) for name in names]
+        order = np.argsort(np.concatenate(self.engine.comm.allgather(np.array(self["gid"]))))
+        return columns[0][order] if len(columns) == 1 else tuple(c[order] for c in columns)
+
+    @property
+    def count(self) -> int:
+        """Particles on all ranks."""
+        return self.engine.count(len(self))
+
+    @property
+    def steps(self) -> int:
+        """Number of the present step."""
+        return self.engine.clock.step
+
+    @property
+    def time(self) -> float:
+        """Model time [s]."""
+        return self.engine.clock.time
+
+    @property
+    def dt(self) -> float:
+        """Time step of the last cycle [s]; 0 before the first."""
+        return self.engine.clock.dt
+
+    @property
+    def rank(self) -> int:
+        """Which of the ranks this is."""
+        return self.engine.comm.rank
+
+    @property
+    def ranks(self) -> int:
+        """Number of ranks."""
+        return self.engine.comm.size
+
+    @property
+    def outdir(self) -> Path:
+        """Folder of the results."""
+        return self.engine.outdir
+
+    @property
+    def walls(self) -> dict[int, Wall]:
+        """The walls by id, those of BOX with ids -1 to -4 (left, right, bottom, top)."""
+        w = self.engine.walls
+        return {
+            int(w.id[k]): Wall(
+                _point(w.p1[k]), _point(w.p2[k]), _point(w.v[k]), float(w.kn[k]), float(w.ks[k]), float(w.fric[k])
+            )
+            for k in range(len(w))
+        }
+
+    @_verb
+    def extents(self) -> dict[str, float]:
+        """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
+        return self.engine.extents()
+
+    @_verb
+    def wall_force(self, id: int) -> Point:
+        """Force on a wall (x, y) [N], exactly summed."""
+        from hpcdem import observe
+
+        row = self.engine.walls.row(id)
+        self._ready()
+        return _point(observe.wall_forces(self.engine)[row])
+
+    @_verb
+    def wall_forces(self) -> dict[int, Point]:
+        """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
+        from hpcdem import observe
+
+        self._ready()
+        force = observe.wall_forces(self.engine)
+        return {int(i): _point(f) for i, f in zip(self.engine.walls.id, force, strict=True)}
+
+    @_verb
+    def kinetic_energy(self) -> float:
+        """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
+        from hpcdem import observe
+
+        self._ready()
+        return observe.kinetic_energy(self.engine)
+
+    @_verb
+    def unbalanced(self) -> float:
+        """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
+        from hpcdem import output
+
+        self._ready()
+        return output.unbalanced(self.engine)
+
+    def contacts(self) -> dict[str, np.ndarray]:
+        """Touching pairs of the whole model, on every rank, in the order of ids: id1 id2, normal force fn and shear
+        force fs [N], fx fy on id1, contact point x y, overlap [m]."""
+        return self._table("contacts")
+
+    def bonds(self) -> dict[str, np.ndarray]:
+        """Bonds of the whole model, as `contacts`, with kind, ebmod, gbmod, tstrength, sstrength."""
+        return self._table("bonds")
+
+    def wall_contacts(self) -> dict[str, np.ndarray]:
+        """Contacts with walls: id1, wall (its id), fn fs, fx fy on the particle, x y, overlap."""
+        table = self._table("wall_contacts")
+        w = self.engine.walls
+        return {**table, "wall": w.id[w.in_output_order()][table["wall"]]}
+
+    @property
+    def bonds_left(self) -> int:
+        """Bonds that hold."""
+        return self.engine.bonds_left()
+
+    @property
+    def bonds_broken(self) -> tuple[int, int]:
+        """Bonds broken so far, in tension and in shear."""
+        return self.engine.broken()
+
+    # ---- ours ------------------------------------------------------------------------------------------------------
+
+    def _table(self, name: str) -> dict[str, np.ndarray]:
+        from hpcdem import observe
+
+        self._ready()
+        slab = observe.frame(self.engine).tables[name].columns
+        parts = self.engine.comm.allgather({key: np.asarray(values) for key, values in slab.items()})
+        return {key: np.concatenate([part[key] for part in parts]) for key in slab}
+
+    def _ready(self) -> None:
+        """Lists, ghosts and masses in place, as kernels that look at contacts need them."""
+        self.engine.close()
+
+    def _existing(self, file: str | Path) -> str:
+        """A file to read: in `directory`, then in data below it; looked for by rank 0."""
+        comm = self.engine.comm
+        found = comm.bcast(find(self.directory, str(file)) if comm.rank == 0 else None)
+        if found is None:
+            raise CommandError(f"there is no file {self.directory / file}")
+        return found
+
+
+def _point(values: Any) -> Point:
+    return float(values[0]), float(values[1])
+
+
+def _color(color: str | int | None) -> Any:
+    if color is None or (isinstance(color, int) and color in COLORS.values()):
+        return color
+    if isinstance(color, str) and color.lower() in COLORS:
+        return COLORS[color.lower()]
+    raise CommandError(f"expected a colour, {', '.join(f'{n} ({i})' for n, i in COLORS.items())}, got {color!r}")
+
+
+def _radii(rad: Iterable[float] | float) -> list[float]:
+    return [float(r) for r in (rad if isinstance(rad, Iterable) else [rad])]
+
+
+def _degrees(dofs: tuple[str, ...]) -> tuple[str, ...]:
+    wrong = [d for d in dofs if d not in FIX_BITS]
+    if wrong or not dofs:
+        raise CommandError(f"say which of {', '.join(FIX_BITS)}" + (f", not {wrong[0]!r}" if wrong else ""))
+    return dofs
+
+
+@functools.lru_cache(maxsize=256)
+def _parsed(text: str) -> Selection | None:
+    return parse_text(f"RES model\nDEL RANGE {text}", "where").statements[1].selection
+
+
+def _selection(where: Where) -> Selection | None:
+    if where is None or isinstance(where, Selection):
+        return where
+    if not isinstance(where, str) or "\n" in where:
+        raise CommandError(f"where: expected the text of a RANGE or a selection, got {where!r}")
+    try:
+        return _parsed(where)
+    except ScriptError as error:
+        raise CommandError(f"where '{where}': {error.message.removeprefix('DEL RANGE: ')}") from None

@@ -1,0 +1,189 @@
+"""What one process shares among all that it computes: ranks, threads, log, signals, compiled kernels.
+
+The program `hpcdem` opens a session for the script it runs. A Python program that was started by itself
+(``python study.py``, ``mpiexec -n 4 python study.py``) gets one when it makes its first simulation; the session then
+also sees to it that an error on one rank ends all of them, with its message and its exit code.
+"""
+
+from __future__ import annotations
+
+import atexit
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.errors import UsageError
+from hpcdem.runtime import ending, launch
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+    from hpcdem.runtime.stopping import StopRequests
+    from hpcdem.simulation import Simulation
+
+
+@dataclass
+class Session:
+    """comm: all ranks; threads: per rank; outdir: where results go if the script does not say; directory: that of the
+    script, where its relative file names begin; figure: draw the last state of each simulation; text: of the script;
+    ends_with_frame: write the last state of each simulation, too, if no command has.
+    """
+
+    comm: SerialComm
+    log: Log
+    stop: StopRequests
+    threads: int = 1
+    directory: Path = field(default_factory=Path)
+    outdir: Path | None = None
+    figure: bool = True
+    balance: bool = True
+    text: str = ""
+    ends_with_frame: bool = False
+    kernels_ready: bool = False
+    unfinished: list[Simulation] = field(default_factory=list)
+
+    def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
+        """Collective: an empty model; the first one waits for the kernels."""
+        if not self.kernels_ready:
+            from hpcdem.runtime.warmup import prepare_kernels
+
+            prepare_kernels(self.comm, self.log, lambda: rehearse(self.threads))
+            self.kernels_ready = True
+            self.stop.install()
+        from hpcdem.simulation import Simulation  # brings the kernels with it
+
+        outdir = self.outdir or self.directory / "data" if outdir is None else outdir
+        sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
+        sim.script = self.text
+        self.unfinished.append(sim)
+        return sim
+
+    def finish(self, sim: Simulation) -> None:
+        """Collective: the table of stages, the figure of the last frame; MPI forgets the simulation."""
+        if sim in self.unfinished:
+            self.unfinished.remove(sim)
+        if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
+            from hpcdem import output
+
+            sim.close()
+            output.Snapshot(sim).write_print()
+        if sim.log is not None and sim.timers.steps:
+            sim.log.stages(sim.timers, self.comm)
+        sim.release()
+        if self.figure and self.comm.rank == 0 and sim.log is not None:
+            draw_last_state(sim, sim.log)
+
+    def close(self, failed: bool = False) -> None:
+        """The end of the program: simulations that were not finished are."""
+        for sim in list(self.unfinished):
+            if failed:
+                sim.release()
+            else:
+                self.finish(sim)
+        self.unfinished.clear()
+        self.stop.uninstall()
+
+
+def rehearse(*threads: int) -> None:
+    """Call every kernel once for each number of threads. Imports them: the cache must be settled before."""
+    from hpcdem.commands import rehearsal
+    from hpcdem.io import textnum
+
+    for n in threads:
+        rehearsal.rehearse(n)
+    textnum.warm_up()
+
+
+def draw_last_state(sim: Simulation, log: Log) -> None:
+    """The figure of the newest frame of this run, if there is one. Serial."""
+    from hpcdem.io.frames import frame_name, read_frame
+    from hpcdem.post import plots
+
+    if sim.last_frame is not None:
+        last = sim.outdir / frame_name(sim.last_frame[0], ".vtkhdf", sim.last_frame[1])
+        log.info(f"figure: {plots.plot_frame(read_frame(last, ('particles',)), last.with_suffix('.jpg'))}")
+
+
+def greet(comm: SerialComm, log: Log, cores_before: int, threads: int, warnings: list[str]) -> None:
+    """Collective: the first line of the log, and what is wrong with the launch."""
+    places = comm.allgather(launch.place(cores_before, threads))
+    log.info(launch.start_report(places, launch.mpi_library() if comm.mpi is not None else None))
+    for warning in warnings + launch.start_warnings(places):
+        log.warn(warning)
+
+
+# -- the session of this process -------------------------------------------------------------------------------------
+
+_current: Session | None = None
+
+
+def enter(session: Session | None) -> None:
+    """Make it the session that simulations made by Python code belong to; None: there is none any more."""
+    global _current
+    _current = session
+
+
+def current(threads: int | None = None) -> Session:
+    """The session of this process, opened if there is none yet. UsageError if it has another number of threads."""
+    if _current is None:
+        enter(_open(threads))
+    assert _current is not None
+    if threads is not None and threads != _current.threads:
+        raise UsageError(
+            f"this run has {_current.threads} thread(s) per rank already, {threads} were asked for: all simulations of "
+            "a program share them (with the program hpcdem, -j says how many)"
+        )
+    return _current
+
+
+def _open(threads: int | None) -> Session:
+    """Collective: start what a Python program that was not started by `hpcdem` needs, and watch over its end."""
+    cores_before = launch.cores()
+    with launch.one_voice():
+        count, warnings = launch.prepare_environment(threads or launch.threads_by_default())
+        comm = launch.start_mpi()
+    from hpcdem.runtime.progress import Log
+    from hpcdem.runtime.stopping import StopRequests, slurm_end_time
+
+    log = Log(comm.rank)
+    greet(comm, log, cores_before, count, warnings)
+    stop = StopRequests(None, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
+    program = getattr(sys.modules["__main__"], "__file__", None)
+    directory = Path(program).parent if program else Path()
+    session = Session(comm, log, stop, count, directory, ends_with_frame=True)
+    _watch_the_end(session)
+    return session
+
+
+def _watch_the_end(session: Session) -> None:
+    """An uncaught error ends all ranks as it does in the program hpcdem; at a good end, simulations are finished."""
+    channel = ending.private_channel(session.comm)
+    usual = sys.excepthook
+    done: list[bool] = []
+
+    def end(failure: ending.Failure | None) -> int:
+        done.append(True)
+        code = ending.end_mpi(ending.come_together(session.comm, channel, failure))
+        enter(None)
+        return code
+
+    def on_error(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        if hasattr(sys, "ps1"):  # a conversation goes on after an error
+            usual(kind, error, trace)
+            return
+        session.close(failed=True)
+        sys.exit(end(ending.describe(error)))
+
+    def at_exit() -> None:
+        if done:
+            return
+        try:
+            session.close()
+        except Exception as error:  # a full disk, a missing matplotlib: the code of the process is settled already
+            end(ending.describe(error))
+        else:
+            end(None)
+
+    sys.excepthook = on_error
+    atexit.register(at_exit)
