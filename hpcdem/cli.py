@@ -44,6 +44,7 @@ class Options:
     outdir: Path | None = None
     figure: bool = True
     balance: bool = True
+    draw: bool = False
     arguments: tuple[str, ...] = ()
 
 
@@ -233,6 +234,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 @click.option("--outdir", type=click.Path(path_type=Path), metavar="DIR", help="Results [data beside the script].")
 @click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
 @click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
+@click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
 @click.version_option(launch.version(), "-v", "--version", prog_name="hpcdem", message="%(prog)s %(version)s")
 def hpcdem(**options: Any) -> None:
     """Run a discrete-element SCRIPT (ZDEM commands, or Python that uses hpcdem), alone or under mpiexec or srun.
@@ -280,8 +282,9 @@ def main() -> NoReturn:
             greet(comm, log, cores_before, threads, warnings)
         stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
         session = Session(
-            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance
-        )
+            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance,
+            options.draw,
+        )  # fmt: skip
         run(session, options)
 
     ending.leave(ending.run_together(comm, work))

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem import observe, saving
-from hpcdem.errors import CommandError
+from hpcdem.errors import CommandError, HpcdemError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.dat import write_dat
 from hpcdem.io.files import make_folder, write_sections
-from hpcdem.io.frame import Frame
+from hpcdem.io.frame import Frame, whole
 from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
@@ -43,8 +43,9 @@ class Snapshot:
             self._frame = observe.frame(self.sim)
         return self._frame
 
-    def _path(self, suffix: str) -> str:
-        return str(folder(self.sim) / frame_name(self.sim.clock.step, suffix, self.initial))
+    def _path(self, suffix: str, head: str = "all") -> str:
+        name = frame_name(self.sim.clock.step, suffix, self.initial)
+        return str(folder(self.sim) / name.replace("all", head, 1))
 
     def write_print(self) -> None:
         """`all_<step>[_ini].vtkhdf` and `.dat`."""
@@ -65,6 +66,20 @@ class Snapshot:
         """`all_<step>.ps`."""
         with self.sim.timers("output"):
             write_ps(self._path(".ps"), self.frame, self.sim.comm)
+
+    def write_drawing(self, what: tuple[str, ...]) -> None:
+        """`draw_<step>.jpg`, by rank 0: the words of DRAW."""
+        with self.sim.timers("figure"):
+            path, error = self._path(".jpg", "draw"), None
+            all_rows = whole(self.frame, self.sim.comm)
+            if all_rows is not None:
+                from hpcdem.post import plots
+
+                try:
+                    plots.plot_frame(all_rows, path, 200.0, what)
+                except HpcdemError as problem:
+                    error = str(problem)
+            self.sim.comm.agree(error)
 
 
 def folder(sim: Simulation) -> Path:

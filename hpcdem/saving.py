@@ -61,6 +61,7 @@ def _state(sim: Simulation) -> dict[str, Any]:
         "position": sim.position,
         "script": sim.script,
         "plots": sim.plots,
+        "drawing": sim.drawing,
     }
 
 
@@ -157,6 +158,8 @@ def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, n
         setattr(sim, name, state[name])
     sim.history_wishes = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
     sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
+    if state.get("drawing") is not None:
+        sim.drawing = int(state["drawing"][0]), tuple(state["drawing"][1])
     sim.bonds = state["bonds"]
     sim._longest2 = state["longest2"]
     sim.restart_step = sim.clock.step

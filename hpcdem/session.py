@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 @dataclass
 class Session:
     """comm: all ranks; threads: per rank; outdir: where results go if the script does not say; directory: that of the
-    script, where its relative file names begin; figure: draw the last state of each simulation; text: of the script;
-    ends_with_frame: write the last state of each simulation, too, if no command has.
+    script, where its relative file names begin; figure: draw the last state of each simulation; draws: DRAW makes
+    pictures; text: of the script; ends_with_frame: write the last state of each simulation, too, if no command has.
     """
 
     comm: SerialComm
@@ -38,6 +38,7 @@ class Session:
     outdir: Path | None = None
     figure: bool = True
     balance: bool = True
+    draws: bool = False
     text: str = ""
     ends_with_frame: bool = False
     kernels_ready: bool = False
@@ -55,7 +56,7 @@ class Session:
 
         outdir = self.outdir or self.directory / "data" if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
-        sim.script = self.text
+        sim.script, sim.draws = self.text, self.draws
         self.unfinished.append(sim)
         return sim
 

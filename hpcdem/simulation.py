@@ -75,7 +75,8 @@ class Simulation:
     """One model on one communicator.
 
     comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
-    stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint.
+    stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
+    draws: DRAW makes pictures.
     """
 
     def __init__(
@@ -94,6 +95,7 @@ class Simulation:
         self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
         self.goes_on_with = "--resume"
+        self.draws = False
         self.balance_on = balance_on
         self.timers = Timers()
         self.script = ""
@@ -118,6 +120,7 @@ class Simulation:
         self.bonds = 0
         self.history_wishes: dict[int, tuple[int, str]] = {}
         self.plots: list[tuple[int, int]] = []
+        self.drawing: tuple[int, tuple[str, ...]] | None = None
         self.progress: dict | None = None
         self.last_frame: tuple[int, bool] | None = None
         self.series_open: set[str] = set()

@@ -6,6 +6,9 @@ from hpcdem.errors import CommandError
 from hpcdem.output import HISTORIES
 from hpcdem.simulation import Simulation
 
+DRAW_INTERVAL = 1000
+"""Steps between pictures where DRAW does not say."""
+
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     """HIST: append `what` to hist_<id>.dat every `interval` steps."""
@@ -21,7 +24,17 @@ def plot_hist(sim: Simulation, y: int, x: int) -> None:
     sim.plots.append((y, x))
 
 
-def draw(sim: Simulation, interval: int, what: list[str]) -> None:
-    """DRAW: screen drawing of ZDEM; noted in the log only."""
-    if sim.log is not None:
-        sim.log.info("DRAW is not needed here: frames are drawn from the files by zdem2jpg")
+def draw(sim: Simulation, interval: int | None, what: list[str]) -> None:
+    """DRAW: `draw_<step>.jpg` every `interval` steps (in an IMPLE from its start), if the run was started with --draw.
+
+    what: bfill ball wall bondc cforce bang bid mesh, by default filled particles and walls.
+
+    Scripts draw far more often than pictures are looked at, so without --draw it is noted in the log only.
+    """
+    if interval is not None and interval <= 0:
+        raise CommandError(f"DRAW INTERVAL must be positive, got {interval}")
+    words = tuple(what) or ("bfill", "wall")
+    # ZDEM draws particles as circles unless they are to be filled.
+    sim.drawing = (interval or DRAW_INTERVAL, words if "bfill" in words else ("ball", *words))
+    if not sim.draws and sim.log is not None:
+        sim.log.info("DRAW: no pictures without the option --draw; zdem2jpg draws the frames of a finished run")

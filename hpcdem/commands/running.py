@@ -218,6 +218,9 @@ def _tasks(sim: Simulation) -> list[Task]:
     for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
         if intervals[kind] > 0:
             tasks.append(Task(intervals[kind], origin, write))
+    if sim.drawing is not None and sim.draws:
+        every, what = sim.drawing
+        tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))
     if intervals["save"] > 0:
         tasks.append(Task(intervals["save"], origin, partial(output.write_checkpoint, sim)))
     return tasks

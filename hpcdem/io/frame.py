@@ -6,7 +6,8 @@ gids), so that files do not depend on the rank count. Walls are few and known to
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -38,3 +39,15 @@ class Frame:
     walls: dict[str, np.ndarray]
     tables: dict[str, Table]
     group_names: list[str] = field(default_factory=list)
+
+
+def whole(frame: Frame, comm: Any) -> Frame | None:
+    """Collective: the frame with all rows on rank 0, None elsewhere."""
+    parts = comm.gather({name: table.columns for name, table in frame.tables.items()})
+    if parts is None:
+        return None
+    tables = {
+        name: Table({key: np.concatenate([part[name][key] for part in parts]) for key in table.columns}, 0, table.total)
+        for name, table in frame.tables.items()
+    }
+    return replace(frame, tables=tables)

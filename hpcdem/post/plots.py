@@ -6,18 +6,16 @@ matplotlib is imported where it is used, and only its file-writing parts: no win
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io import colours
 from hpcdem.io.axes import View, view
 from hpcdem.io.files import atomic_path
 from hpcdem.io.frame import Frame
 from hpcdem.io.frames import list_frames, read_frame
+from hpcdem.post.layers import LAYERS
 
 CM = 1.0 / 2.54
 PAGE_WIDTH, PAGE_HEIGHT = 17.0 * CM, 22.0 * CM
@@ -28,43 +26,21 @@ _DIGIT = 0.2 * CM
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 
 
-def draw_frame(frame: Frame, ax: Any, seen: View | None = None) -> None:
-    """Draw particles and walls of a whole frame into matplotlib axes: true-size discs in the manual's colours.
+MODEL = ("bfill", "wall")
+"""The usual picture: filled particles and walls."""
+
+
+def draw_frame(frame: Frame, ax: Any, seen: View | None = None, what: Sequence[str] = MODEL) -> None:
+    """Draw a whole frame into matplotlib axes; what: words of `layers.LAYERS`, in any order.
 
     The axes get limits, ticks and labels in km (m, cm or mm for small models); their data unit stays the metre, so
     that more can be drawn on top. seen: the part of the plane to show (by default BOX and walls, see `axes.view`).
     """
-    from matplotlib.collections import LineCollection, PathCollection
-    from matplotlib.path import Path as Outline
-    from matplotlib.transforms import Affine2D, AffineDeltaTransform
-
     seen = view(frame) if seen is None else seen
     ax.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
-
-    columns = frame.tables["particles"].columns
-    if len(frame.tables["particles"]):
-        places = np.stack([columns["x"], columns["y"]], axis=1)
-        faces = colours.RGB[colours.numbers(columns["color"])]
-        # One shape per radius (to three digits) drawn at many places: quick, and small as PDF and SVG.
-        radii, kind = np.unique([float(f"{r:.3g}") for r in columns["radius"]], return_inverse=True)
-        for k, radius in enumerate(radii):
-            chosen = np.flatnonzero(kind == k)
-            discs = PathCollection(
-                [Outline.unit_circle()],
-                offsets=places[chosen],
-                offset_transform=ax.transData,
-                facecolors=faces[chosen],
-                edgecolors="none",
-                linewidths=0,
-            )
-            discs.set_transform(Affine2D().scale(radius) + AffineDeltaTransform(ax.transData))
-            ax.add_collection(discs, autolim=False)
-    if len(frame.walls["id"]):
-        segments = np.stack([frame.walls["p1"], frame.walls["p2"]], axis=1)
-        shades = colours.RGB[colours.numbers(frame.walls["color"])]
-        ax.add_collection(
-            LineCollection(list(segments), colors=shades, linewidths=1.0, capstyle="round"), autolim=False
-        )
+    for word, draw in LAYERS.items():
+        if word in what:
+            draw(frame, ax)
     _draw_axes(ax, seen)
 
 
@@ -81,7 +57,7 @@ def _draw_axes(ax: Any, seen: View) -> None:
         spine.set_linewidth(0.6)
 
 
-def frame_figure(frame: Frame) -> Any:
+def frame_figure(frame: Frame, what: Sequence[str] = MODEL) -> Any:
     """A matplotlib Figure of the frame, as wide as a page; as high as it must be, or narrower if too high."""
     from matplotlib.figure import Figure
 
@@ -93,14 +69,15 @@ def frame_figure(frame: Frame) -> Any:
     page = left + width + right, bottom + height + top
     figure = Figure(figsize=page)
     ax = figure.add_axes((left / page[0], bottom / page[1], width / page[0], height / page[1]))
-    draw_frame(frame, ax, seen)
+    draw_frame(frame, ax, seen, what)
     return figure
 
 
-def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0) -> Path:
+def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: Sequence[str] = MODEL) -> Path:
     """Write the picture of a whole frame: JPG, PNG, PDF or SVG by the suffix of `path`.
 
-    dpi: dots per inch of JPG and PNG; the figure is 17 cm wide. Serial. Raises HpcdemError.
+    what: words of `layers.LAYERS`; dpi: dots per inch of JPG and PNG; the figure is 17 cm wide. Serial. Raises
+    HpcdemError.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -109,7 +86,7 @@ def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0) -> Pat
         import matplotlib
     except ImportError:
         raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
-    figure = frame_figure(frame)
+    figure = frame_figure(frame, what)
     kind = path.suffix.lower().removeprefix(".")
     options: dict[str, Any] = {}
     if kind in ("jpg", "jpeg"):
