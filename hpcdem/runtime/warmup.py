@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-WITHOUT_KERNELS = frozenset({"__init__.py", "__main__.py", "api.py", "cli.py", "lang", "runtime", "post"})
+WITHOUT_KERNELS = frozenset({"__init__.py", "__main__.py", "api.py", "session.py", "cli", "lang", "runtime", "post"})
 """Parts of hpcdem that no kernel takes a function or a constant from: a change there needs no new cache."""
 BUILDING = ".building-"
 UNUSED_DAYS = 60

@@ -90,7 +90,7 @@ def test_the_traceback_of_a_users_error_begins_in_the_program(launch: Launcher, 
     done = launch(1, "study.py", cwd=tmp_path)
     assert done.returncode == 1
     assert "ZeroDivisionError" in done.stderr and "return 1 / 0" in done.stderr
-    assert "cli.py" not in done.stderr
+    assert "cli/run.py" not in done.stderr
 
 
 def test_arguments_and_exit_codes(launch: Launcher, tmp_path: Path) -> None:

@@ -1,25 +1,19 @@
-"""The programs hpcdem (also called zdem), zdemss and zdem2jpg.
-
-`hpcdem script.py` runs a script, on one process or under mpiexec or srun; `run` below is the whole way from the
-script to the figure. Imports stand where they are needed: the environment must be settled before numpy, numba, MPI
-and HDF5 are loaded, and thousands of processes should not load what only the last picture needs.
-"""
+"""`hpcdem SCRIPT`: from the command line to the figure of the last state."""
 
 from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from hpcdem.errors import EXIT_OK, EXIT_USAGE, HpcdemError, StoppedWithCheckpoint, UsageError
-from hpcdem.runtime import ending, launch
-from hpcdem.session import Session, greet, rehearse
+from hpcdem.cli.common import HELP, PATH
+from hpcdem.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
+from hpcdem.runtime import launch
+from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
 
 if TYPE_CHECKING:
@@ -27,9 +21,6 @@ if TYPE_CHECKING:
     from hpcdem.lang.zdem.parser import Script
     from hpcdem.runtime.progress import Log
     from hpcdem.simulation import Simulation
-
-
-# -- one run -----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -168,9 +159,8 @@ def read_script(comm: SerialComm, path: Path) -> bytes:
     return source
 
 
-# -- the command line --------------------------------------------------------------------------------------------
+# -- the command line ---------------------------------------------------------------------------------------------
 
-HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 110}
 
 STRESS_AND_STRAIN = (
     (("-s", "--strain-stress", "--strin-stres"), "DIR"),
@@ -221,7 +211,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     epilog="`hpcdem warmup` compiles all kernels for later runs. Exit codes: 0 done, 1 the run failed, 2 command line "
     "or script not understood, 85 stopped on request with a checkpoint (go on with --resume).",
 )
-@click.argument("script", type=click.Path(path_type=Path))
+@click.argument("script", type=PATH)
 @click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")
 @click.option(
     "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
@@ -231,7 +221,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 )
 @click.option("--resume", is_flag=True, help="Go on from the newest checkpoint of this script.")
 @click.option("--check", is_flag=True, help="Read the whole script, say what it would do, run nothing.")
-@click.option("--outdir", type=click.Path(path_type=Path), metavar="DIR", help="Results [data beside the script].")
+@click.option("--outdir", type=PATH, metavar="DIR", help="Results [data beside the script].")
 @click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
 @click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
 @click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
@@ -241,93 +231,3 @@ def hpcdem(**options: Any) -> None:
 
     ARGUMENTS are for a Python script, in sys.argv.
     """
-
-
-@click.command(context_settings=HELP)
-@click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the later runs [1].")
-def warmup(**options: Any) -> None:
-    """Compile all kernels now, for example on a login node, so that no job waits for it."""
-
-
-def read_command_line(command: click.Command, program: str, words: list[str]) -> dict[str, Any]:
-    """Values of the options; prints and leaves for --help, --version and for what is not understood."""
-    try:
-        return command.make_context(program, words).params
-    except click.exceptions.Exit as done:
-        raise SystemExit(done.exit_code) from None
-    except click.ClickException as error:
-        error.show()
-        raise SystemExit(error.exit_code) from None
-
-
-# -- entry points ------------------------------------------------------------------------------------------------
-
-
-def main() -> NoReturn:
-    """The programs hpcdem and zdem."""
-    words, cores_before = sys.argv[1:], launch.cores()
-    with messages_only(), launch.one_voice():
-        if words[:1] == ["warmup"]:
-            run_warmup(words[1:])
-        options = Options(**read_command_line(hpcdem, "hpcdem", words))
-        threads, warnings = launch.prepare_environment(options.threads or launch.threads_by_default())
-        comm = launch.start_mpi()
-
-    def work() -> None:
-        from hpcdem.runtime.progress import Log
-        from hpcdem.runtime.stopping import StopRequests, slurm_end_time
-
-        log = Log(comm.rank)
-        if not options.check:
-            greet(comm, log, cores_before, threads, warnings)
-        stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
-        session = Session(
-            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance,
-            options.draw,
-        )  # fmt: skip
-        run(session, options)
-
-    ending.leave(ending.run_together(comm, work))
-
-
-def run_warmup(words: list[str]) -> NoReturn:
-    """`hpcdem warmup`: on the first process; others, if any, have nothing to do."""
-    threads = read_command_line(warmup, "hpcdem warmup", words)["threads"]
-    if launch.speaks_for_all():
-        launch.prepare_environment(threads)
-        from hpcdem.runtime.progress import Log
-        from hpcdem.runtime.warmup import warmup as compile_all
-
-        compile_all(Log(), lambda: rehearse(*{1, threads}))
-    sys.exit(EXIT_OK)
-
-
-def zdem2jpg() -> NoReturn:
-    """The program zdem2jpg: pictures of all frames of a folder, made by the first process."""
-    with messages_only(), launch.one_voice():
-        launch.prepare_environment(1)
-        from hpcdem.post import plots
-
-        folder = plots.zdem2jpg_folder(sys.argv[1:])
-        if folder is None:
-            click.echo(plots.USAGE)
-        elif launch.speaks_for_all():
-            plots.zdem2jpg(folder, report=click.echo)
-    sys.exit(EXIT_OK)
-
-
-def zdemss() -> NoReturn:
-    """The program zdemss: known by name, its pictures of stress and strain come later."""
-    with messages_only(), launch.one_voice():
-        raise UsageError("zdemss: pictures of stress and strain come later; this version runs scripts and draws frames")
-    sys.exit(EXIT_USAGE)  # the other processes never get here either
-
-
-@contextmanager
-def messages_only() -> Iterator[None]:
-    """Before the ranks are together: a failure a user can act on is printed as its message, and the process leaves."""
-    try:
-        yield
-    except HpcdemError as error:
-        click.echo(ending.describe(error).text, err=True)
-        sys.exit(error.exit_code)

@@ -1,0 +1,86 @@
+"""The programs hpcdem (also called zdem), zdemss and zdem2jpg.
+
+Imports stand where they are needed: the environment must be settled before numpy, numba, MPI and HDF5 are loaded, and
+thousands of processes should not load what only the last picture needs.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import NoReturn
+
+import click
+
+from hpcdem.cli.common import HELP, messages_only, read_command_line
+from hpcdem.cli.run import Options, hpcdem, run
+from hpcdem.errors import EXIT_OK, EXIT_USAGE, UsageError
+from hpcdem.runtime import ending, launch
+from hpcdem.session import Session, greet, rehearse
+
+__all__ = ["Options", "hpcdem", "main", "read_command_line", "zdem2jpg", "zdemss"]
+
+
+@click.command(context_settings=HELP)
+@click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the later runs [1].")
+def warmup(**options: object) -> None:
+    """Compile all kernels now, for example on a login node, so that no job waits for it."""
+
+
+def main() -> NoReturn:
+    """The programs hpcdem and zdem."""
+    words, cores_before = sys.argv[1:], launch.cores()
+    with messages_only(), launch.one_voice():
+        if words[:1] == ["warmup"]:
+            run_warmup(words[1:])
+        options = Options(**read_command_line(hpcdem, "hpcdem", words))
+        threads, warnings = launch.prepare_environment(options.threads or launch.threads_by_default())
+        comm = launch.start_mpi()
+
+    def work() -> None:
+        from hpcdem.runtime.progress import Log
+        from hpcdem.runtime.stopping import StopRequests, slurm_end_time
+
+        log = Log(comm.rank)
+        if not options.check:
+            greet(comm, log, cores_before, threads, warnings)
+        stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
+        session = Session(
+            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance,
+            options.draw,
+        )  # fmt: skip
+        run(session, options)
+
+    ending.leave(ending.run_together(comm, work))
+
+
+def run_warmup(words: list[str]) -> NoReturn:
+    """`hpcdem warmup`: on the first process; others, if any, have nothing to do."""
+    threads = read_command_line(warmup, "hpcdem warmup", words)["threads"]
+    if launch.speaks_for_all():
+        launch.prepare_environment(threads)
+        from hpcdem.runtime.progress import Log
+        from hpcdem.runtime.warmup import warmup as compile_all
+
+        compile_all(Log(), lambda: rehearse(*{1, threads}))
+    sys.exit(EXIT_OK)
+
+
+def zdem2jpg() -> NoReturn:
+    """The program zdem2jpg: pictures of all frames of a folder, made by the first process."""
+    with messages_only(), launch.one_voice():
+        launch.prepare_environment(1)
+        from hpcdem.post import plots
+
+        folder = plots.zdem2jpg_folder(sys.argv[1:])
+        if folder is None:
+            click.echo(plots.USAGE)
+        elif launch.speaks_for_all():
+            plots.zdem2jpg(folder, report=click.echo)
+    sys.exit(EXIT_OK)
+
+
+def zdemss() -> NoReturn:
+    """The program zdemss: known by name, its pictures of stress and strain come later."""
+    with messages_only(), launch.one_voice():
+        raise UsageError("zdemss: pictures of stress and strain come later; this version runs scripts and draws frames")
+    sys.exit(EXIT_USAGE)  # the other processes never get here either

@@ -1,0 +1,62 @@
+"""What all programs share: reading a command line, starting the ranks, ending together."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from hpcdem.errors import HpcdemError
+from hpcdem.runtime import ending, launch
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 110}
+"""The misspelt form is the manual's."""
+PATH = click.Path(path_type=Path)
+Work = Callable[["SerialComm", "Log"], None]
+
+
+def read_command_line(command: click.Command, program: str, words: list[str]) -> dict[str, Any]:
+    """Values of the options; prints and leaves for --help, --version and for what is not understood."""
+    try:
+        return command.make_context(program, words).params
+    except click.exceptions.Exit as done:
+        raise SystemExit(done.exit_code) from None
+    except click.ClickException as error:
+        error.show()
+        raise SystemExit(error.exit_code) from None
+
+
+@contextmanager
+def messages_only() -> Iterator[None]:
+    """Before the ranks are together: a failure a user can act on is printed as its message, and the process leaves."""
+    try:
+        yield
+    except HpcdemError as error:
+        click.echo(ending.describe(error).text, err=True)
+        sys.exit(error.exit_code)
+
+
+def run_program(
+    command: click.Command, program: str, words: list[str], work: Callable[[SerialComm, Log, dict[str, Any]], None]
+) -> NoReturn:
+    """A program that looks at finished runs: read its command line, start the ranks, call `work(comm, log, options)`
+    on each, end together. An option called "threads" is the number of threads per rank."""
+    with messages_only(), launch.one_voice():
+        options = read_command_line(command, program, words)
+        launch.prepare_environment(options.get("threads") or launch.threads_by_default())
+        comm = launch.start_mpi()
+
+    def together() -> None:
+        from hpcdem.runtime.progress import Log
+
+        work(comm, Log(comm.rank), options)
+
+    ending.leave(ending.run_together(comm, together))
