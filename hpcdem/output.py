@@ -43,9 +43,8 @@ class Snapshot:
             self._frame = observe.frame(self.sim)
         return self._frame
 
-    def _path(self, suffix: str, head: str = "all") -> str:
-        name = frame_name(self.sim.clock.step, suffix, self.initial)
-        return str(folder(self.sim) / name.replace("all", head, 1))
+    def _path(self, suffix: str, stem: str = "all") -> str:
+        return str(folder(self.sim) / frame_name(self.sim.clock.step, suffix, self.initial, stem))
 
     def write_print(self) -> None:
         """`all_<step>[_ini].vtkhdf` and `.dat`."""
