@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.conftest import ROOT, Launcher
 
 HEAD = """\
 import hpcdem
@@ -211,3 +211,15 @@ def test_import_is_light(launch: Launcher, tmp_path: Path) -> None:
     text = "import hpcdem, sys\nprint([m for m in ('numpy', 'numba', 'mpi4py') if m in sys.modules])\n"
     (tmp_path / "a.py").write_text(text)
     assert launch.python(1, "a.py", cwd=tmp_path).stdout.strip() == "[]"
+
+
+def test_the_program_of_the_documentation_runs(launch: Launcher, tmp_path: Path) -> None:
+    """The first block of docs/python.md, with fewer steps."""
+    text = (ROOT / "docs" / "python.md").read_text().split("```python\n")[1].split("```")[0]
+    for long, short in (("sim.cycle(4000)", "sim.cycle(40)"), ("xmove=2000.0, print=500.0", "xmove=4.0, print=2.0")):
+        assert long in text
+        text = text.replace(long, short)
+    program(tmp_path, text, head="")
+    done = launch(1, "study.py", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "IMPLE, 40 steps" in done.stdout
