@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import shutil
 import socket
 import sys
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-WITHOUT_KERNELS = frozenset({"__init__.py", "__main__.py", "api.py", "session.py", "cli", "lang", "runtime", "post"})
-"""Parts of hpcdem that no kernel takes a function or a constant from: a change there needs no new cache."""
 BUILDING = ".building-"
 UNUSED_DAYS = 60
 
@@ -148,18 +147,17 @@ def cache_key() -> str:
     """Name of a cache folder: all that compiled code depends on.
 
     numba compares the source file of a kernel, but not of the functions that are inlined into it, and knows nothing
-    of constants: hence the digest over all sources. A run with threads has kernels of its own, and a folder must be
-    complete when it gets its name: hence a folder for runs with one thread and one for runs with more.
+    of constants: hence the digest over the sources of all kernels and of those who call them. A run with threads has
+    kernels of its own, and a folder must be complete when it gets its name: hence a folder for runs with one thread
+    and one for runs with more.
     """
     import llvmlite.binding as llvm
     import numba
 
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
-    for source in sorted(package.rglob("*.py")):
-        name = source.relative_to(package)
-        if name.parts[0] not in WITHOUT_KERNELS:
-            digest.update(str(name).encode() + b"\0" + source.read_bytes())
+    for source in kernel_sources(package):
+        digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
     settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k in COMPILER_SETTINGS)
     threaded = os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
@@ -167,6 +165,33 @@ def cache_key() -> str:
     release = version().split()[0]
     return f"{release}-numba{numba.__version__}-{llvm.get_host_cpu_name()}-{digest.hexdigest()[:12]}"
 
+
+def kernel_sources(package: Path) -> list[Path]:
+    """The modules that decide what is compiled: those with kernels, all that they take functions or constants from, and
+    those that call them, with arguments of types of their choice."""
+    texts = {path: path.read_text(encoding="utf-8") for path in package.rglob("*.py")}
+    imports = {path: _imported(text, package) & texts.keys() for path, text in texts.items()}
+    kernels = {path for path, text in texts.items() if _COMPILES.search(text)}
+    found, wanted = set(kernels), list(kernels)
+    while wanted:
+        more = imports[wanted.pop()] - found
+        found |= more
+        wanted += more
+    callers = {path for path, used in imports.items() if used & kernels}
+    return sorted(found | callers | {package / "commands" / "rehearsal.py"})  # what it calls is what the folder holds
+
+
+def _imported(text: str, package: Path) -> set[Path]:
+    """Files that the statements ``from hpcdem.a import b`` of a module may mean."""
+    files = set()
+    for module, names in _IMPORTS.findall(text):
+        folder = package.joinpath(*module.split(".")[1:])
+        files |= {folder.with_suffix(".py"), *(folder / f"{name}.py" for name in re.findall(r"\w+", names))}
+    return files
+
+
+_COMPILES = re.compile(r"^\s*from numba import .*njit", re.MULTILINE)
+_IMPORTS = re.compile(r"^\s*from (hpcdem[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 COMPILER_SETTINGS = frozenset(
     f"NUMBA_{name}"

@@ -199,3 +199,20 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
         lines = sorted(line for line in done.stdout.splitlines() if line.startswith("rank"))
         assert lines == [f"rank {r} hits {h}" for r, h in enumerate(hits)]
     assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_the_key_knows_every_module_with_kernels_and_its_callers():
+    """Whatever holds the word njit is in it, and so are constants that kernels use and modules that call kernels."""
+    package = Path(warmup.__file__).parent.parent
+    found = {str(path.relative_to(package)) for path in warmup.kernel_sources(package)}
+    with_kernels = {str(p.relative_to(package)) for p in package.rglob("*.py") if "@njit" in p.read_text()}
+    assert with_kernels and with_kernels <= found
+    assert {
+        "fields.py",
+        "simulation.py",
+        "observe.py",
+        "commands/bonds.py",
+        "commands/particles.py",
+        "io/dat.py",
+    } <= found
+    assert not {"api.py", "commands/walls.py"} & found
