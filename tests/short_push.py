@@ -7,6 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+HDF5 = (".vtkhdf", ".sav")
+
 SHORT_PUSH = """\
 # Some 300 particles settle in a box 4 km wide; then the left wall pushes them.
 START
@@ -48,6 +50,25 @@ def contents(path: Path) -> dict[str, np.ndarray]:
         visit("", file)
         file.visititems(visit)
     return found
+
+
+def assert_same_files(one: Path, other: Path) -> None:
+    """Two folders hold the same files with the same content: HDF5 dataset by dataset, all others byte by byte."""
+    names = files(one)
+    assert names and names == files(other)
+    for name in names:
+        a, b = one / name, other / name
+        if a.read_bytes() == b.read_bytes():
+            continue
+        assert a.suffix in HDF5, name
+        left, right = contents(a), contents(b)
+        assert left.keys() == right.keys(), name
+        assert not [k for k in left if left[k].tobytes() != right[k].tobytes()], name
+
+
+def files(folder: Path) -> list[str]:
+    """Paths of all files below a folder, relative to it, in order."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
 def assert_same_end(one: Path, other: Path, patterns: tuple[str, ...] = ("*.vtkhdf", "*.sav")) -> None:

@@ -26,6 +26,8 @@ class SerialComm:
     rank = 0
     size = 1
     mpi: Any = None
+    crowded = False
+    """More ranks than cores on some host."""
 
     def barrier(self) -> None:
         """Wait for all ranks."""

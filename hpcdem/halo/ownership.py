@@ -37,7 +37,8 @@ class Ownership:
         """Choose borders for particles in columns cx (n,) i8 of this rank. Collective.
 
         busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known.
-        UsageError at the first call when there are more ranks than columns.
+        UsageError when a new model has fewer columns than there are ranks. One that lost them on its way, or was
+        restored so, goes on with ranks that wait.
         """
         first_time = not len(self.borders)
         if self.comm.size == 1:
@@ -55,7 +56,7 @@ class Ownership:
         first, columns = self._span(cx)
         if columns == 0:
             first, columns = 0, 1
-        elif first_time:
+        elif first_time and step == 0:
             self._refuse_too_many_ranks(columns, room)
         cost = np.zeros(min(columns, MOST_COLUMNS))
         np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)

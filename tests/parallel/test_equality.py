@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import Launcher
-from tests.short_push import contents
+from tests.short_push import assert_same_files, contents
 
 BUSY = """\
 START
@@ -70,20 +70,6 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def assert_same_files(one: Path, other: Path) -> None:
-    """All frames, checkpoints and series of two runs are equal: HDF5 by content, text byte by byte."""
-    names = sorted(p.name for p in (one / "data").iterdir())
-    assert names == sorted(p.name for p in (other / "data").iterdir())
-    for name in names:
-        a, b = one / "data" / name, other / "data" / name
-        if a.suffix in (".vtkhdf", ".sav"):
-            left, right = contents(a), contents(b)
-            assert left.keys() == right.keys()
-            assert not [k for k in left if left[k].tobytes() != right[k].tobytes()], name
-        else:
-            assert a.read_bytes() == b.read_bytes(), name
-
-
 def test_the_model_is_busy(reference: Path) -> None:
     """The run is worth comparing: bonds broke both ways, particles came and went."""
     last = sorted((reference / "data").glob("*.sav"))[-1]
@@ -118,29 +104,3 @@ def test_resumed_run_equals_the_uninterrupted_one(
         (folder / "data" / path.name).unlink()
     busy(launch, folder, ranks, resume=True)
     assert_same_files(reference, folder)
-
-
-def short_push(launch: Launcher, scripts: Path, folder: Path, ranks: int, *options: str) -> None:
-    """Run the short variant of the manual's push.py in a new folder."""
-    folder.mkdir()
-    (folder / "push.py").write_text((scripts / "short" / "push.py").read_text())
-    done = launch(ranks, folder / "push.py", "--no-figure", *options, cwd=folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-@pytest.fixture(scope="module")
-def pushed(manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The short push on one rank and one thread."""
-    folder = tmp_path_factory.mktemp("push") / "one"
-    short_push(Launcher(), manual_scripts, folder, 1)
-    return folder
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("case", CASES)
-def test_short_push_of_the_manual(
-    pushed: Path, launch: Launcher, manual_scripts: Path, tmp_path: Path, case: str
-) -> None:
-    ranks, options = CASES[case]
-    short_push(launch, manual_scripts, tmp_path / "other", ranks, *options)
-    assert_same_files(pushed, tmp_path / "other")
