@@ -109,9 +109,10 @@ class Simulation:
 
     def __init__(self, outdir: str | Path | None = None, threads: int | None = None, log: bool = True) -> None:
         self._session = session.current(threads)
-        self.directory = self._session.directory
+        self.directory = self._session.directory.resolve()
         folder = None if outdir is None else self.directory / outdir
         self.engine = self._session.simulation(folder, self._session.log if log else None)
+        self.engine.outdir = self.engine.outdir.resolve()
         self.engine.goes_on_with = "Simulation.resume()"
         self._do = Verbs()
 

@@ -54,7 +54,7 @@ class Session:
             self.stop.install()
         from hpcdem.simulation import Simulation  # brings the kernels with it
 
-        outdir = self.outdir or self.directory / "data" if outdir is None else outdir
+        outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
         sim.script, sim.draws = self.text, self.draws
         self.unfinished.append(sim)

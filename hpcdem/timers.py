@@ -8,16 +8,18 @@
     timers.count(steps=1, particles=n_own)
 
 Stages lie side by side: the same stage must not be entered twice at once, and a stage inside another would be
-counted in both.
+counted in both, unless the outer one is entered by `around`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Any
 
-WAITING = frozenset({"halo", "migrate", "reduce", "output", "checkpoint", "figure"})
+WAITING = frozenset({"halo", "migrate", "reduce", "output", "checkpoint", "figure", "callback"})
 """Stages in which a rank mostly waits for others or for the disk; all others are its own work."""
 
 
@@ -93,6 +95,17 @@ class Timers:
     def stop(self, name: str) -> None:
         """Leave a stage."""
         self(name).__exit__()
+
+    @contextmanager
+    def around(self, name: str) -> Iterator[None]:
+        """A stage that may hold others: what they take is theirs, the rest is its own."""
+        began, inner = perf_counter_ns(), sum(w.ns for w in self.watches.values())
+        try:
+            yield
+        finally:
+            watch = self(name)
+            watch.ns += perf_counter_ns() - began - (sum(w.ns for w in self.watches.values()) - inner)
+            watch.calls += 1
 
     def count(self, steps: int, particles: int) -> None:
         """This rank moved `particles` particles of its own by `steps` steps."""

@@ -281,7 +281,8 @@ def _call_watchers(sim: Simulation) -> bool:
     step, enough = sim.clock.step, False
     due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
     for task in due:
-        enough |= bool(task.run())
+        with sim.timers.around("callback"):
+            enough |= bool(task.run())
     if not due:
         return False
     if sim.closed:

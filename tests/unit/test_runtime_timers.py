@@ -77,3 +77,13 @@ def test_ranks_are_merged_stage_by_stage():
 
 def test_a_run_without_work_is_balanced():
     assert Timers().merge(SerialComm()).imbalance == 1.0
+
+
+def test_a_stage_around_others_counts_its_own_time_only():
+    timers = Timers()
+    with timers.around("callback"):
+        with timers("force"):
+            time.sleep(0.02)
+        time.sleep(0.002)
+    assert timers("callback").calls == timers("force").calls == 1
+    assert 0.002 <= timers.seconds("callback") < 0.02 <= timers.seconds("force")

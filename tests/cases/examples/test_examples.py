@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
+from hpcdem.lang.detect import kind
 from tests.conftest import ROOT, Launcher
 
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+EXAMPLES = [p for p in sorted((ROOT / "examples").glob("*.py")) if kind(p.read_bytes()) == "zdem"]
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.name)
