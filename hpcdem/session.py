@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.errors import UsageError
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import ending, launch, speed
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -70,7 +70,10 @@ class Session:
             sim.close()
             output.Snapshot(sim).write_print()
         if sim.log is not None and sim.timers.steps:
-            sim.log.stages(sim.timers, self.comm)
+            summary = sim.log.stages(sim.timers, self.comm)
+            if self.comm.rank == 0:
+                law = "hertz" if sim.materials.rows["hertz"].any() else "linear"
+                speed.remember_run(summary.particle_steps, summary.wall, self.comm.size * self.threads, law)
         sim.release()
         if self.figure and self.comm.rank == 0 and sim.log is not None:
             draw_last_state(sim, sim.log)

@@ -194,7 +194,7 @@ class Simulation:
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), wall_speed) * dt
         room = 0.5 * lattice.skin - path
-        if room < 0.0:
+        if room < 0.0 and self.largest_radius > 0.0:  # without particles nothing can be late
             lattice.late += 1
         stale = room < stride
         if stale:
@@ -314,7 +314,8 @@ class Simulation:
         if found[0] != 2 * found[1]:
             raise PhysicsError(
                 f"step {self.clock.step}: {found[0] // 2 - found[1]} bonds were lost when the lists were rebuilt; "
-                f"longest bond {self.lattice.bond_reach:g} m, column {self.lattice.side:g} m"
+                f"longest bond {self.lattice.bond_reach:g} m, column {self.lattice.side:g} m. Particles move too far "
+                "in a step: the time step is probably too large"
             )
         self.bonds = int(found[1])
 
@@ -333,7 +334,7 @@ class Simulation:
             lattice.skin_factor = NARROW
         lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
         side = 2.0 * self.largest_radius + lattice.skin
-        while side < lattice.bond_reach + lattice.skin:
+        while 0.0 < side < lattice.bond_reach + lattice.skin:
             side *= 1.05  # in steps, so that the lattice seldom changes
         lattice.side = side if side > 0.0 else 1.0
 

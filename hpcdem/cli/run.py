@@ -62,7 +62,7 @@ def run_zdem(session: Session, options: Options, source: bytes) -> None:
         raise UsageError(f"{options.arguments[0]}: a ZDEM script takes no arguments, a Python program does")
     script = parser.parse_text(source, name)
     if options.check:
-        log.info(check.summary(script))
+        log.info(check.summary(script, options.outdir))
         return
     execute.refuse_unexecuted(script.statements)
     sim = session.simulation(log=log)

@@ -12,6 +12,9 @@ from hpcdem.simulation import Simulation
 
 ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
 TOLERATE = 1e-6
+FARTHEST = 10.0
+"""Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
+all."""
 
 
 def bond(
@@ -51,13 +54,21 @@ def bond(
     scale = 1.0 if rext is None else rext
     if scale <= 0.0:
         raise CommandError(f"rext must be positive, got {scale:g}")
+    largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])
+    reach = max(gap, 2.0 * largest * (scale - 1.0) + gap, 0.0)
+    if reach > FARTHEST * largest > 0.0:
+        raise CommandError(
+            f"tolerate {gap:g} and rext {scale:g} would bond particles {reach:g} m apart; at most {FARTHEST:g} radii "
+            f"of the largest particle, {FARTHEST * largest:g} m"
+        )
     if fric is not None:
         prop(sim, where, fric=fric)
+    if largest == 0.0:
+        return 0
 
     # Lists that are sure to hold every pair within the search distance, made at the present positions.
     sim.open()
-    largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])
-    sim.close(least_skin=max(gap, 2.0 * largest * (scale - 1.0) + gap, 0.0))
+    sim.close(least_skin=reach)
     lists, p = sim.lists, sim.particles
     which = _flags_with_ghosts(sim, where)
     renewed = _renewed(sim, kind, given).astype(np.int32)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcdem import limits
 from hpcdem.commands.properties import chosen
 from hpcdem.errors import CommandError, HpcdemError
 from hpcdem.io.files import write_sections
@@ -38,9 +39,14 @@ def load(
     for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
         if bounds is not None:
             keep &= (column >= bounds[0]) & (column < bounds[1])
-    if scale <= 0.0:
+    if not scale > 0.0:
         raise CommandError(f"scale must be positive, got {scale:g}")
+    if not keep.any():
+        raise CommandError(f"none of the {len(rows)} particles of {path} lies within the bounds of x and y")
     rows, names = rows[keep] * scale, [g for g, k in zip(groups, keep, strict=True) if k]
+    _check_circles(rows)
+    if sim.log is not None and not keep.all():
+        sim.log.info(f"LOAD: {len(rows)} of {len(keep)} particles lie within the bounds")
     sim.clear()
     numbers = {name: sim.group_number(name) for name in dict.fromkeys(names)}
     return _add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
@@ -56,10 +62,11 @@ def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, list[str]] | Non
                     continue
                 try:
                     x, y, r = map(float, words[:3])
-                    if len(words) > 4 or not np.isfinite([x, y, r]).all() or r <= 0.0:
+                    if len(words) > 4 or "_" in "".join(words[:3]) or not np.isfinite([x, y, r]).all() or r <= 0.0:
                         raise ValueError
                 except ValueError:
-                    error = f"{path}:{number}: read '{line.strip()[:60]}', expected x y r [group] with r > 0"
+                    shown = "".join(c if c.isprintable() else " " for c in line.strip()[:60])
+                    error = f"{path}:{number}: read '{shown}', expected x y r [group] with r > 0"
                     break
                 rows.append((x, y, r))
                 groups.append(words[3] if len(words) == 4 else NO_GROUP)
@@ -83,8 +90,7 @@ def ball(
     sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
 ) -> None:
     """BALL: one particle. gid None takes the next free id."""
-    if not (rad > 0.0 and np.isfinite([x, y, rad]).all()):
-        raise CommandError(f"a particle needs finite x, y and a positive rad, got {x:g}, {y:g}, {rad:g}")
+    limits.check_circle(x, y, rad)
     if gid is not None:
         if gid < 0:
             raise CommandError(f"id must not be negative, got {gid}")
@@ -106,7 +112,8 @@ def gen(
 
     Gives up after SET gentry (2.75) attempts per particle asked for: scripts ask for far more than fit.
     """
-    _check_radii(radii, x, y)
+    limits.check_rectangle(radii, x, y, grid=False)
+    limits.check_attempts(num, sim.settings.gentry)
     existing = _everyone(sim)
     attempts = max(int(sim.settings.gentry * num), num)
     rows, tried = packing.insert_randomly(
@@ -130,7 +137,7 @@ def gen_grid(
     group: str = NO_GROUP,
 ) -> int:
     """GEN GRID: a particle of a random listed radius at each node of a square lattice of spacing 2 max(r)."""
-    _check_radii(radii, x, y)
+    limits.check_rectangle(radii, x, y, grid=True)
     rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams)
     sim.streams += 1
     if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
@@ -151,10 +158,7 @@ def gline(
     group: str = NO_GROUP,
 ) -> int:
     """GLINE: a row of equal particles from p1 towards p2, spacing 2 rad cratio; overlaps are not looked at."""
-    if rad <= 0.0:
-        raise CommandError(f"rad must be positive, got {rad:g}")
-    if not 0.0 < cratio <= 1.0:
-        raise CommandError(f"cratio must lie in (0, 1], got {cratio:g}")
+    limits.check_row(p1, p2, rad, cratio)
     centres = row(p1, p2, rad, cratio)
     material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
     rows = np.column_stack([centres, np.full(len(centres), rad)])
@@ -190,12 +194,11 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
     write_sections(path, sim.comm, lambda: [text.encode()])
 
 
-def _check_radii(radii: list[float], x: tuple[float, float], y: tuple[float, float]) -> None:
-    if not len(radii) or min(radii) <= 0.0:
-        raise CommandError(f"radii must be positive, got {' '.join(f'{r:g}' for r in radii) or 'none'}")
-    for name, (low, high) in (("x", x), ("y", y)):
-        if not high > low:
-            raise CommandError(f"{name} range is empty: {low:g} to {high:g}")
+def _check_circles(rows: np.ndarray) -> None:
+    """As limits.check_circle, for (n, 3) rows x, y, r."""
+    size = np.abs(rows[:, :2]).max(axis=1) / rows[:, 2]
+    for worst in {int(size.argmax()), int(rows[:, 2].argmin()), int(rows[:, 2].argmax())}:
+        limits.check_circle(*rows[worst])
 
 
 def _everyone(sim: Simulation) -> np.ndarray:

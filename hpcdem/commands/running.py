@@ -17,6 +17,8 @@ from hpcdem.simulation import Simulation
 
 STEPBAR = 1000
 """Steps between progress reports and rows of walls.csv when the script sets none."""
+MOST_STEPS = 2**53
+"""Steps are counted exactly up to here, in frames and histories too."""
 KINDS = ("print", "vtk", "ps", "save")
 
 
@@ -77,6 +79,8 @@ def stop(sim: Simulation) -> None:
 
 
 def _nearest(steps: float) -> int:
+    if not steps <= MOST_STEPS:
+        raise CommandError(f"that would take {steps:g} steps")
     return math.floor(steps + 0.5)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hpcdem import limits
 from hpcdem.errors import CommandError
 from hpcdem.model.walls import BOX_IDS
 from hpcdem.simulation import Simulation
@@ -26,6 +27,7 @@ def wall(
     if nodes is not None and not np.isfinite(nodes).all():
         raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
     if nodes is not None:
+        limits.check_nodes(*nodes, name=f"wall {id}")
         forget(sim, sim.walls.find(id))
         sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
     at = sim.walls.row(id)
@@ -61,6 +63,8 @@ def box(
         "bottom": ((left, bottom), (right, bottom)),
         "top": ((right, top), (left, top)),
     }  # inside lies to the left of P1 -> P2
+    for side, nodes in corners.items():
+        limits.check_nodes(*nodes, name=f"the {side} side of the BOX")
     for side, (p1, p2) in corners.items():
         forget(sim, sim.walls.find(BOX_IDS[side]))
         _set(sim, sim.walls.put(BOX_IDS[side], p1, p2, one_sided=True), kn, ks, fric)

@@ -1,14 +1,16 @@
 """`.sav` files: HDF5, in the order of ids, free of ranks and threads.
 
 Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
-one dataset per column. The root attribute `sums` (JSON) holds the 64-bit words of each dataset added up modulo 2^64; it
-is compared after writing, before the file gets its name, and again on reading.
+one dataset per column. The root attribute `sums` (JSON) holds the 64-bit words of each dataset added up modulo 2^64,
+and `crc` the CRC-32 of `state` and `sums`; they are compared after writing, before the file gets its name, and again on
+reading.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,7 +22,7 @@ from hpcdem.io.frame import Table
 from hpcdem.io.h5 import Writer, reading
 
 FORMAT = "hpcdem checkpoint"
-VERSION = 1
+VERSION = 2
 
 
 def word_sum(values: np.ndarray) -> int:
@@ -28,6 +30,10 @@ def word_sum(values: np.ndarray) -> int:
     wide = np.ascontiguousarray(values)
     wide = wide.view(np.uint64) if wide.dtype.itemsize == 8 else wide.astype(np.int64).view(np.uint64)
     return int(np.add.reduce(wide.ravel(), dtype=np.uint64)) if wide.size else 0
+
+
+def _crc(state: str, sums: str) -> int:
+    return zlib.crc32(sums.encode("utf-8", "surrogateescape"), zlib.crc32(state.encode("utf-8", "surrogateescape")))
 
 
 def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Any) -> None:
@@ -44,8 +50,8 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
                     part = np.array([word_sum(values)], dtype=np.uint64)
                     sums[full] = int(sum(comm.allgather(int(part[0]))) % (1 << 64))
                     writer.slabs(full, values, table.offset, table.total)
-            header = {"format": FORMAT, "version": VERSION, "state": json.dumps(state), "sums": json.dumps(sums)}
-            writer.group("/", header)
+            texts = {"state": json.dumps(state), "sums": json.dumps(sums)}
+            writer.group("/", {"format": FORMAT, "version": VERSION, **texts, "crc": _crc(**texts)})
         except BaseException:
             writer.abandon()
             raise
@@ -70,7 +76,10 @@ def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, n
                 raise HpcdemError(
                     f"{os.fspath(path)} has checkpoint version {version}, this program reads up to {VERSION}"
                 )
-            state, sums = json.loads(file.attrs["state"]), json.loads(file.attrs["sums"])
+            texts = {name: str(file.attrs[name]) for name in ("state", "sums")}
+            if version > 1 and int(file.attrs["crc"]) != _crc(**texts):
+                raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of its state is wrong")
+            state, sums = json.loads(texts["state"]), json.loads(texts["sums"])
             tables: dict[str, dict[str, np.ndarray]] = {}
             for full, expected in sums.items():
                 table, name = full.split("/")
@@ -78,6 +87,6 @@ def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, n
                 if word_sum(values) != expected:
                     raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
                 tables.setdefault(table, {})[name] = values
-        except (KeyError, OSError, ValueError, RuntimeError) as problem:
+        except (AttributeError, KeyError, OSError, TypeError, ValueError, RuntimeError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is damaged: {problem}") from None
     return state, tables

@@ -10,6 +10,8 @@ from hpcdem.errors import ScriptError
 from hpcdem.lang.zdem.lexer import COMMENT, LINE_END, SEPARATORS
 from hpcdem.lang.zdem.table import ZDEM
 
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
 _PCDC_LINE = re.compile(rb"^[ \t]*pcdc[ \t]+[A-Za-z]", re.MULTILINE)
 _PYTHON_LINE = re.compile(
     rb"""^[ \t]*( import[ \t]+\w | from[ \t]+\S+[ \t]+import\b | (def|class)[ \t] | (for|while|if|with)\b.*:
@@ -26,6 +28,8 @@ def kind(source: bytes | str, file: str = "script") -> str:
     """
     if isinstance(source, str):
         source = source.encode("utf-8", errors="surrogatepass")
+    if source.startswith(_UTF_16):
+        raise ScriptError(file, 1, "the file is UTF-16 text; save it as UTF-8")
     source = source.removeprefix(b"\xef\xbb\xbf")
     tree, trouble = _python(source)
     if tree is not None and any(isinstance(node, (ast.Import, ast.ImportFrom)) for node in ast.walk(tree)):
@@ -44,10 +48,11 @@ def kind(source: bytes | str, file: str = "script") -> str:
             line = trouble.lineno or line
             raise ScriptError(file, line, f"this looks like Python, but is not correct: {trouble.msg}")
         raise ScriptError(file, line, "this is Python that imports nothing; a Python script must import hpcdem")
+    shown = "".join(char if char.isprintable() else "?" for char in word[:40])
     raise ScriptError(
         file,
         line,
-        f"'{word[:40]}' begins no script that hpcdem knows: neither a ZDEM command{ZDEM.hint(word)}, "
+        f"'{shown}' begins no script that hpcdem knows: neither a ZDEM command{ZDEM.hint(word)}, "
         "nor a pcdc command, nor Python",
     )
 

@@ -217,17 +217,18 @@ class Log:
 
     # -- the end ---------------------------------------------------------------------------------------------
 
-    def stages(self, timers: Timers, comm: Any) -> None:
+    def stages(self, timers: Timers, comm: Any) -> Summary:
         """Collective: the table of stages."""
         summary = timers.merge(comm)
         if not self._speaks:
-            return
+            return summary
         self.command_finished()
         if self._terminal:
             print_table(summary, self._stream)
         else:
             self._print(stage_text(summary))
         self._print(closing_line(summary))
+        return summary
 
 
 def bonds(status: StepStatus) -> str:

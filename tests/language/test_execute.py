@@ -201,10 +201,11 @@ def test_a_file_that_is_not_there(tmp_path):
 def test_rank_0_looks_for_files(tmp_path):
     class Comm:
         rank = 1
+        answers = iter([None, "/from/rank/0"])  # no folder is missing; where the file is
 
         def bcast(self, found):
             assert found is None
-            return "/from/rank/0"
+            return next(self.answers)
 
     sim, recorder = Sim(), Recorder()
     sim.comm = Comm()

@@ -2,173 +2,19 @@
 
 from __future__ import annotations
 
+import io
+import json
+
 import pytest
 
-from hpcdem.errors import EXIT_USAGE, ScriptError
-from hpcdem.lang.zdem.parser import parse_text
-
-BEFORE = "START\nSET DT 5e-2\nWALL id 1 nodes (0 0) (0 10) xv 2.0\nHIST id 1 interval 10 kinetic\n"
-
-# A line that follows BEFORE, and a part of what must be said about it.
-LINES = [
-    # words
-    ("WALLY id 1 xv 1", "expected a command; did you mean 'WALL'?"),
-    ("foo", "expected a command; commands are START"),
-    ("CY 100", "expected a command"),
-    ("5000", "every line begins with a command"),
-    ("RANGE y 0 1", "RANGE is no command"),
-    ("设置 速度", "a comment begins with #"),
-    ("沉积4 #####", "a comment begins with #"),
-    ("PROP fric 0.3 frci 0.2", "did you mean 'fric'?"),
-    ("PROP fric 0.3 fric 0.2", "fric is given twice (column 15)"),
-    ("PROP den 1 density 2", "density is given twice"),
-    ("WALL id 1 0.3", "expected a keyword before this number"),
-    ("CYC 100 200", "expected the end of the line"),
-    ("STOP now", "expected the end of the line"),
-    ("SET DT 5e-2 GRAVITYY 0 -9.8", "did you mean 'gravity'?"),
-    ("BOND RANGE y 0 1", "expected 'break'"),
-    ("BOND brake RANGE y 0 1", "expected 'break'"),
-    ("BOND", "the line ends where 'break' is expected"),
-    ("IMPLE id 1 xmove 100", "expected 'wall'"),
-    ("IMPLE wall id 1 xmvoe 100", "did you mean 'xmove'?"),
-    ("WALL id 1 xv 2 RANGE y 0 1", "WALL takes no RANGE"),
-    ("CYC 10 RANGE y 0 1", "CYC takes no RANGE"),
-    # numbers
-    ("CYC", "the line ends where a whole number not below 0 for steps is expected"),
-    ("CYC many", "read 'many' at column 5, expected a whole number not below 0 for steps"),
-    ("CYC 1.5", "expected a whole number"),
-    ("CYC -5", "expected a whole number not below 0"),
-    ("CYC 1e300", "expected a whole number"),
-    ("CYC 1e999", "too large"),
-    ("CYC 5OOO", "read '5OOO'"),
-    ("CYC {top}", "variables may stand in RANGE"),
-    ("WALL id one xv 1", "expected a whole number not below 0 for id"),
-    ("WALL id -1 xv 1", "expected a whole number not below 0 for id"),
-    ("WALL id 1 fric -0.3", "expected a number not below 0 for fric"),
-    ("WALL id 1 fric", "the line ends where a number not below 0 for fric is expected"),
-    ("WALL id 1 xv fric 0.3", "read 'fric' at column 14, expected a number for xv"),
-    ("WALL id 1 xv 2,0", "expected a keyword before this number"),
-    ("PROP density -2500", "expected a number above 0 for density"),
-    ("PROP poiss 0.7", "expected a Poisson ratio above -1, at most 0.5"),
-    ("PROP damp 40", "expected a number from 0 to 1 for damp"),
-    ("PROP shear 2.9e9Pa", "read '2.9e9Pa'"),
-    ("PROP color 12", "expected a colour"),
-    ("PROP color pink", "expected a colour: lg (0), green (1)"),
-    ("SET DT 0", "expected a number above 0 for dt"),
-    ("SET DT nan", "expected a number above 0 for dt"),
-    ("SET DT inf", "expected a number above 0 for dt"),
-    ("SET GRAVITY -9.8", "a second number for gravity"),
-    ("SET print 100.5", "expected a whole number for print"),
-    ("SET disk maybe", "expected on, off (or 0), or hex for disk"),
-    ("SET damp 0.4", "expected the word 'lsm' after damp"),
-    ("SET damp lsm -1", "expected a number not below 0"),
-    ("SET wallside right", "expected left or both"),
-    ("SET", "say what to set: dt, gravity"),
-    # shapes and places
-    ("WALL id 1 nodes (0 0) (0 0)", "the wall has no length"),
-    ("WALL id 1 nodes (0 0) (10)", "the line ends"),
-    ("WALL id 1 nodes (0 0 10 xv 2)", "expected a second number for nodes: two points"),
-    ("WALL xv 2.0", "id missing; for example: WALL"),
-    ("WALL id 1", "nothing to do"),
-    ("WALL", "id missing"),
-    ("WALL id 9 xv 2", "there is no wall 9 yet (walls so far: 1)"),
-    ("BOX left 0 right 10 bottom 0", "height missing; for example: BOX"),
-    ("BOX left 10 right 0 bottom 0 height 5", "right, 0.0, must be above left, 10.0"),
-    ("BOX left 0 right 10 bottom 0 height -5", "expected a number above 0 for height"),
-    ("BALL id 1 x 0 y 0 rad -1", "expected a number above 0 for rad"),
-    ("BALL id 1 x 0 y 0", "rad missing"),
-    ("BALL id 1 x 0 y 0 rad 0", "expected a number above 0 for rad"),
-    ("GEN num 100 rad discrete x (0 10) y (0 10)", "read 'x' at column 26, expected a number above 0 for rad"),
-    ("GEN num 100 rad 60 80 x (0 10) y (0 10)", "expected the word 'discrete' after rad"),
-    ("GEN num 100 rad discrete 1 -2 x (0 10) y (0 10)", "read '-2'"),
-    ("GEN num 0 rad discrete 1 x (0 10) y (0 10)", "expected a whole number above 0 for num"),
-    ("GEN num 10.4 rad discrete 1 x (0 10) y (0 10)", "expected a whole number above 0 for num"),
-    ("GEN num 100 rad discrete 1 x (10 0) y (0 10)", "the lower bound of x, 10.0, is above the upper bound, 0.0"),
-    ("GEN num 100 rad discrete 1 x (0 10)", "y missing"),
-    ("GEN rad discrete 1 x (0 10) y (0 10)", "give either num <int> or grid"),
-    ("GEN num 5 grid rad discrete 1 x (0 10) y (0 10)", "give either num <int> or grid"),
-    ("GEN num 5 idmin 1 rad discrete 1 x (0 10) y (0 10)", "idmin belongs to GEN grid"),
-    ("GEN num 5 rad discrete 6 x (0 10) y (0 20)", "too narrow for a particle"),
-    ("GEN num 5 rad discrete 1 x ({tpo} 10) y (0 20)", "did you mean 'top'?"),
-    ("GEN num 5 rad discrete 1 x ({top} - 10) y (0 20)", "read '-'"),
-    ("GLINE p1 (0 0) p2 (0 0) rad 1", "p1 and p2 are the same point"),
-    ("GLINE p1 (0 0) p2 (9 0) rad 1 cratio 0", "expected a number above 0, at most 1 for cratio"),
-    ("GLINE p1 (0 0) p2 (9 0)", "rad missing"),
-    # RANGE
-    ("DEL RANGE", "the line ends where a term"),
-    ("DEL y 0 1", "expected a keyword: RANGE"),
-    ("DEL RANGE y 0", "the line ends where the upper bound of y is expected"),
-    ("DEL RANGE y 2 1", "the lower bound of y, 2.0, is above the upper bound, 1.0"),
-    ("DEL RANGE y 0 1 2", "is there a number too many?"),
-    ("DEL RANGE z 0 1", "expected one of x, y, P4"),
-    ("DEL RANGE and y 0 1", "before it"),
-    ("DEL RANGE y 0 1 or", "the line ends where a term"),
-    ("DEL RANGE y 0 1 and or x 0 1", "before it"),
-    ("DEL RANGE P4 (0 0) (1 0) (1 1)", "number 7 of the 8 numbers of P4"),
-    ("DEL RANGE ellipse (0 0) 1 -1", "a half axis of ellipse is -1.0"),
-    ("DEL RANGE id 5 2", "the first id, 5, is above the last, 2"),
-    ("DEL RANGE group", "the line ends where a group name is expected"),
-    ("DEL RANGE y {top}-", "missing at the end"),
-    ("DEL RANGE y {top} -1000 {top}", "expected one of x, y, P4"),
-    ("PROP RANGE y 0 1", "nothing to set before RANGE"),
-    ("PROP group RANGE y 0 1", "expected a group name"),
-    ("PROP RANGE y 0 1 fric 0.3", "RANGE stands last"),
-    ("FIX RANGE y 0 1", "say which of x, y, spin"),
-    # bonds, histories, files, running
-    ("PROP", "nothing to set"),
-    ("PROP ebmod 1e8 n_bond 1e4", "belong to different bond models"),
-    ("HIST id 5 interval 10", "say what to record"),
-    ("HIST id 5 interval 0 step", "expected a whole number above 0 for interval"),
-    ("HIST id 5 interval 10 potential", "expected a keyword"),
-    ("PLOT hist 2 1", "there is no history 2; HIST makes one"),
-    ("PLOT", "the line ends"),
-    ("EXP", "the line ends where a file name is expected"),
-    ("EXP RANGE y 0 1", "expected a file name"),
-    ("SAV", "the line ends where a file name is expected"),
-    ('SAV "a.sav"', "without quotes"),
-    ("IMPLE wall id 7 xmove 100", "there is no wall 7 (walls so far: 1)"),
-    ("IMPLE wall id 1 ymove 100", "wall 1 does not move; give it a velocity with WALL id 1 yv"),
-    ("IMPLE wall id 1 xmove 0", "expected a distance other than 0"),
-    ("IMPLE wall id 1 xmove 1 ymove 1", "give one distance"),
-    ("IMPLE wall id 1 print 100", "give one distance"),
-    ("IMPLE wall id 1 xmove 1e300", "would take 1e+301 steps"),
-    ("IMPLE wall xmove 100", "id missing"),
-    ("IMPLE wall id 1 xmove 10 print -1", "expected a number not below 0 for print"),
-    ("RES a.sav", "only be the first command"),
-    ("LOAD a.dat", "only be the first command"),
-    ("START", "only be the first command"),
-    ("START again", "expected the end of the line"),
-    # characters
-    ("SET DT，5e-2", "type an ordinary ','"),
-    ("CYC 5000\x00", "control character U+0000"),
-    ("CYC \u202e5000", "control character U+202E"),
-    ("CYC " + "9" * 5000, "expected a whole number"),
-    ("x" * 5000 + " 1", "..."),
-]  # fmt: skip
-
-# Whole scripts, the line of the error, and a part of what must be said.
-SCRIPTS = [
-    (b"", 1, "there is no command in the script; the first must be START, RESTORE or LOAD"),
-    (b"\xef\xbb\xbf", 1, "there is no command"),
-    (b"# only a title\n\n; and this\n", 1, "there is no command"),
-    (b"\r\n\r\n", 1, "there is no command"),
-    (b"SET disk off\nSTART\n", 1, "the first command is SET; it must be START, RESTORE or LOAD"),
-    (b"\n\nSTOP\n", 3, "the first command is STOP"),
-    (b"CYC 100", 1, "the first command is CYC"),
-    (b"RESTORE\n", 1, "the line ends where a file name is expected"),
-    (b"LOAD a.dat x 1\n", 1, "the upper bound of x"),
-    (b"LOAD a.dat scale 0\n", 1, "expected a number above 0 for scale"),
-    (b"START\nCYC 100\n", 2, "there is no time step yet"),
-    (b"START\nSET DT 1\nWALL id 1 nodes 0 0 1 1\nIMPLE wall id 1 xmove 1", 4, "wall 1 does not move"),
-    (b"START\nSET DT 1\nIMPLE wall id 1 xmove 1", 3, "there is no wall 1 (walls so far: none)"),
-    (b"START\nSAV \xc9\xfa.sav\n", 2, "is not UTF-8"),
-    (b"\xff\xfeS\x00T\x00A\x00R\x00T\x00", 1, "UTF-16"),
-    (b"START\n\x7fELF\x02\x01\x01", 2, "control character"),
-    (b"\x89PNG\r\n\x1a\n\x00", 1, "is not UTF-8"),
-    (b"\x89HDF\r\n\x1a\n", 1, "is not UTF-8"),
-    (b"import hpcdem\nsim = hpcdem.Simulation()\n", 1, "read 'import' at column 1, expected a command; did you mean"),
-    (b"{\n}\n", 1, "expected a command"),
-]
+from hpcdem.errors import EXIT_USAGE, HpcdemError, ScriptError, UsageError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.lang import detect
+from hpcdem.lang.zdem.execute import Interpreter
+from hpcdem.lang.zdem.parser import parse_text, read_script
+from hpcdem.runtime.progress import Log
+from hpcdem.simulation import Simulation
+from tests.language.hostile import BEFORE, BEGIN, BOX, COORDINATES, LINES, RUNS, SCRIPTS, spoiled
 
 
 def error_of(source):
@@ -225,3 +71,208 @@ def test_every_line_cut_short_is_found_or_complete(line):
             parse_text(BEFORE + " ".join(words[:n]), "push.py")
         except ScriptError as error:
             assert error.line == 5
+
+
+# ---- in a folder with results of an earlier run --------------------------------------------------------------------
+
+GOOD = (
+    f"START\nSET gravity 0 -1\n{BOX}BALL id 1 x 5 y 5 rad 1\nBALL id 2 x 9 y 5 rad 1\nPROP density 1 kn 1\n"
+    "WALL id 4 nodes 0 0 9 0\nHIST id 7 interval 9 step\n"
+)
+
+
+@pytest.fixture(scope="module")
+def good_checkpoint(tmp_path_factory) -> bytes:
+    """A restart file that is whole."""
+    folder = tmp_path_factory.mktemp("good")
+    Interpreter(parse_text(GOOD + "SAV good.sav", str(folder / "a.py"))).run(Simulation(outdir=folder / "data"))
+    return (folder / "good.sav").read_bytes()
+
+
+@pytest.fixture
+def workplace(tmp_path, good_checkpoint):
+    """A folder in which somebody has worked before."""
+    data, folder = tmp_path / "data", tmp_path / "folder"
+    data.mkdir()
+    folder.mkdir()
+    for name in ("all_0000000000_ini.dat", "all_0000000100.vtkhdf", "0000000100.sav", "hist_7.dat", "walls.csv"):
+        (data / name).write_text(f"{name} of an earlier run\n")
+    (folder / "notes").write_text("a folder that is no file\n")
+    (tmp_path / "file.txt").write_text("a file that is no folder\n")
+    (tmp_path / "good.dat").write_text("1 2 1\n5 2 1\n")
+    (tmp_path / "good.sav").write_bytes(good_checkpoint)
+    return tmp_path
+
+
+def contents(folder) -> dict[str, bytes | None]:
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
+def run_as_the_program_does(path, comm=None):
+    """The way of a script from its bytes to its end."""
+    source = path.read_bytes()
+    assert detect.kind(source, str(path)) == "zdem"
+    comm = comm or SerialComm()
+    sim = Simulation(comm, 1, path.parent / "data", Log(comm.rank, io.StringIO()))
+    try:
+        Interpreter(parse_text(source, str(path))).run(sim)
+    finally:
+        sim.release()
+
+
+def refused(workplace, source: str | bytes, expected: str, line: int | None = None) -> HpcdemError:
+    """The script is refused in one line that names its file and line, and no file has changed."""
+    path = workplace / "script.py"
+    path.write_bytes(source if isinstance(source, bytes) else source.encode())
+    before = contents(workplace)
+    with pytest.raises(HpcdemError) as caught:
+        run_as_the_program_does(path)
+    message = str(caught.value)
+    assert contents(workplace) == before
+    assert expected in message and "\n" not in message and len(message) < 900
+    assert message.isprintable()
+    wanted = line if line is not None else source.rstrip().count(b"\n" if isinstance(source, bytes) else "\n") + 1
+    assert message.startswith(f"{path}:{wanted}: ")
+    assert caught.value.exit_code != 0
+    return caught.value
+
+
+def line_of(source: str, message: str) -> int:
+    """Where the command that the message begins with stands last in the script."""
+    word = message.split(":")[0].lower()[:3]
+    return max((n for n, text in enumerate(source.split("\n"), 1) if text.lower().startswith(word)), default=0)
+
+
+@pytest.mark.parametrize(("source", "message"), RUNS, ids=[f"{i}:{m[:30]}" for i, (_, m) in enumerate(RUNS)])
+def test_scripts_that_cannot_be_carried_out(workplace, source, message):
+    command = message.split(":")[0]
+    line = line_of(source, message) if command.isupper() else None
+    refused(workplace, source, message, line)
+
+
+@pytest.mark.parametrize("name", COORDINATES)
+def test_files_that_are_no_coordinates(workplace, name):
+    (workplace / "bad.dat").write_bytes(COORDINATES[name])
+    for before, line in (("", 1), ("START\n", 2)):
+        refused(workplace, before + "LOAD bad.dat\nSET dt 1\nCYC 1\n", "LOAD: ", line)
+
+
+SPOILED = list(spoiled(b"SNOD" + bytes(200)))
+
+
+@pytest.mark.parametrize("name", SPOILED)
+def test_files_that_are_no_checkpoint(workplace, good_checkpoint, name):
+    (workplace / "bad.sav").write_bytes(spoiled(good_checkpoint)[name])
+    refused(workplace, "RES bad.sav\nSET dt 1\nCYC 1\n", "RESTORE: ", 1)
+
+
+def test_frames_and_scripts_are_no_checkpoint(workplace):
+    (workplace / "frame.py").write_text("START\nSET dt 1\nCYC 0\n")
+    run_as_the_program_does(workplace / "frame.py")
+    refused(workplace, "RES all_0000000000_ini.vtkhdf\n", "is not an hpcdem checkpoint", 1)
+    refused(workplace, "RES all_0000000000_ini.dat\n", "RESTORE: ", 1)
+    refused(workplace, "RES frame.py\n", "RESTORE: ", 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("absent.py", "absent.py"), ("folder", "folder"), ("file.txt/a.py", "a.py"), ("a" * 300, "aaa"), ("a\0b", "a")],
+)
+def test_scripts_that_cannot_be_read(workplace, name, message):
+    with pytest.raises(UsageError, match="cannot read the script") as caught:
+        read_script(workplace / name)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        b"\xef\xbb\xbfSTART\nSET DT 1\n",
+        b"START\rSET DT 1\r",
+        b"START\r\nSET DT 1\r\n",
+        b"\n\n  START  # x\n\tSET\tDT\t1",
+        b"START\nSET DT 1",
+        b"start # \xc9\xfa\nSET DT 1\n",
+        b"START\n\n\n\nSET DT 1\nSTOP\n\x00\xff garbage",
+    ],
+)
+def test_odd_but_good(workplace, source):
+    """Byte order mark, any ends of lines, blanks, comments in another encoding, anything after STOP."""
+    path = workplace / "script.py"
+    path.write_bytes(source)
+    run_as_the_program_does(path)
+    assert [s.command for s in read_script(path).statements][:2] == ["START", "SET"]
+
+
+def test_a_full_box_ends_well(workplace):
+    """It is told (see test_rules), and is no error: the manual's scripts ask for far more than fits."""
+    path = workplace / "script.py"
+    path.write_text(BEGIN + "GEN grid rad discrete 1 x 0 20 y 0 20\nGEN num 100 rad discrete 1 x 0 20 y 0 20\nSTOP\n")
+    run_as_the_program_does(path)
+
+
+def test_there_are_enough_of_them():
+    """Scripts and files that are refused, each another way; those with other ends of lines not counted."""
+    collection = {*[line for line, _ in LINES], *[source for source, *_ in SCRIPTS], *[source for source, _ in RUNS]}
+    assert len(collection) == len(LINES) + len(SCRIPTS) + len(RUNS), "none stands there twice"
+    assert len(collection) + len(COORDINATES) + len(SPOILED) >= 300
+
+
+# ---- through the program -------------------------------------------------------------------------------------------
+
+ON_RANKS = """
+import json, sys
+from pathlib import Path
+from hpcdem.runtime import ending, launch
+launch.prepare_environment(1)
+comm = launch.start_mpi()
+sys.path[:0] = [{root!r}, {here!r}]
+from test_hostile import run_as_the_program_does
+
+def work():
+    told = []
+    for number, source in enumerate(json.loads(Path("sources.json").read_text())):
+        path = Path(f"script_{{number}}.py")
+        if comm.rank == 0:
+            path.write_text(source)
+        comm.barrier()
+        try:
+            run_as_the_program_does(path, comm)
+            said = "nothing"
+        except Exception as error:
+            said = f"{{type(error).__name__}} {{error}}"
+        told.append(comm.allgather(said))
+    if comm.rank == 0:
+        Path("told.json").write_text(json.dumps(told))
+
+ending.leave(ending.run_together(comm, work))
+"""
+
+
+@pytest.mark.mpi
+def test_two_ranks_refuse_alike(workplace, launch, request):
+    """What is found out in mid-run is found out by both, and neither waits for the other."""
+    (workplace / "sources.json").write_text(json.dumps([source for source, _ in RUNS]))
+    here = request.path.parent
+    (workplace / "ranks.py").write_text(ON_RANKS.format(root=str(here.parent.parent), here=str(here)))
+    done = launch.python(2, "ranks.py", cwd=workplace, timeout=120)
+    assert done.returncode == 0, done.stderr
+    told = json.loads((workplace / "told.json").read_text())
+    for (_, message), (first, second) in zip(RUNS, told, strict=True):
+        assert first == second and message in first
+
+
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [(BEFORE + "CYC many\n", "script.py:5: CYC: read 'many'"), ("", "script.py:1: there is no command"),
+     (b"\x7fELF\x02\x00", "script.py:1: "), ("RES absent.sav", "script.py:1: RESTORE: there is no file"),
+     (BEGIN + "CYC 0\nEXP folder", "script.py:4: EXP: folder is a folder")],
+)  # fmt: skip
+def test_a_sample_through_the_program(workplace, launch, source, message, ranks):
+    (workplace / "script.py").write_bytes(source if isinstance(source, bytes) else source.encode())
+    before = contents(workplace)
+    done = launch(ranks, "script.py", cwd=workplace, timeout=120)
+    assert done.returncode == EXIT_USAGE
+    assert done.stderr.count(message) == 1 and "Traceback" not in done.stdout + done.stderr
+    assert contents(workplace) == before

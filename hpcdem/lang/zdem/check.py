@@ -1,42 +1,42 @@
 """``hpcdem --check script``: what a script would do, told without doing it.
 
-Particle numbers and file sizes are estimates made from the script alone, meant for choosing a machine and a disk.
+Particle numbers, file sizes and times are estimates, meant for choosing a machine and a disk.
 """
 
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from hpcdem.errors import HpcdemError, ScriptError
 from hpcdem.lang.zdem import plan
-from hpcdem.lang.zdem.execute import find
+from hpcdem.lang.zdem.estimate import estimate, kind_of
+from hpcdem.lang.zdem.execute import find, refuse_lost_files
 from hpcdem.lang.zdem.parser import Script
 from hpcdem.lang.zdem.plan import Run
 from hpcdem.lang.zdem.statement import Statement
-from hpcdem.selection import has_expressions
-
-JAMMED = 0.547
-"""Share of the area that random insertion without overlap can cover (jamming of random sequential adsorption of disks;
-Feder 1980, J. Theor. Biol. 87, 237)."""
+from hpcdem.runtime import launch, speed
+from hpcdem.runtime.progress import rate
 
 BYTES_PER_PARTICLE: Mapping[str, int] = {"print": 2300, "ps": 40, "vtk": 190, "save": 260}
 """Size of one output per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
 "print" is the .dat and the .vtkhdf together."""
 
-LABELS = {
-    "print": "frames (.dat and .vtkhdf)",
-    "ps": "pictures (.ps)",
-    "vtk": ".vtk files",
-    "save": "restart files (.sav)",
+PATTERNS = {
+    "print": ("all_<step>.dat", "all_<step>.vtkhdf"),
+    "ps": ("all_<step>.ps",),
+    "vtk": ("all_<step>.vtk", "wall_<step>.vtk"),
+    "save": ("<step>.sav",),
 }
+"""Names of the files of each kind; <step> has ten digits, a frame before the first step of a command ends in _ini."""
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files of one kind: how many, and how many bytes together; None where unknown."""
+    """Files of one kind: how many (pairs of files count once), and how many bytes together; None where unknown."""
 
     files: int | None
     size: int | None
@@ -46,143 +46,146 @@ class Outputs:
 class Report:
     """What can be said beforehand; None stands for unknown.
 
-    runs: the CYC and IMPLE commands; made: particles that each statement makes at most, by index; particles: most that
-    can be there at once, deletions not counted; work: particle-steps at most; unexecuted: (line, words) that would be
-    refused; notes: what else the reader should know.
+    runs: the CYC and IMPLE commands; made: particles that each statement makes, by index; rough: indices of `made` that
+    are estimates; particles: most at once; work: particle-steps; certain: neither is an estimate; folder: of the
+    results; outputs: files at intervals, by kind; named: (name, what it is) of all other files; rate: particle-steps/s
+    per core, `measured` here or assumed; unexecuted: (line, words) that would be refused; notes: what else the reader
+    should know.
     """
 
     script: Script
     runs: tuple[Run, ...]
     steps: int | None
     made: Mapping[int, int | None]
+    rough: frozenset[int]
     particles: int | None
     work: int | None
+    certain: bool
+    folder: str
     outputs: Mapping[str, Outputs]
+    named: tuple[tuple[str, str], ...]
+    rate: float
+    measured: bool
     unexecuted: tuple[tuple[int, str], ...]
     notes: tuple[str, ...]
 
+    def seconds(self, cores: int) -> float | None:
+        """Time that the steps would take on so many cores [s], if the strips share the work evenly."""
+        return None if self.work is None else self.work / (self.rate * cores)
 
-def examine(script: Script) -> Report:
-    """Look through a script; reads the file that LOAD names, if it is there, and nothing else."""
+
+def examine(script: Script, outdir: Path | None = None) -> Report:
+    """Look through a script; reads the file that LOAD or RESTORE names, if it is there, and the rate of the last run.
+
+    outdir: folder of the results, if the script does not name one.
+    """
     statements = script.statements
-    runs = tuple(plan.follow(statements))
-    made = {index: n for index, s in enumerate(statements) if (n := _made(s, script.directory)) != 0}
-    populations = [_sum(n for index, n in made.items() if index < run.index) for run in runs]
+    restored = _restored(script)
+    runs = tuple(plan.follow(statements, **(restored["plan"] if restored else {})))
+    guess = estimate(statements, script.directory, restored["particles"] if restored else None)
+    per_core, measured = speed.recall(kind_of(statements))
     return Report(
         script=script,
         runs=runs,
         steps=_sum(run.steps for run in runs),
-        made=made,
-        particles=_sum(made.values()),
-        work=_sum(_product(run.steps, n) for run, n in zip(runs, populations)),
-        outputs={kind: _outputs(kind, statements, runs, populations) for kind in plan.OUTPUTS},
+        made=guess.made,
+        rough=frozenset(guess.rough),
+        particles=guess.most,
+        work=_sum(_product(run.steps, guess.before[run.index]) for run in runs),
+        certain=guess.certain,
+        folder=_folder(statements, outdir),
+        outputs={kind: _outputs(kind, runs, guess.before) for kind in plan.OUTPUTS},
+        named=tuple(_named(statements, runs, outdir)),
+        rate=per_core,
+        measured=measured,
         unexecuted=tuple((s.line, word) for s in statements for word in s.unexecuted),
-        notes=tuple(_notes(script, runs)),
+        notes=tuple(_notes(script, runs, restored is not None, outdir)),
     )
 
 
-# ---- particles -----------------------------------------------------------------------------------------------------
+def _restored(script: Script) -> dict[str, Any] | None:
+    """What the file of RESTORE holds, if it is there and whole: "plan": time step and walls, "particles"."""
+    for statement in script.statements[:2]:
+        path = find(script.directory, statement.get("file")) if statement.command == "RESTORE" else None
+        if path is None:
+            continue
+        from hpcdem.io import checkpoint
 
-
-def _made(statement: Statement, directory: Path) -> int | None:
-    """Particles that a statement makes at most."""
-    match statement.command:
-        case "RESTORE":
-            return None
-        case "LOAD":
-            return _rows(find(directory, statement.get("file")))
-        case "BALL":
-            return 1
-        case "GLINE":
-            (x1, y1), (x2, y2) = statement.get("p1"), statement.get("p2")
-            spacing = 2.0 * statement.get("rad") * statement.get("cratio", 1.0)
-            return _whole(_over(math.hypot(x2 - x1, y2 - y1), spacing) + 1e-9, 1)
-        case "GEN":
-            return _generated(statement)
-    return 0
-
-
-def _generated(statement: Statement) -> int | None:
-    if has_expressions((statement.get("x"), statement.get("y"))):
-        return statement.get("num")
-    (x1, x2), (y1, y2) = statement.get("x"), statement.get("y")
-    radii = statement.get("rad")
-    if "grid" in statement.arguments:
-        side = 2.0 * max(radii)
-        columns, rows = _whole(_over(x2 - x1, side) + 1e-9), _whole(_over(y2 - y1, side) + 1e-9)
-        return _product(columns, rows)
-    disk = math.pi * sum(r * r for r in radii) / len(radii)
-    fits = _whole(_over(JAMMED * (x2 - x1) * (y2 - y1), disk), 1)
-    return statement.get("num") if fits is None else min(statement.get("num"), fits)
-
-
-def _rows(path: str | None) -> int | None:
-    if path is None:
-        return None
-    try:
-        with open(path, "rb") as file:
-            return sum(1 for line in file if line.strip())
-    except OSError:
-        return None
+        try:
+            state, tables = checkpoint.read(path)
+            walls = dict(zip(state["walls"]["id"], map(tuple, state["walls"]["v"])))
+            return {"plan": {"dt": state["settings"]["dt"] or None, "walls": walls}, "particles": tables["particles"]}
+        except (HpcdemError, KeyError, TypeError):
+            return None  # told when the script is run
+    return None
 
 
 # ---- output files --------------------------------------------------------------------------------------------------
 
 
-def _outputs(
-    kind: str, statements: Sequence[Statement], runs: Sequence[Run], populations: Sequence[int | None]
-) -> Outputs:
-    files = [_files(kind, run, statements[run.index].command) for run in runs]
-    size = _sum(_product(_product(n, here), BYTES_PER_PARTICLE[kind]) for n, here in zip(files, populations))
-    named = sum(s.command == "SAV" for s in statements) if kind == "save" else 0
-    return Outputs(_sum([*files, named]), size)
+def _outputs(kind: str, runs: Sequence[Run], populations: Mapping[int, int | None]) -> Outputs:
+    files = [run.files(kind) for run in runs]
+    sizes = [_product(n, populations[run.index]) for n, run in zip(files, runs)]
+    return Outputs(_sum(files), _product(_sum(sizes), BYTES_PER_PARTICLE[kind]))
 
 
-def _files(kind: str, run: Run, command: str) -> int | None:
-    """Files of one kind that a CYC or IMPLE writes; frames with the one at its start and, for IMPLE, at its end."""
-    every, steps = run.every[kind], run.steps
-    extra = 1 if kind == "print" else 0
-    if every == 0:
-        last = 1 if kind == "print" and command == "IMPLE" else 0
-        return extra + last
-    if every is None or steps is None:
-        return None
-    if command == "IMPLE":
-        last = 1 if kind == "print" and steps % every else 0
-        return extra + steps // every + last
-    # CYC counts from step 0; after RESTORE the start may be unknown, then this is right to one file.
-    start = run.start or 0
-    return extra + (start + steps) // every - start // every
+def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | None) -> list[tuple[str, str]]:
+    """Files that are written once, or grow."""
+    found = []
+    for s in statements:
+        if s.command in ("EXP", "SAV"):
+            found.append((s.get("file"), f"line {s.line}: {'particles' if s.command == 'EXP' else 'restart file'}"))
+    data = _folder(statements, outdir)
+    if runs:
+        found.append((f"{data}/walls.csv", "forces on the walls, a row each per stepbar"))
+        found.append((f"{data}/all_<last step>.jpg", "picture of the last frame"))
+    for s in statements:
+        if s.command == "HIST":
+            what = "kinetic energy" if "kinetic" in s.arguments else "step"
+            found.append((f"{data}/hist_{s.get('id')}.dat", f"line {s.line}: {what}"))
+        elif s.command == "PLOT":
+            found.append((f"{data}/hist_{s.get('y')}_vs_{s.get('x')}.txt", f"line {s.line}: history against history"))
+    return found
+
+
+def _folder(statements: Sequence[Statement], outdir: Path | None = None) -> str:
+    """Where the results go, as the user would say it."""
+    named = next((s.get("outdir") for s in reversed(statements) if s.get("outdir")), None)
+    return str(named or outdir or "data")
 
 
 # ---- words ---------------------------------------------------------------------------------------------------------
 
 
-def _notes(script: Script, runs: Sequence[Run]) -> list[str]:
+def _notes(script: Script, runs: Sequence[Run], restored: bool, outdir: Path | None) -> list[str]:
     notes = []
-    first = script.statements[0]
-    if first.command == "RESTORE":
-        notes.append("particles, walls and settings of the restart file are not looked at")
     for statement in script.statements[:2]:
-        name = statement.get("file")
-        if statement.command in ("RESTORE", "LOAD") and find(script.directory, name) is None:
-            notes.append(f"line {statement.line}: there is no file {name} beside the script, nor in data")
+        if statement.command not in ("RESTORE", "LOAD"):
+            continue
+        if find(script.directory, statement.get("file")) is None:
+            notes.append(
+                f"line {statement.line}: there is no file {statement.get('file')} beside the script, nor in data"
+            )
+        elif statement.command == "RESTORE" and not restored:
+            notes.append(f"line {statement.line}: {statement.get('file')} cannot be read")
+    try:
+        refuse_lost_files(script, outdir)
+    except ScriptError as error:
+        notes.append(f"line {error.line}: {error.message}; the script would be refused")
     if any(run.steps is None for run in runs):
         notes.append("steps of IMPLE are known when both SET DT and the velocity of the wall stand in the script")
-    if any(s.command == "DEL" for s in script.statements):
-        notes.append("particles are counted without the deletions of DEL")
     if script.statements[-1].command != "STOP":
         notes.append("there is no STOP; the script ends with its last line")
     return notes
 
 
-def summary(script: Script) -> str:
+def summary(script: Script, outdir: Path | None = None) -> str:
     """The report of a script as text."""
     from rich.console import Console
 
     # Wide enough for any line: tables must not be cut when the text goes to a file.
     console = Console(file=io.StringIO(), width=120, force_terminal=False, color_system=None)
-    print_report(examine(script), console)
+    print_report(examine(script, outdir), console)
     return console.file.getvalue().rstrip("\n")  # type: ignore[attr-defined]
 
 
@@ -203,29 +206,63 @@ def print_report(report: Report, console=None) -> None:
             str(statement.line),
             escape(statement.text),
             _count(steps[index]) if index in steps else "",
-            _at_most(report.made[index]) if index in report.made else "",
+            _estimated(report.made[index], index not in report.rough) if index in report.made else "",
         )
     console.print(commands)
     totals = Table(box=SIMPLE, show_header=False)
     totals.add_row("steps", _count(report.steps))
-    totals.add_row("particles", _at_most(report.particles))
-    totals.add_row("particle-steps", _at_most(report.work))
-    for kind, outputs in report.outputs.items():
-        size = f", about {_size(outputs.size)}" if outputs.size else ""
-        totals.add_row(LABELS[kind], _count(outputs.files) + size)
+    totals.add_row("particles, most at once", _estimated(report.particles, report.certain))
+    totals.add_row("particle-steps", _estimated(report.work, report.certain))
+    totals.add_row("time", escape(_time(report)))
     console.print(totals)
+    files = Table("files", "number", "size", box=SIMPLE)
+    for kind, outputs in report.outputs.items():
+        if outputs.files != 0:
+            size = f"about {_size(outputs.size)}" if outputs.size else ""
+            for name in PATTERNS[kind]:
+                files.add_row(escape(f"{report.folder}/{name}"), _count(outputs.files), size)
+                size = "(both)" if size else ""
+    for name, what in report.named:
+        files.add_row(escape(name), "1", escape(what))
+    if files.row_count:
+        console.print(files)
     for note in report.notes:
         console.print(escape(f"note: {note}"))
     for line, word in report.unexecuted:
         console.print(escape(f"line {line}: {word} is not carried out yet; the script would be refused"))
 
 
+def _time(report: Report) -> str:
+    """``about 2 min on 2 cores, 4 min on 1 (at 11M particle-steps/s per core, as measured in the last run here)``."""
+    cores = launch.cores()
+    one, all_of_them = report.seconds(1), report.seconds(cores)
+    if one is None or all_of_them is None:
+        return "unknown"
+    text = f"about {_spoken(one)} on 1 core" if cores == 1 else (
+        f"about {_spoken(all_of_them)} on {cores} cores, {_spoken(one)} on 1"
+    )  # fmt: skip
+    source = "as measured in the last run here" if report.measured else "assumed: no run was measured here yet"
+    return f"{text} (at {rate(report.rate)} particle-steps/s per core, {source})"
+
+
+def _spoken(seconds: float) -> str:
+    """Two digits at most: ``under 1 s``, ``46 s``, ``2.5 min``, ``14 h``, ``3 days``."""
+    for unit, size, upto in (("s", 1.0, 100.0), ("min", 60.0, 100.0), ("h", 3600.0, 48.0), ("days", 86400.0, 1e5)):
+        if seconds < upto * size:
+            number = seconds / size
+            return "under 1 s" if unit == "s" and number < 1.0 else f"{number:.2g} {unit}"
+    return "centuries"
+
+
 def _count(n: int | None) -> str:
     return "unknown" if n is None else f"{n:,}".replace(",", " ")
 
 
-def _at_most(n: int | None) -> str:
-    return "unknown" if n is None else f"at most {_count(n)}"
+def _estimated(n: int | None, certain: bool) -> str:
+    if n is None or certain or n == 0:
+        return _count(n)
+    digits = 10 ** max(len(str(n)) - 3, 0)
+    return f"about {_count(round(n / digits) * digits)}"
 
 
 def _size(n: int) -> str:
@@ -247,12 +284,3 @@ def _sum(numbers) -> int | None:
 
 def _product(a: int | None, b: int | None) -> int | None:
     return 0 if a == 0 or b == 0 else None if a is None or b is None else a * b
-
-
-def _over(a: float, b: float) -> float:
-    return a / b if b > 0.0 else math.inf
-
-
-def _whole(value: float, more: int = 0) -> int | None:
-    """Rounded down, plus `more`; None if it is beyond all sense."""
-    return math.floor(value) + more if value < 1e15 else None

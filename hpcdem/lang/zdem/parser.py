@@ -19,6 +19,9 @@ from hpcdem.lang.zdem.lexer import Line, Token
 from hpcdem.lang.zdem.nearest import hint
 from hpcdem.lang.zdem.statement import Statement
 
+LONGEST_NAME = 255
+"""Bytes in the name of a file, on all systems in use."""
+
 
 @dataclass(frozen=True)
 class Script:
@@ -323,6 +326,11 @@ class _LineParser:
         token = self.next(kind.meaning)
         if self.table.range_row.full == token.word:
             self.unexpected(token, kind.meaning)
+        longest = max(len(part.encode()) for part in token.text.split("/"))
+        if longest > LONGEST_NAME:
+            self.unexpected(
+                token, f"{kind.meaning}; this one is {longest} bytes long, at most {LONGEST_NAME} are possible"
+            )
         return token.text
 
     def choice(self, kind: t.Choice, name: str) -> str:

@@ -7,7 +7,7 @@ time step, the walls and the histories of the file are not known here; they coun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
@@ -23,13 +23,47 @@ class Run:
     """One CYC or IMPLE. index: of its statement; start: step it begins at; steps: how many; None where unknown.
 
     every: steps between outputs of each of OUTPUTS, 0 is off, None unknown; counted from step 0 for CYC, from the start
-    of the command for IMPLE.
+    of the command for IMPLE, which also writes a frame at its end.
     """
 
     index: int
     start: int | None
     steps: int | None
     every: Mapping[str, int | None]
+    imple: bool = False
+
+    def files(self, kind: str) -> int | None:
+        """Files of one kind that the command writes; frames with the one at its start. None if unknown.
+
+        CYC counts from step 0; where the start is unknown, after RESTORE, this is right to one file.
+        """
+        every, steps = self.every[kind], self.steps
+        frame = kind == "print"
+        if every == 0:
+            return frame + (frame and self.imple)
+        if every is None or steps is None:
+            return None
+        if self.imple:
+            return frame + steps // every + (frame and steps % every > 0)
+        start = self.start or 0
+        return frame + (start + steps) // every - start // every
+
+    def frames(self) -> Iterator[tuple[int, bool]] | None:
+        """(step, initial) of every frame in the order in which they are written; None if unknown."""
+        start, steps, every = self.start, self.steps, self.every["print"]
+        if start is None or steps is None or every is None:
+            return None
+        return self._frames(start, start + steps, every)
+
+    def _frames(self, start: int, end: int, every: int) -> Iterator[tuple[int, bool]]:
+        yield start, True
+        last = start
+        if every > 0:
+            first = start + every if self.imple else (start // every + 1) * every
+            for last in range(first, end + 1, every):
+                yield last, False
+        if (self.imple and last != end) or (self.imple and every == 0):
+            yield end, False
 
 
 @dataclass
@@ -43,6 +77,18 @@ class _Known:
     walls: dict[int, Velocity] = field(default_factory=dict)
     histories: set[int] = field(default_factory=set)
     every: dict[str, int | None] = field(default_factory=lambda: dict.fromkeys(OUTPUTS, 0))
+
+
+def frame_names(runs: Iterable[Run], suffix: str = ".dat") -> list[str] | None:
+    """Names of all frames of a script, each once, in order; None where something is unknown. As long as there are
+    frames: ask `Run.files` how many before."""
+    names: dict[str, None] = {}
+    for run in runs:
+        frames = run.frames()
+        if frames is None:
+            return None
+        names.update((f"all_{step:010d}{'_ini' if initial else ''}{suffix}", None) for step, initial in frames)
+    return list(names)
 
 
 def follow(
@@ -144,7 +190,7 @@ def _imple(index: int, statement: Statement, known: _Known) -> Run:
         distance = statement.get(name, 0.0)
         steps = steps_for(distance) if distance > 0.0 else 0
         every[name] = max(1, steps) if steps is not None and distance > 0.0 else steps
-    return Run(index, known.step, steps_for(statement.get("xmove", statement.get("ymove"))), every)
+    return Run(index, known.step, steps_for(statement.get("xmove", statement.get("ymove"))), every, imple=True)
 
 
 def _walls(known: _Known) -> str:

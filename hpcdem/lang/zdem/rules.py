@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from hpcdem.errors import ScriptError
+from hpcdem import limits
+from hpcdem.errors import CommandError, ScriptError
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.statement import Statement
 from hpcdem.selection import has_expressions
@@ -44,11 +47,20 @@ def _wall(s: Statement) -> None:
     if nodes is not None and nodes[0] == nodes[1]:
         x, y = nodes[0]
         raise s.error(f"the wall has no length, both nodes are ({x}, {y})")
+    if nodes is not None:
+        _within(s, limits.check_nodes, *nodes)
 
 
 def _box(s: Statement) -> None:
-    if s.get("right") <= s.get("left"):
-        raise s.error(f"right, {s.get('right')}, must be above left, {s.get('left')}")
+    left, right, bottom = s.get("left"), s.get("right"), s.get("bottom")
+    if right <= left:
+        raise s.error(f"right, {right}, must be above left, {left}")
+    _within(s, limits.check_nodes, (left, bottom), (right, bottom), "the BOX")
+    _within(s, limits.check_nodes, (left, bottom), (left, bottom + s.get("height")), "the BOX")
+
+
+def _ball(s: Statement) -> None:
+    _within(s, limits.check_circle, s.get("x"), s.get("y"), s.get("rad"))
 
 
 def _gen(s: Statement) -> None:
@@ -56,17 +68,14 @@ def _gen(s: Statement) -> None:
         raise s.error("give either num <int> or grid")
     if "idmin" in s.arguments and "grid" not in s.arguments:
         raise s.error("idmin belongs to GEN grid")
-    for axis in ("x", "y"):
-        low, high = s.get(axis)
-        if has_expressions((low, high)):
-            continue
-        if high - low < 2.0 * min(s.get("rad")):
-            raise s.error(f"the rectangle is {high - low:g} m in {axis}, too narrow for a particle")
+    if not has_expressions((s.get("x"), s.get("y"))):
+        _within(s, limits.check_rectangle, s.get("rad"), s.get("x"), s.get("y"), "grid" in s.arguments)
 
 
 def _gline(s: Statement) -> None:
     if s.get("p1") == s.get("p2"):
-        raise s.error("p1 and p2 are the same point")
+        raise s.error("p1 and p2 are the same point; BALL makes a single particle")
+    _within(s, limits.check_row, s.get("p1"), s.get("p2"), s.get("rad"), s.get("cratio", 1.0))
 
 
 def _prop(s: Statement) -> None:
@@ -86,6 +95,8 @@ def _degrees(s: Statement) -> None:
 def _set(s: Statement) -> None:
     if not s.arguments:
         raise s.error("say what to set: " + t.joined(option.name for option in _SET.options))
+    if "outdir" in s.arguments and _is_script(s, s.get("outdir")):
+        raise s.error(f"outdir {s.get('outdir')} is the script itself")
 
 
 def _imple(s: Statement) -> None:
@@ -98,11 +109,33 @@ def _hist(s: Statement) -> None:
         raise s.error("say what to record: kinetic or step")
 
 
+def _output(s: Statement) -> None:
+    name = s.get("file")
+    if _is_script(s, name):
+        raise s.error(f"{name} is the script itself, and would be overwritten")
+    if name.endswith(("/", os.sep)) or os.path.basename(name) in (".", ".."):
+        raise s.error(f"{name} is a folder, expected a file name")
+
+
+def _is_script(s: Statement, name: str) -> bool:
+    return os.path.normpath(os.path.join(os.path.dirname(s.file), name)) == os.path.normpath(s.file)
+
+
+def _within(s: Statement, check: Callable[..., None], *values: Any) -> None:
+    try:
+        check(*values)
+    except CommandError as error:
+        raise s.error(str(error)) from None
+
+
 _SET = next(command for command in t.COMMANDS if command.name == "SET")
 
 _RULES: dict[str, Callable[[Statement], None]] = {
     "WALL": _wall,
     "BOX": _box,
+    "BALL": _ball,
+    "EXP": _output,
+    "SAV": _output,
     "GEN": _gen,
     "GLINE": _gline,
     "PROP": _prop,

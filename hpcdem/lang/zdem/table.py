@@ -145,6 +145,7 @@ RATIO = Number("<float>", "a number above 0, at most 1", low=0.0, high=1.0, abov
 POISSON = Number("<float>", "a Poisson ratio above -1, at most 0.5", low=-1.0, high=0.5, above=True)
 INT = Number("<int>", "a whole number", integer=True)
 COUNT = Number("<int>", "a whole number above 0", integer=True, low=1)
+ASKED = Number("<int>", "a whole number from 1 to 1e9", integer=True, low=1, high=1e9)
 INDEX = Number("<int>", "a whole number not below 0", integer=True, low=0)
 TOLERANCE = Optional("[<float>]", "a number not below 0, or nothing", absent=1e-6)
 POINT = Point("(<float> <float>)", "two numbers (x y)")
@@ -298,7 +299,8 @@ _PROPERTIES = (
     Option("sstrength", "model 1 bond: cohesion", kind=NOT_NEGATIVE, unit="Pa"),
     Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
     Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
-    Option("tolerate", "largest gap that is bonded; the word alone keeps the default", kind=TOLERANCE, unit="m",
+    Option("tolerate", "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default",
+           kind=TOLERANCE, unit="m",
            default="1e-6"),
     Option("rext", "factor on the radii in the search for bonds, see cratio of GLINE", kind=POSITIVE, default="1"),
 )  # fmt: skip
@@ -359,7 +361,8 @@ COMMANDS = (
     ),
     Command(
         "LOAD",
-        "Begins a new calculation with the particles of a text file of columns x y r [group].",
+        "Begins a new calculation with the particles of a text file of columns x y r [group]. Bounds that leave nobody "
+        "are an error.",
         leading=(Option("file", "file of particles", kind=FILE, required=True),),
         options=(
             Option("scale", "factor on x, y and r", kind=POSITIVE, default="1"),
@@ -387,7 +390,9 @@ COMMANDS = (
     ),
     Command(
         "WALL",
-        "With nodes: makes a wall, or replaces the one of this id. Without: changes the properties given.",
+        "With nodes: makes a wall, or replaces the one of this id. Without: changes the properties given. Both sides "
+        "act, with the same properties, unless SET wallside left was given before; stiffnesses are for linear contacts "
+        "only.",
         options=(
             _id("number of the wall"),
             Option("nodes", "end points P1 and P2", kind=SEGMENT, unit="m"),
@@ -419,10 +424,11 @@ COMMANDS = (
         "GEN",
         "Fills a rectangle with particles. num: at random without overlap, until so many are placed or no more fit in "
         "(gentry times num attempts). grid: on a square lattice with a spacing of twice the largest radius. "
-        "The sides of the rectangle may be expressions.",
+        "The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an error, a full one "
+        "is not: the log says how many were placed.",
         longest="generate",
         options=(
-            Option("num", "particles asked for", kind=COUNT),
+            Option("num", "particles asked for", kind=ASKED),
             Option("grid", "one particle on every node of a lattice", source="S"),
             Option("idmin", "first id of a lattice", kind=INDEX, default="next free id", source="S"),
             _RADII,
@@ -462,7 +468,7 @@ COMMANDS = (
     ),
     Command(
         "EXP",
-        "Writes x y r of particles to a text file that LOAD reads.",
+        "Writes x y r of particles to a text file that LOAD reads. Its folder must be there before the run begins.",
         longest="export",
         leading=(Option("file", "file of particles", kind=FILE, required=True),),
         options=(Option("group", "the group as a fourth column"),),
@@ -532,7 +538,7 @@ COMMANDS = (
     ),
     Command(
         "SAV",
-        "Writes a restart file of this name, beside the script.",
+        "Writes a restart file of this name, beside the script. Its folder must be there before the run begins.",
         longest="save",
         source="S",
         leading=(Option("file", "restart file", kind=FILE, required=True, source="S"),),
@@ -565,11 +571,11 @@ COMMANDS = (
     ),
     Command(
         "DRAW",
-        "Live drawing in ZDEM; read, and only noted in the log.",
+        "Pictures in mid-run, draw_<step>.jpg, if the run was started with --draw; otherwise only noted in the log.",
         source="S",
         options=(
             Option("interval", "steps between two drawings", kind=COUNT, unit="steps", source="S"),
-            Option("bfill", "filled particles", source="S"),
+            Option("bfill", "particles filled, not as circles", source="S"),
             Option("wall", "walls", source="S"),
             *(Option(name, doc, source="W") for name, doc in (
                 ("bondc", "bonds"), ("bid", "ids"), ("bang", "rotations"), ("mesh", "search cells"),

@@ -111,9 +111,10 @@ def dip(x: np.ndarray, y: np.ndarray) -> float:
 
 
 def front(x: np.ndarray, y: np.ndarray, levels: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """The outermost x of the points in each interval of y (98 of 100 lie inside), and the middles of the intervals."""
-    at = [np.quantile(x[(y >= a) & (y < b)], side) for a, b in itertools.pairwise(levels)]
-    return np.array(at), (levels[:-1] + levels[1:]) / 2
+    """The border of a set of points: quantile `side` of x in each interval of y, and the middles of the intervals."""
+    rows = [x[(y >= a) & (y < b)] for a, b in itertools.pairwise(levels)]
+    assert all(map(len, rows)), "no particles at some height"
+    return np.array([np.quantile(row, side) for row in rows]), (levels[:-1] + levels[1:]) / 2
 
 
 def detachment(run: Run) -> None:
