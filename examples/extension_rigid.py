@@ -79,5 +79,5 @@ CYC 2500
 DEL range group fill3 and y 2950.0 99999.0
 CYC 500
 
-CYC 1                                   # begins with the frame that the figure at the end shows
+CYC 1                                   # writes a last frame as it begins
 STOP

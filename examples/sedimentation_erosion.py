@@ -69,5 +69,5 @@ IMPLE wall id 1 xmove 2000.0 print 500.0
 WALL id 1 xv 0.0
 DEL range y 3200.0 99999.0
 CYC 500
-CYC 1                                   # begins with the frame that the figure at the end shows
+CYC 1                                   # writes a last frame as it begins
 STOP

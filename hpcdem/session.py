@@ -74,9 +74,9 @@ class Session:
             if self.comm.rank == 0:
                 law = "hertz" if sim.materials.rows["hertz"].any() else "linear"
                 speed.remember_run(summary.particle_steps, summary.wall, self.comm.size * self.threads, law)
-        sim.release()
-        if self.figure and self.comm.rank == 0 and sim.log is not None:
+        if self.figure and sim.log is not None:
             draw_last_state(sim, sim.log)
+        sim.release()
 
     def close(self, failed: bool = False) -> None:
         """The end of the program: simulations that were not finished are."""
@@ -100,13 +100,27 @@ def rehearse(*threads: int) -> None:
 
 
 def draw_last_state(sim: Simulation, log: Log) -> None:
-    """The figure of the newest frame of this run, if there is one. Serial."""
+    """Collective: the figure of the present state, `all_<step>.jpg`, by rank 0. No steps, no figure."""
+    from hpcdem.io.frame import whole
     from hpcdem.io.frames import frame_name, read_frame
     from hpcdem.post import plots
 
-    if sim.last_frame is not None:
-        last = sim.outdir / frame_name(sim.last_frame[0], ".vtkhdf", sim.last_frame[1])
-        log.info(f"figure: {plots.plot_frame(read_frame(last, ('particles',)), last.with_suffix('.jpg'))}")
+    if not sim.timers.steps:
+        return
+    path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
+    if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
+        from hpcdem import observe, output
+
+        sim.close()
+        output.folder(sim)
+        frame = observe.frame(sim)
+        frame.tables = {"particles": frame.tables["particles"]}
+        frame = whole(frame, sim.comm)
+    elif sim.comm.rank == 0:
+        path = path.with_name(frame_name(sim.last_frame[0], ".jpg", sim.last_frame[1]))
+        frame = read_frame(path.with_suffix(".vtkhdf"), ("particles",))
+    if frame is not None:
+        log.info(f"figure: {plots.plot_frame(frame, path)}")
 
 
 def greet(comm: SerialComm, log: Log, cores_before: int, threads: int, warnings: list[str]) -> None:
