@@ -11,6 +11,7 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 42
+SET gentry 2.75                         # attempts per particle asked for
 
 BOX left -100.0 right 22100.0 bottom -100.0 height 5200.0
 WALL id 0 nodes (0.0, 0.0) (22000.0, 0.0)            color black

@@ -10,6 +10,7 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 44
+SET gentry 2.75                         # attempts per particle asked for
 
 BOX left -2100.0 right 15100.0 bottom -100.0 height 5000.0
 WALL id 1 nodes (0.0, 4800.0) (0.0, 0.0)             color blue

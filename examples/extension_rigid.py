@@ -11,6 +11,7 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 43
+SET gentry 2.75                         # attempts per particle asked for
 
 BOX left -100.0 right 19600.0 bottom -300.0 height 6300.0
 WALL id 1 nodes (0.0, 6000.0) (0.0, 0.0)             color blue

@@ -10,6 +10,7 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 45
+SET gentry 2.75                         # attempts per particle asked for
 
 # No BOX: the walls hold everything. The floor is deeper on the right, so that the block there brings its own root
 # along when it rises by 1.43 km.

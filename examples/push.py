@@ -10,6 +10,7 @@
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
 SET seed 20
+SET gentry 2.75                         # attempts per particle asked for
 
 # The space in which particles may be, a little wider than the model.
 BOX left -100.0 right 20100.0 bottom -100.0 height 6000.0

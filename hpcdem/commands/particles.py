@@ -16,6 +16,8 @@ from hpcdem.selection import Selection
 from hpcdem.simulation import Simulation
 
 NO_GROUP = "***"
+FAILURES = 1000
+"""Attempts without room in a row after which GEN gives up. Found from two published facts: see docs/physics.md."""
 
 
 def start(sim: Simulation) -> None:
@@ -110,15 +112,15 @@ def gen(
 ) -> int:
     """GEN num: random insertion without overlap into a rectangle; returns the number of particles made.
 
-    Gives up after SET gentry (2.75) attempts per particle asked for: scripts ask for far more than fit.
+    Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after SET
+    gentry attempts per particle asked for, if that is set.
     """
     limits.check_rectangle(radii, x, y, grid=False)
     limits.check_attempts(num, sim.settings.gentry)
     existing = _everyone(sim)
-    attempts = max(int(sim.settings.gentry * num), num)
-    rows, tried = packing.insert_randomly(
-        num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, attempts
-    )
+    factor = sim.settings.gentry
+    ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
+    rows, tried = packing.insert_randomly(num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, **ends)
     sim.streams += 1
     made = _add(sim, rows, sim.group_number(group), color)
     if sim.log is not None:

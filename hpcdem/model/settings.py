@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 @dataclass
 class Settings:
-    """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0."""
+    """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
+    attempts of GEN per particle asked for, 0 while not set."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -20,6 +21,6 @@ class Settings:
     print: int = 0
     ps: int = 0
     vtk: int = 0
-    seed: int = 1
+    seed: int = 2
     wallside: str = "both"
-    gentry: float = 2.75
+    gentry: float = 0.0

@@ -12,13 +12,14 @@ from hpcdem.physics.rng import uniform
 
 
 @njit(cache=True)
-def _insert(attempts, wanted, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, n_old, out):
+def _insert(attempts, in_a_row, wanted, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, n_old, out):
     """Place discs one by one; returns (placed, attempts used). head (nx, ny) i8, nxt (m,) i8: linked cells."""
     nx, ny = head.shape
     n = n_old
     placed = 0
     tried = 0
-    while placed < wanted and tried < attempts:
+    last = 0
+    while placed < wanted and tried < attempts and tried - last < in_a_row:
         r = radii[min(int(uniform(seed, stream, 3 * tried) * len(radii)), len(radii) - 1)]
         u = uniform(seed, stream, 3 * tried + 1)
         v = uniform(seed, stream, 3 * tried + 2)
@@ -50,6 +51,7 @@ def _insert(attempts, wanted, radii, x0, x1, y0, y1, seed, stream, cell, head, n
             out[placed] = n
             n += 1
             placed += 1
+            last = tried
     return placed, tried
 
 
@@ -61,12 +63,14 @@ def insert_randomly(
     existing: np.ndarray,
     seed: int,
     stream: int,
-    attempts: int,
+    attempts: int | None = None,
+    in_a_row: int | None = None,
 ) -> tuple[np.ndarray, int]:
     """Discs placed at random in a rectangle, whole, without overlap with each other or with `existing` (m, 3) [x, y,
     r].
 
-    Each attempt draws a radius from the list (repeats weight it) and a place. Returns ((n, 3) f8 rows x, y, r [m] with
+    Each attempt draws a radius from the list (repeats weight it) and a place. Ends with `number` discs, after so many
+    attempts, or after so many failures in a row (None: no such end). Returns ((n, 3) f8 rows x, y, r [m] with
     n <= number, attempts used).
     """
     (x0, x1), (y0, y1) = x, y
@@ -79,6 +83,8 @@ def insert_randomly(
     )  # fmt: skip
     old = existing[near]
     area = max(x1 - x0, 0.0) * max(y1 - y0, 0.0)
+    endless = np.iinfo(np.int64).max
+    attempts, in_a_row = (endless if n is None else n for n in (attempts, in_a_row))
     room = int(min(number, attempts, area / (np.pi * float(radii.min()) ** 2) + 1.0))
     cell = reach
     shape = (int((x1 - x0) / cell) + 3, int((y1 - y0) / cell) + 3)
@@ -95,7 +101,7 @@ def insert_randomly(
         head[ox[k], oy[k]] = k
     out = np.empty(room, np.int64)
     placed, tried = _insert(
-        attempts, room, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, len(old), out
+        attempts, in_a_row, room, radii, x0, x1, y0, y1, seed, stream, cell, head, nxt, px, py, pr, len(old), out
     )
     new = out[:placed]
     return np.column_stack([px[new], py[new], pr[new]]), int(tried)

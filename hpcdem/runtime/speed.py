@@ -20,6 +20,8 @@ DEFAULT = 10e6
 KINDS = ("hertz", "linear")
 SHORTEST = 5.0
 """Runs of fewer seconds tell nothing [s]."""
+SMALLEST = 2e8
+"""Nor do runs of fewer particle-steps: in a small model it is not the particles that take the time."""
 
 
 def _file() -> Path:
@@ -62,7 +64,7 @@ def remember(rate: float, kind: str) -> None:
 def remember_run(particle_steps: int, seconds: float, cores: int, kind: str) -> None:
     """Keep the rate of a finished run, if it was long enough: all its particle-steps, its wall time, and the cores that
     its ranks and threads had."""
-    if seconds >= SHORTEST and particle_steps > 0:
+    if seconds >= SHORTEST and particle_steps >= SMALLEST:
         remember(particle_steps / seconds / max(cores, 1), kind)
 
 

@@ -24,8 +24,8 @@ JAMMED = 0.547
 SETTLED = {"hertz": 0.95, "linear": 0.90}
 """Area of the disks over the area of a bed settled under its weight. Hertz particles overlap by much: published bed of
 the ZDEM manual, 0.943 to 0.956; linear: a bed of 250 000 disks of 0.1 to 0.3 mm."""
-GENTRY = 2.75
-"""Attempts of GEN per particle asked for, unless SET gentry says otherwise."""
+FAILURES = 1000
+"""Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle asked for."""
 
 MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN")
 
@@ -84,7 +84,7 @@ class _Follower:
         self.bed: Layer | None = None
         self.falling: list[Layer] = []
         self.standing: int | None = 0
-        self.gentry = GENTRY
+        self.gentry = 0.0
         self.walls: dict[int, tuple[float, float]] = {}
         self.result = Estimate()
 
@@ -239,7 +239,7 @@ class _Follower:
 
 def insertion(num: int, gentry: float, radii: Sequence[float], free: float, rectangle: float) -> tuple[float, float]:
     """Particles that GEN makes and the area of their disks [m2], of `num` asked for; free: area [m2] without particles
-    in the rectangle (area [m2]).
+    in the rectangle (area [m2]). gentry: attempts per particle; 0: until FAILURES in a row are to be expected.
 
     An attempt finds room with probability (1-x)^3 (1 + 0.812 x + 0.4258 x^2 + 0.0716 x^3), x = cover / JAMMED (Schaaf
     and Talbot 1989, J. Chem. Phys. 91, 4401, equal disks); for a disk of radius r among others to the power of the mean
@@ -251,9 +251,9 @@ def insertion(num: int, gentry: float, radii: Sequence[float], free: float, rect
     placed = dict.fromkeys(weights, 0.0)
     mean = sum(math.pi * r * r for r in radii) / len(radii)
     # Only attempts in the free part can succeed; `all_at` is how many of them there are, in layers of disks.
-    attempts = max(gentry * num, num) * free / rectangle
-    last, t, total = attempts * mean / free, 0.0, 0.0
-    while t < last and total < num and t < 1e4:
+    last = max(gentry * num, num) / rectangle * mean if gentry > 0.0 else math.inf
+    t, total, ends = 0.0, 0.0, 0.0  # ends: number of rows of failures that are to be expected so far
+    while t < last and total < num and t < 1e4 and ends < 0.56:  # exp(-Euler)
         dt = min(0.02 + 0.02 * t, last - t)
         cover = sum(n * math.pi * r * r for r, n in placed.items()) / free
         crowd = placed if total > 0.0 else weights
@@ -263,8 +263,12 @@ def insertion(num: int, gentry: float, radii: Sequence[float], free: float, rect
         p = (1.0 - x) ** 3 * (1.0 + 0.812 * x + 0.4258 * x**2 + 0.0716 * x**3)
         if p <= 1e-12:
             break
-        for r, weight in weights.items():
-            placed[r] += dt * free / mean * weight / len(radii) * p ** ((r * r + 2.0 * r * r1 + r2) / (4.0 * r2))
+        luck = {r: w / len(radii) * p ** ((r * r + 2.0 * r * r1 + r2) / (4.0 * r2)) for r, w in weights.items()}
+        for r in weights:
+            placed[r] += dt * free / mean * luck[r]
+        if gentry <= 0.0:
+            share = sum(luck.values()) * free / rectangle
+            ends += dt * rectangle / mean * share * (1.0 - share) ** FAILURES
         total = sum(placed.values())
         t += dt
     if total > num:

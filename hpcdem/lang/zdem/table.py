@@ -343,10 +343,11 @@ _SETTINGS = (
     _interval("print", "a frame .dat and .vtkhdf every so many steps"),
     _interval("ps", "a vector picture every so many steps"),
     _interval("vtk", "a .vtk file every so many steps"),
-    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="1", source="X"),
+    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="2", source="X"),
     Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
            kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
-    Option("gentry", "attempts of GEN per particle asked for", kind=POSITIVE, default="2.75", source="X"),
+    Option("gentry", "attempts of GEN per particle asked for; not set: GEN gives up after 1000 failures in a row",
+           kind=POSITIVE, source="X"),
     Option("outdir", "folder of the results", kind=FILE, default="data", source="X"),
 )  # fmt: skip
 
@@ -423,8 +424,8 @@ COMMANDS = (
     Command(
         "GEN",
         "Fills a rectangle with particles. num: at random without overlap, until so many are placed or no more fit in "
-        "(gentry times num attempts). grid: on a square lattice with a spacing of twice the largest radius. "
-        "The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an error, a full one "
+        "(1000 failures in a row, or as SET gentry says). grid: on a square lattice with a spacing of twice the largest "
+        "radius. The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an error, a full one "
         "is not: the log says how many were placed.",
         longest="generate",
         options=(
