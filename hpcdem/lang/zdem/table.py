@@ -424,9 +424,9 @@ COMMANDS = (
     Command(
         "GEN",
         "Fills a rectangle with particles. num: at random without overlap, until so many are placed or no more fit in "
-        "(1000 failures in a row, or as SET gentry says). grid: on a square lattice with a spacing of twice the largest "
-        "radius. The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an error, a full one "
-        "is not: the log says how many were placed.",
+        "(1000 failures in a row, or as SET gentry says). grid: on a square lattice with a spacing of twice the "
+        "largest radius. The sides of the rectangle may be expressions. A rectangle too narrow for a particle is an "
+        "error, a full one is not: the log says how many were placed.",
         longest="generate",
         options=(
             Option("num", "particles asked for", kind=ASKED),
