@@ -6,18 +6,25 @@ thousands of processes should not load what only the last picture needs.
 
 from __future__ import annotations
 
+import importlib
 import sys
 from typing import NoReturn
 
 import click
 
-from hpcdem.cli.common import HELP, messages_only, read_command_line
+from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
 from hpcdem.cli.run import Options, hpcdem, run
-from hpcdem.errors import EXIT_OK, EXIT_USAGE, UsageError
+from hpcdem.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
 from hpcdem.session import Session, greet, rehearse
 
-__all__ = ["Options", "hpcdem", "main", "read_command_line", "zdem2jpg", "zdemss"]
+__all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
+
+
+PROGRAMS = ("movie", "measure")
+"""`hpcdem NAME ...`: modules of this package."""
+STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
+"""`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
 
 
 @click.command(context_settings=HELP)
@@ -29,6 +36,10 @@ def warmup(**options: object) -> None:
 def main() -> NoReturn:
     """The programs hpcdem and zdem."""
     words, cores_before = sys.argv[1:], launch.cores()
+    if words[:1] and words[0] in PROGRAMS:
+        start(words[0], words[1:])
+    if any(word.split("=")[0] in STRESS_AND_STRAIN for word in words):
+        start("strain_stress", words)
     with messages_only(), launch.one_voice():
         if words[:1] == ["warmup"]:
             run_warmup(words[1:])
@@ -65,22 +76,17 @@ def run_warmup(words: list[str]) -> NoReturn:
     sys.exit(EXIT_OK)
 
 
-def zdem2jpg() -> NoReturn:
-    """The program zdem2jpg: pictures of all frames of a folder, made by the first process."""
-    with messages_only(), launch.one_voice():
-        launch.prepare_environment(1)
-        from hpcdem.post import plots
-
-        folder = plots.zdem2jpg_folder(sys.argv[1:])
-        if folder is None:
-            click.echo(plots.USAGE)
-        elif launch.speaks_for_all():
-            plots.zdem2jpg(folder, report=click.echo)
-    sys.exit(EXIT_OK)
+def start_zdem2jpg() -> NoReturn:
+    """The program zdem2jpg: pictures of all frames of a folder."""
+    start("zdem2jpg", sys.argv[1:])
 
 
-def zdemss() -> NoReturn:
-    """The program zdemss: known by name, its pictures of stress and strain come later."""
-    with messages_only(), launch.one_voice():
-        raise UsageError("zdemss: pictures of stress and strain come later; this version runs scripts and draws frames")
-    sys.exit(EXIT_USAGE)  # the other processes never get here either
+def start_zdemss() -> NoReturn:
+    """The program zdemss: pictures of stress and strain."""
+    start("zdemss", sys.argv[1:])
+
+
+def start(name: str, words: list[str]) -> NoReturn:
+    """A program that looks at finished runs: its module holds a command of the same name, and a function `work`."""
+    module = importlib.import_module(f"hpcdem.cli.{name}")
+    run_program(getattr(module, name), name if name.startswith("zdem") else f"hpcdem {name}", words, module.work)

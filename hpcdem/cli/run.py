@@ -163,7 +163,6 @@ def read_script(comm: SerialComm, path: Path) -> bytes:
 
 
 STRESS_AND_STRAIN = (
-    (("-s", "--strain-stress", "--strin-stres"), "DIR"),
     (("-g", "--grid"), "SIZE"),
     (("--leftwallid",), "ID"),
     (("--rightwallid",), "ID"),
@@ -171,25 +170,23 @@ STRESS_AND_STRAIN = (
     (("--ymove",), "Y"),
     (("--addball",), None),
     (("--delball",), None),
+    (("--increment",), None),
 )
-"""Options of zdem that belong to stress and strain, with the name of their value; the misspelt form is the manual's."""
+"""Options that go with -s DIR (cli/strain_stress.py), with the name of their value."""
 
 
-def refuse_stress_and_strain(context: click.Context, option: click.Parameter, value: Any) -> None:
-    """UsageError for an option that is known but not carried out yet."""
+def only_with_s(context: click.Context, option: click.Parameter, value: Any) -> None:
+    """UsageError for an option that makes no sense with a script."""
     if value:
-        names = "/".join(option.opts[:2])
-        raise click.UsageError(f"{names}: stress and strain from finished runs come later; this version runs scripts")
+        raise click.UsageError(f"{'/'.join(option.opts[:2])} goes with -s DIR, the stress and strain of a finished run")
 
 
-def later_options(command: click.Command) -> click.Command:
-    """Add the options of stress and strain: understood, hidden, refused by name."""
+def other_options(command: click.Command) -> click.Command:
+    """Add the options of -s: understood, hidden, refused by name."""
     for names, value in STRESS_AND_STRAIN:
         kind = {"is_flag": True} if value is None else {"metavar": value}
         command.params.append(
-            click.Option(
-                names, **kind, hidden=True, is_eager=True, expose_value=False, callback=refuse_stress_and_strain
-            )  # type: ignore[arg-type]
+            click.Option(names, **kind, hidden=True, is_eager=True, expose_value=False, callback=only_with_s)  # type: ignore[arg-type]
         )
     return command
 
@@ -204,12 +201,14 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
         raise click.UsageError(str(error)) from None
 
 
-@later_options
+@other_options
 @click.command(
     context_settings=HELP,
     no_args_is_help=True,
-    epilog="`hpcdem warmup` compiles all kernels for later runs. Exit codes: 0 done, 1 the run failed, 2 command line "
-    "or script not understood, 85 stopped on request with a checkpoint (go on with --resume).",
+    epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s --help), `hpcdem measure "
+    "DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs. Exit "
+    "codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a checkpoint "
+    "(go on with --resume).",
 )
 @click.argument("script", type=PATH)
 @click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")

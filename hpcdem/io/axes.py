@@ -50,18 +50,28 @@ class View:
         longer = max(self.width, self.height)
         return next((size, name) for least, size, name in UNITS if longer >= least)
 
-    def ticks(self) -> tuple[Ticks, Ticks]:
+    def ticks(self, major: float | None = None, minor: float | None = None) -> tuple[Ticks, Ticks]:
         """The ticks of the x and the y axis.
 
         Both go in the same steps, three to eight of them along the longer side; the other axis takes smaller steps
-        where it would have a single number.
+        where it would have a single number. major, minor: steps [m] that are wanted instead, on both axes.
         """
         size = self.unit[0]
         sides = (self.left / size, self.right / size), (self.bottom / size, self.top / size)
+        if major is not None:
+            fine = major / 10.0 if minor is None else minor
+            x, y = (Ticks(_multiples(*side, major / size), _multiples(*side, fine / size)) for side in sides)
+            return x, y
         longer = max(self.width, self.height) / size
         common = next(step for step in _round_steps(longer) if longer / step <= 7.0)
         x, y = (_ticks(low, high, common) for low, high in sides)
+        if minor is not None:
+            x, y = (Ticks(t.major, _multiples(*side, minor / size)) for t, side in zip((x, y), sides))
         return x, y
+
+    def moved(self, x: float, y: float) -> View:
+        """The view of a model that is moved by (x, y)."""
+        return View(self.left + x, self.right + x, self.bottom + y, self.top + y)
 
 
 def view(frame: Frame, extent: tuple[float, float, float, float] | None = None) -> View:

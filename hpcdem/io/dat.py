@@ -16,9 +16,11 @@ knowing:
 
 from __future__ import annotations
 
+import mmap
 import os
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -229,15 +231,14 @@ def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> 
     are numbered in order of first appearance. Raises HpcdemError if the file is no such file or is cut off.
     """
     path = os.fspath(path)
+    wanted = set(_TABLES if tables is None else tables)
     try:
-        with open(path, "rb") as file:
-            data = file.read()
+        with open(path, "rb") as file, _mapped(file) as data:
+            parameters, raw, counts = _split(path, data, wanted)
     except OSError as failure:
         if isinstance(failure, FileNotFoundError):
             raise HpcdemError(f"cannot read {path}: there is no such file") from None
         raise HpcdemError(explain(path, failure, "read")) from None
-    wanted = set(_TABLES if tables is None else tables)
-    parameters, raw, counts = _split(path, data.replace(b"\r\n", b"\n"), wanted)
     if "current_step" not in parameters:
         raise HpcdemError(f"cannot read {path}: it has no line current_step, so it is no frame of ZDEM or hpcdem")
     try:
@@ -281,8 +282,21 @@ def _frame(
     return Frame(step, step * dt if np.isnan(time) else time, dt, settings, walls, tables, groups)
 
 
+@contextmanager
+def _mapped(file: BinaryIO) -> Iterator[bytes | mmap.mmap]:
+    """The bytes of a file with line ends of Unix, without having them all in memory where that is possible."""
+    try:
+        data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except (OSError, ValueError):  # an empty file, or a file system without maps
+        yield file.read().replace(b"\r\n", b"\n")
+        return
+    with data:
+        dos = data.find(b"\r\n", 0, 1 << 16) >= 0
+        yield data[:].replace(b"\r\n", b"\n") if dos else data
+
+
 def _split(
-    path: str, data: bytes, wanted: set[str]
+    path: str, data: bytes | mmap.mmap, wanted: set[str]
 ) -> tuple[dict[str, str], dict[str, list[_RawTable]], dict[str, int]]:
     """Parameters by key, raw tables by section, and the numbers of walls and balls announced."""
     parameters: dict[str, str] = {}
@@ -301,7 +315,9 @@ def _split(
             end = data.find(b"\n\n", at - 1)
             end = len(data) if end < 0 else end
             if section.startswith("wall data") or needed_by.get(section.removesuffix(" data")) in wanted:
-                raw.setdefault(section, []).append(_table(path, section, line.split(), data[at:end]))
+                raw.setdefault(section, []).append(_table(path, section, line.split(), data, at, end))
+                if not isinstance(data, bytes) and hasattr(mmap, "MADV_DONTNEED"):
+                    data.madvise(mmap.MADV_DONTNEED, 0, end)
             at = end + 1
         elif ":" in line:
             key, _, value = line.partition(":")
@@ -312,26 +328,30 @@ def _split(
     return parameters, raw, counts
 
 
-def _table(path: str, section: str, names: list[str], text: bytes) -> _RawTable:
-    """Columns by header word: float64, or bytes where they are not numbers."""
-    end = text.find(b"\n")
-    width = len(text[: end if end >= 0 else None].split())
-    if width == 0:
+_PIECE = 1 << 24
+"""Most bytes of a table that are cut into words at once: words take many times the memory of their text."""
+
+
+def _table(path: str, section: str, names: list[str], data: bytes | mmap.mmap, at: int, end: int) -> _RawTable:
+    """Columns by header word of the lines from `at` to `end`: float64, or bytes where they are not numbers."""
+    words = "group" in names or "name" in names
+    pieces: list[list[np.ndarray]] = []
+    width = 0
+    while at < end:
+        stop = end if end - at <= _PIECE else data.rfind(b"\n", at, at + _PIECE) + 1 or end
+        text = data[at:stop]
+        at = stop
+        width = width or len(text.partition(b"\n")[0].split())
+        values = np.array(text.split()) if words else np.fromstring(text, sep=" ")
+        if width == 0:  # no rows
+            break
+        if values.size % width or values.size < width * text.rstrip().count(b"\n"):
+            raise HpcdemError(f"cannot read {path}: a table of the section '{section}' has rows of unequal length")
+        columns = zip(names, values.reshape(-1, width).T)
+        pieces.append([c.astype(np.float64) if name not in ("group", "name") else c for name, c in columns])
+    if not pieces:
         return {name: np.zeros(0) for name in names}
-    if "group" in names or "name" in names:
-        words = np.array(text.split())
-        if words.size % width == 0:
-            return {
-                name: w if name in ("group", "name") else w.astype(np.float64)
-                for name, w in zip(names, words.reshape(-1, width).T)
-            }
-        size = words.size
-    else:
-        numbers = np.fromstring(text.decode("ascii", "replace"), sep=" ")
-        size = numbers.size
-        if size % width == 0 and size >= width * text.rstrip().count(b"\n"):
-            return dict(zip(names, numbers.reshape(-1, width).T))
-    raise HpcdemError(f"cannot read {path}: a table of the section '{section}' has rows of unequal length")
+    return {name: np.concatenate([piece[k] for piece in pieces]) for k, name in enumerate(names[:width])}
 
 
 def _walls(raw: list[_RawTable]) -> dict[str, np.ndarray]:

@@ -1,9 +1,10 @@
-"""What can be drawn of a frame, each thing by its word in the DRAW command: layers over one another in axes whose data
+"""What can be drawn of a frame, each thing by its word: layers over one another in axes whose data
 unit is the metre. Frames are whole (all rows on this rank); particles are in the order of ids."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,52 +15,93 @@ from hpcdem.io.frame import Frame
 MOST_LABELS = 5000
 """More ids than this in one picture are a grey mush, and take minutes."""
 TENSION, COMPRESSION, INK = "#c81e1e", "#1e3cb4", "#202020"
+BALL = 3.0
+"""Radius of the ball that is rolled over the particles to find their surface, in median radii."""
+LOOSE = 1 / 500
+"""Pieces of less than this part of all particles are flying bits, not the model."""
 
 
-def balls(frame: Frame, ax: Any) -> None:
+@dataclass(frozen=True)
+class Look:
+    """palette (10, 3): colours by number; line: width of walls and of the surface in points."""
+
+    palette: np.ndarray = field(default_factory=lambda: colours.RGB)
+    line: float = 1.0
+
+
+USUAL = Look()
+
+
+def balls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """Discs of true size in the manual's colours."""
-    _discs(frame, ax, filled=True)
+    _discs(frame, ax, look, 0.0)
 
 
-def outlines(frame: Frame, ax: Any) -> None:
+def outlines(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """Circles of true size in the manual's colours."""
-    _discs(frame, ax, filled=False)
+    _discs(frame, ax, look, 0.3)
 
 
-def _discs(frame: Frame, ax: Any, filled: bool) -> None:
-    from matplotlib.collections import PathCollection
-    from matplotlib.path import Path as Outline
-    from matplotlib.transforms import Affine2D, AffineDeltaTransform
+def _discs(frame: Frame, ax: Any, look: Look, line: float) -> None:
+    from hpcdem.post.discs import Discs
+
+    columns = frame.tables["particles"].columns
+    if len(frame.tables["particles"]):
+        places = np.stack([columns["x"], columns["y"]], axis=1)
+        kind = colours.numbers(columns["color"])
+        ax.add_collection(Discs(places, columns["radius"], look.palette, kind, line), autolim=False)
+
+
+def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+    """Walls in their colours, and the sides of the BOX that are not the frame of the picture."""
+    p1, p2 = (np.asarray(frame.walls[p], dtype=float).reshape(-1, 2) for p in ("p1", "p2"))
+    shown = np.ones(len(p1), bool)
+    for axis, limits in enumerate((ax.get_xlim(), ax.get_ylim())):
+        for limit in limits:
+            near = 1e-6 * (limits[1] - limits[0])
+            on_edge = (np.abs(p1[:, axis] - limit) < near) & (np.abs(p2[:, axis] - limit) < near)
+            shown &= ~(on_edge & (np.asarray(frame.walls["id"]) < 0))
+    if shown.any():
+        shades = look.palette[colours.numbers(frame.walls["color"])]
+        _lines(ax, p1[shown], p2[shown], shades[shown], look.line)
+
+
+def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+    """The line over the top of the model, without flying bits."""
+    from hpcdem.post.surface import surface as rolled
 
     columns = frame.tables["particles"].columns
     if not len(frame.tables["particles"]):
         return
-    places = np.stack([columns["x"], columns["y"]], axis=1)
-    shades = colours.RGB[colours.numbers(columns["color"])]
-    # One shape per radius (to three digits) drawn at many places: quick, and small as PDF and SVG.
-    radii, kind = np.unique([float(f"{r:.3g}") for r in columns["radius"]], return_inverse=True)
-    for k, radius in enumerate(radii):
-        chosen = np.flatnonzero(kind == k)
-        discs = PathCollection(
-            [Outline.unit_circle()],
-            offsets=places[chosen],
-            offset_transform=ax.transData,
-            facecolors=shades[chosen] if filled else "none",
-            edgecolors="none" if filled else shades[chosen],
-            linewidths=0 if filled else 0.3,
-        )
-        discs.set_transform(Affine2D().scale(radius) + AffineDeltaTransform(ax.transData))
-        ax.add_collection(discs, autolim=False)
+    x, y, radius = (np.asarray(columns[name], dtype=float) for name in ("x", "y", "radius"))
+    kept = np.isfinite(x) & np.isfinite(y) & (radius > 0.0)
+    kept[kept] = _in_large_pieces(x[kept], y[kept], radius[kept])
+    if not kept.any():
+        return
+    x, y, radius = x[kept], y[kept], radius[kept]
+    usual = float(np.median(radius))
+    # Fine enough to follow the discs, unless they are spread over an odd size of land.
+    spacing = max(0.2 * usual, float(np.ptp(x)) / 100_000)
+    line = rolled(x, y, radius, max(BALL * usual, 2.0 * spacing), spacing)
+    _polylines(ax, [line], INK, 0.75 * look.line)
 
 
-def walls(frame: Frame, ax: Any) -> None:
-    """Walls and BOX in their colours."""
-    if len(frame.walls["id"]):
-        shades = colours.RGB[colours.numbers(frame.walls["color"])]
-        _lines(ax, frame.walls["p1"], frame.walls["p2"], shades, 1.0)
+def _in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Whether each disc is in a piece of at least LOOSE of all. Discs hang together where the squares of a grid, as
+    wide as the largest diameter, do."""
+    from scipy import ndimage
+
+    if len(x) == 0:
+        return np.zeros(0, bool)
+    side = max(2.0 * float(radius.max()), float(np.ptp(x)) / 5000.0, float(np.ptp(y)) / 5000.0)
+    column, row = (((v - v.min()) / side).astype(np.int64) for v in (x, y))
+    filled = np.zeros((row.max() + 1, column.max() + 1), bool)
+    filled[row, column] = True
+    piece = ndimage.label(filled, np.ones((3, 3)))[0][row, column]
+    return np.bincount(piece)[piece] >= LOOSE * len(x)
 
 
-def bonds(frame: Frame, ax: Any) -> None:
+def bonds(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """Bonds from centre to centre: red in tension, blue in compression, dark without force."""
     table = frame.tables["bonds"].columns
     places, (first, second) = _ends(frame, "bonds")
@@ -67,7 +109,21 @@ def bonds(frame: Frame, ax: Any) -> None:
     _lines(ax, places[first], places[second], shades, 0.35)
 
 
-def forces(frame: Frame, ax: Any) -> None:
+def bond_states(frame: Frame, ax: Any, look: Look = USUAL) -> None:
+    """All contacts from centre to centre: black not bonded, red bonded in tension, blue bonded in compression."""
+    bonded = frame.tables["bonds"].columns
+    places, (first, second) = _ends(frame, "contacts")
+    pairs = np.stack([first, second], axis=1)
+    glued = np.stack(_ends(frame, "bonds")[1], axis=1)
+    size = max(len(places), 1)
+    free = ~np.isin(pairs[:, 0] * size + pairs[:, 1], glued[:, 0] * size + glued[:, 1])
+    width = 0.5 * look.line
+    pulled = bonded.get("fn", np.zeros(0)) < 0.0
+    for chosen, shade in ((pairs[free], "black"), (glued[~pulled], COMPRESSION), (glued[pulled], TENSION)):
+        _lines(ax, places[chosen[:, 0]], places[chosen[:, 1]], shade, width)
+
+
+def forces(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """Contact forces from centre to centre; the thickest line is the largest force that only one in 200 exceeds."""
     table = frame.tables["contacts"].columns
     places, (first, second) = _ends(frame, "contacts")
@@ -78,7 +134,7 @@ def forces(frame: Frame, ax: Any) -> None:
         _lines(ax, places[first[shown]], places[second[shown]], INK, width[shown])
 
 
-def ids(frame: Frame, ax: Any) -> None:
+def ids(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """The id in each particle; left out where there are too many to be read."""
     columns = frame.tables["particles"].columns
     if len(columns["gid"]) > MOST_LABELS:
@@ -87,7 +143,7 @@ def ids(frame: Frame, ax: Any) -> None:
         ax.text(x, y, str(gid), fontsize=2.0, ha="center", va="center", clip_on=True)
 
 
-def rotations(frame: Frame, ax: Any) -> None:
+def rotations(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """A radius in each particle, horizontal when it was made."""
     c = frame.tables["particles"].columns
     centre = np.stack([c["x"], c["y"]], axis=1)
@@ -95,7 +151,7 @@ def rotations(frame: Frame, ax: Any) -> None:
     _lines(ax, centre, rim, INK, 0.3)
 
 
-def mesh(frame: Frame, ax: Any) -> None:
+def mesh(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     """A square grid of twice the largest diameter, about the cells in which neighbours are looked for."""
     radius = frame.tables["particles"].columns["radius"]
     if not len(radius):
@@ -108,30 +164,37 @@ def mesh(frame: Frame, ax: Any) -> None:
     _lines(ax, low, high, "#9a9a9a", 0.2)
 
 
-LAYERS: dict[str, Callable[[Frame, Any], None]] = {
+LAYERS: dict[str, Callable[..., None]] = {
     "mesh": mesh,
     "ball": outlines,
     "bfill": balls,
     "bang": rotations,
     "bondc": bonds,
+    "bondplot": bond_states,
     "cforce": forces,
     "bid": ids,
+    "surface": surface,
     "wall": walls,
 }
-"""Layers by word, in the order in which they lie over one another."""
+"""Layers by word (those of DRAW and of zdem2jpg), in the order in which they lie over one another; each is called with
+frame, axes and Look."""
 
 
 def _ends(frame: Frame, table: str) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """Centres (n, 2) and the rows of both particles of each pair."""
     c, pairs = frame.tables["particles"].columns, frame.tables[table].columns
+    none = np.zeros(0, np.int64)  # a file without such a section
     return np.stack([c["x"], c["y"]], axis=1), (
-        np.searchsorted(c["gid"], pairs["id1"]),
-        np.searchsorted(c["gid"], pairs["id2"]),
+        np.searchsorted(c["gid"], pairs.get("id1", none)),
+        np.searchsorted(c["gid"], pairs.get("id2", none)),
     )
 
 
 def _lines(ax: Any, begin: np.ndarray, end: np.ndarray, shades: Any, widths: Any) -> None:
+    _polylines(ax, np.stack([begin, end], axis=1), shades, widths)
+
+
+def _polylines(ax: Any, lines: Any, shades: Any, widths: Any) -> None:
     from matplotlib.collections import LineCollection
 
-    segments = np.stack([begin, end], axis=1)
-    ax.add_collection(LineCollection(list(segments), colors=shades, linewidths=widths, capstyle="round"), autolim=False)
+    ax.add_collection(LineCollection(lines, colors=shades, linewidths=widths, capstyle="round"), autolim=False)

@@ -1,4 +1,4 @@
-"""Pictures of frames: the figure at the end of a run, and the program zdem2jpg.
+"""Pictures of frames: the figure at the end of a run, those of zdem2jpg, and the pictures of a movie.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
 """
@@ -6,78 +6,170 @@ matplotlib is imported where it is used, and only its file-writing parts: no win
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io.axes import View, view
+from hpcdem.io.axes import Ticks, View, particle_extent, view
 from hpcdem.io.files import atomic_path
-from hpcdem.io.frame import Frame
-from hpcdem.io.frames import list_frames, read_frame
-from hpcdem.post.layers import LAYERS
+from hpcdem.io.frame import Frame, Table
+from hpcdem.io.frames import read_frame
+from hpcdem.post.layers import USUAL, Look
 
 CM = 1.0 / 2.54
-PAGE_WIDTH, PAGE_HEIGHT = 17.0 * CM, 22.0 * CM
-"""Largest size of a figure [inches]: the width of a printed page."""
+PAGE_WIDTH = 17.0
+"""Width of a figure [cm]: that of a printed page."""
+TALLEST = 22.0 / 17.0
+"""Largest height of a figure over its width."""
 FONT = 9.0
 _MARGINS = 0.9 * CM, 0.45 * CM, 1.15 * CM, 0.35 * CM  # left (without numbers), right, bottom, top of the axes
 _DIGIT = 0.2 * CM
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
-
-
+SIDES = ("left", "right", "bottom", "top")
 MODEL = ("bfill", "wall")
 """The usual picture: filled particles and walls."""
+MAJOR, MINOR = 10000.0, 1000.0
+"""Steps of the ticks of zdem2jpg [m], for models that are neither much smaller nor much larger."""
+_LARGE = 120_000.0
+_MOST_TICKS = 1000
 
 
-def draw_frame(frame: Frame, ax: Any, seen: View | None = None, what: Sequence[str] = MODEL) -> None:
+@dataclass(frozen=True)
+class Style:
+    """How a picture looks. Lengths of the model in metres, `page` (width of the picture) in cm, `font` and lines in
+    points, `dpi` dots per inch."""
+
+    what: tuple[str, ...] = MODEL
+    page: float = PAGE_WIDTH
+    font: float = FONT
+    dpi: float = 300.0
+    frame_line: float = 0.6
+    look: Look = USUAL
+    sides: frozenset[str] = frozenset(SIDES)
+    move: tuple[float, float] = (0.0, 0.0)
+    limits: dict[str, float] = field(default_factory=dict)  # of SIDES, after the move; those missing by the model
+    from_zero: bool = False  # missing left and bottom limits are 0 where the model allows
+    major: float | None = None
+    minor: float | None = None
+    usual_ticks: bool = False  # MAJOR and MINOR where they suit
+    title: str | None = None  # {step} and {time} are those of the frame
+
+    def ticks(self, seen: View) -> tuple[Ticks, Ticks]:
+        """The ticks along both axes. Raises UsageError for more than anyone can read."""
+        major, minor = self.major, self.minor
+        if self.usual_ticks and major is None and MAJOR <= max(seen.width, seen.height) <= _LARGE:
+            both = seen.ticks(MAJOR, MINOR if minor is None else minor)
+            alone = seen.ticks(None, minor)
+            x, y = (a if len(a.major) > 1 else b for a, b in zip(both, alone))
+        else:
+            x, y = seen.ticks(major, minor)
+        if max(len(ticks.major) + len(ticks.minor) for ticks in (x, y)) > _MOST_TICKS:
+            raise UsageError(f"more than {_MOST_TICKS} ticks along an axis: take larger steps")
+        return x, y
+
+
+USUAL_STYLE = Style()
+
+
+def seen_of(frame: Frame, style: Style) -> View:
+    """The part of the moved plane that a picture shows. Raises UsageError where the limits leave nothing."""
+    seen = view(frame).moved(*style.move)
+    sides = {"left": seen.left, "right": seen.right, "bottom": seen.bottom, "top": seen.top}
+    if style.from_zero:
+        left, _, bottom, _ = particle_extent(frame)
+        air = 0.02 * max(seen.width, seen.height)
+        for side, lowest in (("left", left + style.move[0]), ("bottom", bottom + style.move[1])):
+            if sides[side] <= 0.0 and lowest > -air:
+                sides[side] = 0.0
+    sides |= style.limits
+    if sides["right"] <= sides["left"] or sides["top"] <= sides["bottom"]:
+        raise UsageError(
+            f"nothing to show: x from {sides['left']:g} to {sides['right']:g} m, "
+            f"y from {sides['bottom']:g} to {sides['top']:g} m"
+        )
+    return View(**sides)
+
+
+def moved(frame: Frame, x: float, y: float) -> Frame:
+    """The frame as far as it can be drawn, everything moved by (x, y)."""
+    tables = dict(frame.tables)
+    columns = dict(tables["particles"].columns)
+    columns |= {name: columns[name] + d for name, d in (("x", x), ("y", y)) if name in columns}
+    tables["particles"] = Table(columns, 0, len(tables["particles"]))
+    walls = dict(frame.walls)
+    walls |= {p: walls[p] + (x, y) for p in ("p1", "p2") if len(walls.get(p, ()))}
+    return replace(frame, tables=tables, walls=walls)
+
+
+def draw_frame(
+    frame: Frame, ax: Any, seen: View | None = None, what: Sequence[str] = MODEL, style: Style = USUAL_STYLE
+) -> None:
     """Draw a whole frame into matplotlib axes; what: words of `layers.LAYERS`, in any order.
 
     The axes get limits, ticks and labels in km (m, cm or mm for small models); their data unit stays the metre, so
     that more can be drawn on top. seen: the part of the plane to show (by default BOX and walls, see `axes.view`).
     """
+    from hpcdem.post.layers import LAYERS
+
     seen = view(frame) if seen is None else seen
     ax.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
     for word, draw in LAYERS.items():
         if word in what:
-            draw(frame, ax)
-    _draw_axes(ax, seen)
+            draw(frame, ax, style.look)
+    _draw_axes(ax, seen, style)
+    if style.title is not None:
+        text = style.title.replace("{step}", str(frame.step)).replace("{time}", f"{frame.time:.6g}")
+        ax.text(0.01, 0.97, text, transform=ax.transAxes, fontsize=style.font, ha="left", va="top", parse_math=False)
 
 
-def _draw_axes(ax: Any, seen: View) -> None:
+def _draw_axes(ax: Any, seen: View, style: Style) -> None:
     size, unit = seen.unit
-    for axis, ticks in zip((ax.xaxis, ax.yaxis), seen.ticks()):
-        axis.set_ticks([v * size for v in ticks.major], labels=ticks.labels, fontsize=FONT)
+    for axis, ticks in zip((ax.xaxis, ax.yaxis), style.ticks(seen)):
+        axis.set_ticks([v * size for v in ticks.major], labels=ticks.labels, fontsize=style.font)
         axis.set_ticks([v * size for v in ticks.minor], minor=True)
-    ax.tick_params(which="major", length=4.0, width=0.6)
-    ax.tick_params(which="minor", length=2.0, width=0.6)
-    ax.set_xlabel(f"x ({unit})", fontsize=FONT)
-    ax.set_ylabel(f"y ({unit})", fontsize=FONT)
-    for spine in ax.spines.values():
-        spine.set_linewidth(0.6)
+    ax.tick_params(which="major", length=4.0, width=style.frame_line)
+    ax.tick_params(which="minor", length=2.0, width=style.frame_line)
+    ax.set_xlabel(f"x ({unit})", fontsize=style.font)
+    ax.set_ylabel(f"y ({unit})", fontsize=style.font)
+    for side, spine in ax.spines.items():
+        spine.set_linewidth(style.frame_line)
+        spine.set_visible(side in style.sides)
 
 
-def frame_figure(frame: Frame, what: Sequence[str] = MODEL) -> Any:
+def frame_figure(
+    frame: Frame, what: Sequence[str] = MODEL, style: Style = USUAL_STYLE, seen: View | None = None
+) -> Any:
     """A matplotlib Figure of the frame, as wide as a page; as high as it must be, or narrower if too high."""
     from matplotlib.figure import Figure
 
-    seen = view(frame)
-    left, right, bottom, top = _MARGINS
-    left += _DIGIT * max(map(len, seen.ticks()[1].labels), default=0)
-    scale = min((PAGE_WIDTH - left - right) / seen.width, (PAGE_HEIGHT - bottom - top) / seen.height)
+    seen = seen_of(frame, style) if seen is None else seen
+    if style.move != (0.0, 0.0):
+        frame = moved(frame, *style.move)
+    growth = style.font / FONT
+    left, right, bottom, top = (growth * margin for margin in _MARGINS)
+    left += growth * _DIGIT * max(map(len, style.ticks(seen)[1].labels), default=0)
+    room = style.page * CM - left - right, style.page * CM * TALLEST - bottom - top
+    if min(room) < 0.5 * CM:
+        raise UsageError(f"a page of {style.page:g} cm is too small for numbers of {style.font:g} points")
+    scale = min(room[0] / seen.width, room[1] / seen.height)
     width, height = scale * seen.width, scale * seen.height
     page = left + width + right, bottom + height + top
     figure = Figure(figsize=page)
     ax = figure.add_axes((left / page[0], bottom / page[1], width / page[0], height / page[1]))
-    draw_frame(frame, ax, seen, what)
+    draw_frame(frame, ax, seen, what, style)
     return figure
 
 
-def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: Sequence[str] = MODEL) -> Path:
+def plot_frame(
+    frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: Sequence[str] = MODEL,
+    style: Style = USUAL_STYLE, seen: View | None = None,
+) -> Path:  # fmt: skip
     """Write the picture of a whole frame: JPG, PNG, PDF or SVG by the suffix of `path`.
 
-    what: words of `layers.LAYERS`; dpi: dots per inch of JPG and PNG; the figure is 17 cm wide. Serial. Raises
-    HpcdemError.
+    what: words of `layers.LAYERS`; dpi: dots per inch of JPG and PNG; the figure is 17 cm wide unless `style` says
+    otherwise. Serial. Raises HpcdemError.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -86,8 +178,10 @@ def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: 
         import matplotlib
     except ImportError:
         raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
-    figure = frame_figure(frame, what)
+    figure = frame_figure(frame, what, style, seen)
     kind = path.suffix.lower().removeprefix(".")
+    if kind in ("jpg", "jpeg", "png") and max(figure.get_size_inches()) * dpi >= 2**16:  # the most a JPEG can have
+        raise HpcdemError(f"cannot draw {path}: more than 65535 pixels along a side; take a smaller page or dpi")
     options: dict[str, Any] = {}
     if kind in ("jpg", "jpeg"):
         options["pil_kwargs"] = {"quality": 92, "subsampling": 0}  # thin coloured layers need their full colour
@@ -100,55 +194,7 @@ def plot_frame(frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: 
     return path
 
 
-# --- zdem2jpg --------------------------------------------------------------------------------------------------
-
-# Options of zdem2jpg in the manual and in its help text that are still to come.
-LATER = (
-    "xmin xmax ymin ymax xmove ymove major_locator minor_locator fontsize max_workers dpi linewidth pagesize leftshow "
-    "rightshow bottomshow topshow wallshow surfaceshow bondplot ballplot colormap showlable showable"
-).split()
-
-USAGE = """\
-usage: zdem2jpg --dir DIR
-Draws every frame all_*.vtkhdf or all_*.dat in DIR as DIR/all_*.jpg."""
-
-
-def zdem2jpg(folder: str | os.PathLike, report: Callable[[Path], None] | None = None) -> list[Path]:
-    """Draw every frame of a folder as a JPG of the same name beside it; returns the paths of the pictures.
-
-    report: called with each path once it is written. Raises HpcdemError, also when there is no frame.
-    """
-    frames = list_frames(folder)
-    if not frames:
-        raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {os.fspath(folder)}")
-    pictures = []
-    for file in frames:
-        pictures.append(plot_frame(read_frame(file.path, ("particles",)), file.path.with_suffix(".jpg")))
-        if report:
-            report(pictures[-1])
-    return pictures
-
-
-def zdem2jpg_folder(words: list[str]) -> str | None:
-    """The folder named by the command line of zdem2jpg (without the program's name); None if help is asked for.
-
-    Raises UsageError on anything else, naming options of the manual that are not there yet.
-    """
-    folder = None
-    rest = list(words)
-    while rest:
-        word = rest.pop(0)
-        name, joined, value = word.partition("=")
-        if word in ("-h", "--help"):
-            return None
-        if name == "--dir":
-            if not joined and not rest:
-                raise UsageError("zdem2jpg: --dir needs a folder")
-            folder = value if joined else rest.pop(0)
-        elif name.startswith("--") and name[2:] in LATER:
-            raise UsageError(f"zdem2jpg: {name} is not supported yet; only --dir DIR is")
-        else:
-            raise UsageError(f"zdem2jpg: unknown option {word}\n{USAGE}")
-    if not folder:
-        raise UsageError(f"zdem2jpg: --dir is missing\n{USAGE}")
-    return folder
+def plot_file(source: Path, path: Path, style: Style, seen: View | None = None) -> None:
+    """Draw the frame in a file with all that `style` says. Serial. Raises HpcdemError."""
+    tables = ["particles", *(("contacts", "bonds") if {"bondplot", "bondc", "cforce"} & {*style.what} else ())]
+    plot_frame(read_frame(source, tables), path, style.dpi, style.what, style, seen)

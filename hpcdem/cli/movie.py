@@ -1,0 +1,115 @@
+"""`hpcdem movie DIR`: the frames of a folder, or the pages of zdemss, as a film."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, on_first, positive, style_of
+from hpcdem.runtime import launch
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+PAGE = 17.0
+"""Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
+
+
+@click.command(cls=ManualCommand, context_settings=HELP, no_args_is_help=True)
+@click.argument("folder", type=PATH, metavar="DIR")
+@click.option("--from", "source", type=click.Choice(["frames", "ss"]), default="frames", help="Frames of DIR, or the "
+              "pictures *.jpg that zdemss made in DIR/ss [frames].")  # fmt: skip
+@click.option("--fps", type=float, default=10.0, callback=positive, metavar="N", help="Frames per second [10].")
+@click.option("--size", type=click.IntRange(64, 16384), default=1200, metavar="PX", help="Width in pixels [1200].")
+@click.option("--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 where ffmpeg is].")
+@click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
+@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
+@looks
+def movie(**options: Any) -> None:
+    """Make a film of all frames in DIR, drawn at one view so that nothing jumps.
+
+    An animated GIF, and MP4 where ffmpeg is found (in the PATH, or of the package imageio-ffmpeg). --showlable=true
+    writes the step into each frame; in a text of your own, {step} and {time} (s) are filled in.
+    """
+
+
+def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """Collective: make the film. Raises HpcdemError on all ranks."""
+    from hpcdem.post import movie as films
+
+    def begin() -> tuple[list[tuple[str, Path]], list[Path]]:
+        goals = targets(options)
+        if options["source"] == "ss":
+            return goals, films.pages(options["folder"] / "ss")
+        return goals, []
+
+    goals, pictures = on_first(comm, begin)
+    scratch: Path | None = None
+    try:
+        if options["source"] == "frames":
+            # Beside the film, where every rank can write.
+            scratch = on_first(comm, lambda: Path(tempfile.mkdtemp(prefix=".movie_", dir=goals[0][1].parent)))
+            pictures = draw(comm, log, options, scratch)
+        for kind, path in goals:
+            write = films.write_gif if kind == "gif" else films.write_mp4
+            on_first(comm, lambda: write(pictures, path, options["fps"], options["size"]))  # noqa: B023
+            seconds = len(pictures) / options["fps"]
+            log.info(f"{path}: {len(pictures)} frames, {seconds:.3g} s")
+    finally:
+        if scratch is not None and comm.rank == 0:
+            shutil.rmtree(scratch, ignore_errors=True)
+
+
+def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
+    """Kind and path of each film to be made. Raises HpcdemError."""
+    from hpcdem.errors import HpcdemError, UsageError
+    from hpcdem.post import movie as films
+
+    kind, output = options["kind"], options["output"] or options["folder"] / "movie"
+    if not options["folder"].is_dir():
+        raise HpcdemError(f"cannot read the folder {options['folder']}: there is no such folder")
+    if not output.parent.is_dir():
+        raise HpcdemError(f"cannot make {output}: the folder does not exist")
+    suffix = output.suffix.lower().removeprefix(".")
+    if options["output"] and suffix in ("gif", "mp4"):
+        if kind not in (None, "both", suffix):
+            raise UsageError(f"--format {kind} does not make {output}")
+        kind, output = kind or suffix, output.with_suffix("")
+    if kind is None:
+        kind = "both" if films.ffmpeg() is not None else "gif"
+    if kind != "gif" and films.ffmpeg() is None:
+        raise HpcdemError(
+            "MP4 needs ffmpeg, which is not on this machine: install it, or `pip install imageio-ffmpeg`, or take "
+            "--format gif"
+        )
+    return [(k, output.with_name(f"{output.name}.{k}")) for k in ("gif", "mp4") if kind in (k, "both")]
+
+
+def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> list[Path]:
+    """Collective: the pictures of all frames, at one view."""
+    from hpcdem.errors import HpcdemError
+    from hpcdem.io.frames import list_frames
+    from hpcdem.post.series import Job, draw_all
+
+    def plan() -> list[Job]:
+        folder: Path = options["folder"]
+        files = [file.path for file in list_frames(folder)]
+        if not files:
+            raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {folder}")
+        # Twice the size, made small afterwards: smooth lines at the few pixels of a film.
+        style = style_of(options, folder, PAGE, 2.0 * options["size"] * 2.54 / PAGE)
+        seen = common_view(files, style)
+        style = replace(style, from_zero=False)
+        return [Job(file, scratch / f"{k:06d}.png", style, seen) for k, file in enumerate(files)]
+
+    jobs = on_first(comm, plan)
+    workers = launch.cores() if options["max_workers"] is None else max(1, int(options["max_workers"]))
+    draw_all(jobs, comm, workers, log.info)
+    return [job.picture for job in jobs]

@@ -1,0 +1,169 @@
+"""Options that zdem2jpg and `hpcdem movie` share, read as the manual writes them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.io.axes import View
+    from hpcdem.post.plots import Style
+
+_NUMBER = re.compile(r"-\.?\d")
+
+
+class ManualCommand(click.Command):
+    """A command that also reads `--dir= ./data` (a blank after the sign), `-bondplot=true` (one dash) and a lone `--`
+    where a line of the manual breaks."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        names = {name for parameter in self.params for name in parameter.opts if name.startswith("--")}
+        return super().parse_args(ctx, as_usual(args, names))
+
+
+def as_usual(words: Sequence[str], names: set[str]) -> list[str]:
+    """The words of a command line, with the manual's ways of writing options turned into the usual ones."""
+    result: list[str] = []
+    rest = [word for word in words if word != "--"]
+    while rest:
+        word = rest.pop(0)
+        if word.startswith("-") and not word.startswith("--") and f"-{word.partition('=')[0]}" in names:
+            word = f"-{word}"
+        if word.startswith("--") and word.endswith("=") and rest:
+            if not rest[0].startswith("-") or _NUMBER.match(rest[0]):
+                word += rest.pop(0)
+        result.append(word)
+    return result
+
+
+def positive(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
+    """A number above zero."""
+    if value is not None and not 0.0 < value < float("inf"):
+        raise click.BadParameter(f"{value:g} is not a number above 0", context, option)
+    return value
+
+
+def finite(context: click.Context, option: click.Parameter, value: float | None) -> float | None:
+    """A number that is not infinite."""
+    if value is not None and not abs(value) < float("inf"):
+        raise click.BadParameter(f"{value:g} is not a number", context, option)
+    return value
+
+
+def number(name: str, default: float | None, text: str, check: Callable[..., Any] = finite) -> Callable[..., Any]:
+    """An option that takes a number."""
+    return click.option(f"--{name}", name, type=float, default=default, callback=check, metavar="N", help=text)
+
+
+def yes_no(name: str, default: bool, text: str) -> Callable[..., Any]:
+    """An option that takes true or false."""
+    word = "true" if default else "false"
+    return click.option(f"--{name}", name, type=bool, default=default, metavar="BOOL", help=f"{text} [{word}].")
+
+
+OPTIONS = (
+    number("xmin", None, "Left end of the picture, m [0]."),
+    number("xmax", None, "Right end, m [the model's]."),
+    number("ymin", None, "Lower end, m [0]."),
+    number("ymax", None, "Upper end, m [the model's]."),
+    number("xmove", 0.0, "Move the model along x, m [0]."),
+    number("ymove", 0.0, "Move the model along y, m [0]."),
+    number("major_locator", None, "Step of ticks with numbers, m [10000, or what suits the model].", positive),
+    number("minor_locator", None, "Step of ticks without numbers, m [1000, or what suits the model].", positive),
+    number("fontsize", 9.0, "Size of the numbers, points [9].", positive),
+    number("linewidth", 0.8, "Width of lines, points [0.8].", positive),
+    yes_no("leftshow", True, "Left line of the frame"),
+    yes_no("rightshow", True, "Right line of the frame"),
+    yes_no("bottomshow", True, "Lower line of the frame"),
+    yes_no("topshow", True, "Upper line of the frame"),
+    yes_no("wallshow", True, "Walls"),
+    yes_no("surfaceshow", True, "Line over the top of the model"),
+    yes_no("ballplot", True, "Particles"),
+    yes_no("bondplot", False, "Contacts: black not bonded, red bonded in tension, blue bonded in compression"),
+    click.option("--colormap", metavar="FILE", help="Ten lines of red, green, blue; searched here, in DIR, at home."),
+    click.option(
+        "--showlable", "--showlabel", "--showable", "showlable", default="false", metavar="BOOL|TEXT",
+        help="Step, or this text, in the corner [false].",
+    ),
+)  # fmt: skip
+"""What a picture may look like."""
+
+
+def looks(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of a picture."""
+    for option in reversed(OPTIONS):
+        function = option(function)
+    return function
+
+
+def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> Style:
+    """The style that the options ask for. Raises HpcdemError for a colour file that is not there or not right."""
+    from hpcdem.errors import UsageError
+    from hpcdem.io import colours
+    from hpcdem.post.layers import Look
+    from hpcdem.post.plots import SIDES, Style
+
+    layers = {"ballplot": "bfill", "bondplot": "bondplot", "surfaceshow": "surface", "wallshow": "wall"}
+    limits = dict(zip(SIDES, (options[name] for name in ("xmin", "xmax", "ymin", "ymax"))))
+    for axis in "xy":
+        low, high = options[f"{axis}min"], options[f"{axis}max"]
+        if low is not None and high is not None and high <= low:
+            raise UsageError(f"--{axis}max={high:g} is not above --{axis}min={low:g}")
+    major, minor = options["major_locator"], options["minor_locator"]
+    if major is not None and minor is not None and minor > major:
+        raise UsageError(f"--minor_locator={minor:g} is larger than --major_locator={major:g}")
+    palette = colours.RGB
+    if options["colormap"]:
+        palette = colours.read_palette(colours.find_palette(options["colormap"].strip(), folder))
+    label = {"false": None, "off": None, "no": None, "true": "step {step}", "on": "step {step}", "yes": "step {step}"}
+    return Style(
+        what=tuple(word for name, word in layers.items() if options[name]),
+        page=page,
+        font=options["fontsize"],
+        dpi=dpi,
+        frame_line=options["linewidth"],
+        look=Look(palette, options["linewidth"]),
+        sides=frozenset(side for side in SIDES if options[f"{side}show"]),
+        move=(options["xmove"], options["ymove"]),
+        limits={side: value for side, value in limits.items() if value is not None},
+        from_zero=True,
+        major=major,
+        minor=minor,
+        usual_ticks=True,
+        title=label.get(options["showlable"].lower(), options["showlable"]),
+    )
+
+
+def common_view(files: Sequence[Path], style: Style) -> View:
+    """One view that holds what every one of these frames would show by itself."""
+    from hpcdem.io.axes import View
+    from hpcdem.io.frames import read_frame
+    from hpcdem.post.plots import seen_of
+
+    seen = [seen_of(read_frame(file, ("particles",)), style) for file in files]
+    return View(
+        min(v.left for v in seen), max(v.right for v in seen), min(v.bottom for v in seen), max(v.top for v in seen)
+    )
+
+
+def on_first(comm: SerialComm, action: Callable[[], Any]) -> Any:
+    """Collective: what `action` gives on rank 0, on all ranks; its HpcdemError too."""
+    from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
+
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except HpcdemError as problem:
+            error = str(problem), problem.exit_code
+        except OSError as problem:
+            error = f"{problem.filename or 'files'}: {problem.strerror}", HpcdemError.exit_code
+    result, error = comm.bcast((result, error))
+    if error is not None:
+        raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
+    return result

@@ -1,0 +1,1 @@
+"""Pages of stress and strain from sections: what the program zdemss draws and writes."""

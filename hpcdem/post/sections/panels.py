@@ -1,0 +1,212 @@
+"""One panel: one thing of one section, drawn into matplotlib axes whose data unit is the metre.
+
+A field becomes a picture of true colours: values are interpolated linearly between the nodes, then coloured, and
+painted where there are particles. Nothing is transparent, since PostScript cannot be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io import colours
+from hpcdem.io.frame import Frame, Table
+from hpcdem.post import layers, raster
+from hpcdem.post.cpt import ColourTable
+from hpcdem.post.section import Section
+
+INK = "#000000"
+LINE = 0.5
+"""Width of surface, walls and bars [points]."""
+BAND, SHADE = 1.0, 0.45
+"""Where |distortional strain| is larger, a stress is painted in this part of its brightness: strained bands show as
+dark ones."""
+FIELD_PIXELS = 1000
+"""About as many pixels of a field side by side in a panel; at most FINEST to a cell."""
+FINEST = 8
+BALL = 3.0
+"""Material is where a ball of this many median radii cannot get to between the particles, as under the surface line."""
+VECTOR_DISCS, DISC_PIXELS = 30000, 2400
+"""More particles than this are a bitmap also in a vector picture, so many pixels wide."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a panel can show. key: field of the section; unit: of the colour bar, one is `scale` SI units."""
+
+    key: str
+    title: str
+    unit: str = ""
+    scale: float = 1.0
+    strain: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Title with its unit."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+
+DEFORMATION = Kind("deformation", "Deformation")
+VOLUMETRIC = Kind("volumetric", "Volumetric strain", "%", strain=True)
+DISTORTIONAL = Kind("distortional", "Distortional strain", strain=True)
+MEAN = Kind("mean", "Mean stress", "MPa", 1e6)
+SHEAR = Kind("shear", "Maximum shear stress", "MPa", 1e6)
+KINDS = (DEFORMATION, VOLUMETRIC, DISTORTIONAL, MEAN, SHEAR)
+"""From top to bottom."""
+
+
+def draw(section: Section, kind: Kind, ax: Any, table: ColourTable | None) -> None:
+    """Draw one kind; the limits of the axes are set already. table: colours of its values, in its unit."""
+    if kind is DEFORMATION:
+        draw_particles(section, ax)
+    else:
+        assert table is not None
+        draw_field(section, kind, ax, table)
+    draw_outline(section, ax)
+
+
+def draw_particles(section: Section, ax: Any) -> None:
+    """Discs of true size in the manual's colours; very many as a bitmap, also in a vector picture."""
+    p = section.particles
+    if len(p["x"]) <= VECTOR_DISCS:
+        layers.balls(Frame(section.step, section.time, 0.0, {}, {}, {"particles": Table(p)}), ax)
+        return
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    fine = DISC_PIXELS / (right - left)
+    size = DISC_PIXELS, round(fine * (top - bottom))
+    picture = raster.discs(
+        fine * (p["x"] - left), fine * (p["y"] - bottom), fine * p["radius"], colours.RGB,
+        colours.numbers(p["color"]), *size,
+    )  # fmt: skip
+    cover = picture[..., 3:] / 255.0
+    _paint(ax, cover * picture[..., :3] / 255.0 + 1.0 - cover, (left, right, bottom, top))
+
+
+def _paint(ax: Any, picture: np.ndarray, extent: tuple[float, float, float, float]) -> None:
+    ax.imshow(picture, origin="lower", extent=extent, interpolation="none", zorder=1.0, aspect=ax.get_aspect())
+
+
+def draw_field(section: Section, kind: Kind, ax: Any, table: ColourTable) -> None:
+    """A field in the colours of a table; stresses with the strained bands laid over."""
+    left, right = ax.get_xlim()
+    pixels = Pixels.over(section, right - left)
+    if pixels is None:
+        return
+    shades = table.colours(pixels.values(section.fields[kind.key]) / kind.scale)
+    if not kind.strain:
+        bands = np.abs(pixels.values(section.fields[DISTORTIONAL.key])) > BAND
+        shades[bands] *= SHADE
+    painted = np.isfinite(shades[..., :1]) & pixels.material[..., None]
+    _paint(ax, np.where(painted, shades, 1.0), pixels.extent)
+
+
+def draw_outline(section: Section, ax: Any) -> None:
+    """The line over the top, and the walls."""
+    if len(section.surface):
+        ax.plot(*np.transpose(section.surface), color=INK, linewidth=LINE, zorder=3.0, solid_joinstyle="round")
+    if len(section.walls.get("id", ())):
+        own = section.walls["id"] >= 0  # not the sides of BOX
+        _segments(ax, section.walls["p1"][own], section.walls["p2"][own], LINE)
+
+
+def _segments(ax: Any, begin: np.ndarray, end: np.ndarray, width: float) -> Any:
+    from matplotlib.collections import LineCollection
+
+    lines = LineCollection(list(np.stack([begin, end], axis=1)), colors=INK, linewidths=width, zorder=3.0)
+    return ax.add_collection(lines, autolim=False)
+
+
+# -- fields as pictures -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """A bitmap over the particles of a section. rows, columns: middles of the pixels in units of nodes; material: where
+    there are particles (rows, columns); extent: left, right, bottom, top [m]."""
+
+    rows: np.ndarray
+    columns: np.ndarray
+    material: np.ndarray
+    extent: tuple[float, float, float, float]
+
+    @classmethod
+    def over(cls, section: Section, width: float) -> Pixels | None:
+        """For a panel that is `width` [m] wide; None without particles."""
+        p = section.particles
+        if not len(p["x"]):
+            return None
+        fine = int(np.clip(round(FIELD_PIXELS * section.size / width), 1, FINEST))
+        side = section.size / fine
+        ball = BALL * float(np.median(p["radius"]))
+        margin = ball + float(p["radius"].max()) + 2.0 * side
+        low = np.floor((np.array([p["x"].min(), p["y"].min()]) - margin) / side).astype(int)
+        high = np.ceil((np.array([p["x"].max(), p["y"].max()]) + margin) / side).astype(int)
+        # Which particle is nearest, from the pixels that hold one; of several in a pixel the last one counts.
+        holder = np.full(tuple(high - low)[::-1], -1)
+        column, row = (np.floor(p[k] / side).astype(int) - at for k, at in zip("xy", low))
+        holder[row, column] = np.arange(len(p["x"]))
+        distance, nearest = ndimage.distance_transform_edt(holder < 0, sampling=side, return_indices=True)
+        near = distance <= p["radius"][holder[tuple(nearest)]] + ball
+        material = ndimage.distance_transform_edt(near, sampling=side) > ball
+        x, y = (side * (np.arange(a, b) + 0.5) for a, b in zip(low, high))
+        extent = (side * low[0], side * high[0], side * low[1], side * high[1])
+        return cls((y - section.y[0]) / section.size, (x - section.x[0]) / section.size, material, extent)
+
+    def values(self, field: np.ndarray) -> np.ndarray:
+        """A field (ny, nx) at the pixels: linear between nodes, the nearest node's value up to one and a half cells
+        from where there is one, NaN farther off."""
+        empty = ~np.isfinite(field)
+        if empty.all():
+            return np.full(self.material.shape, np.nan)
+        distance, nearest = ndimage.distance_transform_edt(empty, return_indices=True)
+        places = np.meshgrid(self.rows, self.columns, indexing="ij")
+        result = ndimage.map_coordinates(field[tuple(nearest)], places, order=1, mode="nearest")
+        return np.where(ndimage.map_coordinates(distance, places, order=1, mode="nearest") <= 1.5, result, np.nan)
+
+
+# -- largest principal stress -------------------------------------------------------------------------------------
+
+
+def stress_bars(section: Section, square: float, scale: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Bars along the largest principal stress s1 of squares: ends (n, 2), (n, 2) [m] and the largest s1 [Pa].
+
+    The stress is averaged over the nodes in squares of side `square` [m], where nodes fill half of one or more. A bar
+    is centred on its square; its length is scale * square * s1 / max(s1). Squares without compression have none.
+    Raises HpcdemError for squares smaller than the spacing of the nodes.
+    """
+    size, nothing = section.size, np.zeros((0, 2))
+    if square < size:
+        raise HpcdemError(f"--gridsize {square:g}: smaller than the grid of stress and strain, {size:g} m")
+    parts = [section.fields[k] for k in ("sxx", "sxy", "syy")]
+    known = np.isfinite(parts).all(axis=0)
+    if not known.any():
+        return nothing, nothing, 0.0
+    # A node stands for the square of side `size` about it; squares of all frames fall on each other.
+    x, y = np.meshgrid(section.x, section.y)
+    origin = np.array([section.x[0] % size, section.y[0] % size]) - 0.5 * size
+    squares = np.floor((np.stack([x[known], y[known]], axis=1) - origin) / square + 1e-9)
+    places, which, count = np.unique(squares, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    sxx, sxy, syy = (np.bincount(which, part[known]) / count for part in parts)
+    s1 = 0.5 * (sxx + syy) + np.hypot(0.5 * (sxx - syy), sxy)
+    chosen = (count >= 0.5 * (square / size) ** 2) & (s1 > 0.0)
+    if not chosen.any():
+        return nothing, nothing, 0.0
+    angle = 0.5 * np.arctan2(2.0 * sxy, sxx - syy)[chosen]
+    most = float(s1[chosen].max())
+    half = (0.5 * scale * square / most * s1[chosen])[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    middle = (places[chosen] + 0.5) * square + origin
+    return middle - half, middle + half, most
+
+
+def draw_stress_bars(section: Section, ax: Any, square: float, scale: float) -> str:
+    """Draw the bars of `stress_bars`; returns what the caption must say of them."""
+    begin, end, most = stress_bars(section, square, scale)
+    if not len(begin):
+        return ""
+    _segments(ax, begin, end, LINE)
+    return f"longest bar: $\\sigma_1$ = {most / 1e6:.3g} MPa"

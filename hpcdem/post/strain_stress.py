@@ -1,0 +1,426 @@
+"""Stress and strain of all frames of a folder: `hpcdem -s DIR` writes DIR/ss/data/<frame>.out, .npz and .vtkhdf.
+
+Frames are shared over the ranks in rounds, one frame per rank: each rank reads its frame, gets the positions of the
+frame before from its neighbour, and fits dF between the two; F then passes from frame to frame; at the end of the round
+every rank writes its own. Where there are fewer frames than ranks, rank 0 goes through the frames, and the columns of
+the grids are shared. The files have the same bytes either way.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.files import Alone, explain
+from hpcdem.io.frames import FrameFile, list_frames, read_frame
+from hpcdem.post import grid as grids
+from hpcdem.post import section_files, strain, stress
+from hpcdem.post.section import Section, write_section
+from hpcdem.post.surface import surface
+
+QUIET_SECONDS = 2.0
+"""At most one line on the progress in this time."""
+INSIDE, AROUND = 2, 3
+"""Of `solid_fraction`, in spacings."""
+SUFFIXES = (".out", ".npz", ".vtkhdf")
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Options:
+    """folder: with the frames; size: spacing of the grid [m]; left_wall, right_wall: ids of walls beyond which
+    particles are left out; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
+    added or deleted between frames; increment: strain since the frame before instead of since the first one."""
+
+    folder: Path
+    size: float = 200.0
+    left_wall: int | None = None
+    right_wall: int | None = None
+    xmove: float = 0.0
+    ymove: float = 0.0
+    addball: bool = False
+    delball: bool = False
+    increment: bool = False
+
+
+def run(comm: Any, log: Any, options: Options) -> Path:
+    """Collective: the folder with the results. Results of an earlier call stay until the new ones are complete.
+    Raises HpcdemError (on all ranks) for frames that cannot be read or do not fit together."""
+    if not (np.isfinite(options.size) and options.size > 0.0):
+        raise UsageError(f"-g {options.size:g}: the spacing of the grid must be larger than 0")
+    began = time.monotonic()
+    frames = _shared(comm, lambda: _frames(options.folder))
+    results = options.folder / "ss" / "data"
+    fresh = results.with_name("data.tmp")
+    _shared(comm, lambda: _make_fresh(fresh))
+    many = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
+    ranks = f", {comm.size} ranks share {'the frames' if len(frames) >= comm.size else 'each frame'}"
+    log.info(f"stress and strain of {many} in {options.folder}, grid {options.size:g} m{ranks * (comm.size > 1)}")
+    if len(frames) == 1:
+        log.warn(f"{frames[0].path.name} is the only frame: its strain is zero, there is nothing to compare it with")
+    try:
+        if len(frames) >= comm.size:
+            _rounds(comm, log, frames, options, fresh, grids.sums)
+        else:
+            _together(comm, log, frames, options, fresh)
+        _shared(comm, lambda: _replace(fresh, results, [f.path.stem for f in frames]))
+    except HpcdemError:
+        if comm.rank == 0:
+            shutil.rmtree(fresh, ignore_errors=True)
+        raise
+    seconds = time.monotonic() - began
+    log.info(f"{results}: {many} in {seconds:.1f} s, {len(frames) / max(seconds, 1e-9):.3g} frames/s")
+    return results
+
+
+# --- files and folders -----------------------------------------------------------------------------------------
+
+
+def _frames(folder: Path) -> list[FrameFile]:
+    frames = list_frames(folder)
+    if not frames:
+        raise HpcdemError(f"{folder} holds no frames (all_<step>.vtkhdf or all_<step>.dat)")
+    return frames
+
+
+def _make_fresh(folder: Path) -> None:
+    """An empty folder, whatever an interrupted call has left there."""
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+
+
+def _replace(fresh: Path, results: Path, names: list[str]) -> None:
+    """Put the new files in the place of the old ones; files of other names stay."""
+    os.makedirs(results, exist_ok=True)
+    ours = {name + suffix for name in names for suffix in SUFFIXES}
+    for old in results.iterdir():
+        if old.name not in ours and old.suffix in SUFFIXES and old.name.startswith("all_"):
+            old.unlink()
+    for name in sorted(ours):
+        os.replace(fresh / name, results / name)
+    fresh.rmdir()
+
+
+def _shared(comm: Any, action: Callable[[], _T]) -> _T:
+    """Collective: the result of rank 0 on all ranks, its failure too."""
+    return comm.bcast(_each(comm, lambda: action() if comm.rank == 0 else None))
+
+
+def _each(comm: Any, action: Callable[[], _T]) -> _T:
+    """Collective: each rank's own result; if one fails, all do."""
+    result, error = _tried(action)
+    comm.agree(error)
+    return result  # type: ignore[return-value]
+
+
+def _tried(action: Callable[[], _T]) -> tuple[_T | None, str | None]:
+    try:
+        return action(), None
+    except HpcdemError as failure:
+        return None, str(failure)
+    except OSError as failure:
+        return None, explain(failure.filename or "the results", failure)
+
+
+# --- one frame -------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Snapshot:
+    """What is needed of a frame: particles (in the order of ids) and walls, after --xmove and --ymove.
+
+    inside: not beyond --leftwallid or --rightwallid; moments (n, 4): V s [N m]; volume (n,); thickness [m]; held (n,):
+    in contact with anything.
+    """
+
+    name: str
+    step: int
+    time: float
+    gid: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    radius: np.ndarray
+    color: np.ndarray
+    inside: np.ndarray
+    moments: np.ndarray
+    volume: np.ndarray
+    thickness: float
+    held: np.ndarray
+    walls: dict[str, np.ndarray]
+
+
+def look(path: Path, options: Options) -> Snapshot:
+    """Read a frame. Raises HpcdemError."""
+    frame = read_frame(path)
+    p = frame.tables["particles"].columns
+    if not len(frame.tables["particles"]):
+        raise HpcdemError(f"{path} has no particles; take it out of the folder")
+    bad = ~np.isfinite(p["x"] + p["y"] + p["radius"])
+    if bad.any():
+        raise HpcdemError(f"{path}: the place of particle {p['gid'][bad][0]} is not a number")
+    try:
+        moments, held = stress.moments(frame)
+        volume, thickness = stress.volume_rule(frame)
+    except HpcdemError as error:
+        raise HpcdemError(f"{path}: {error}") from None
+    move = np.array([options.xmove, options.ymove])
+    x, y, walls = p["x"] + move[0], p["y"] + move[1], frame.walls
+    diameter, extent = 2.0 * float(np.mean(p["radius"])), max(np.ptp(x), np.ptp(y)) + 2.0 * float(np.max(p["radius"]))
+    if not diameter <= options.size <= extent:
+        what = (
+            f"smaller than a particle ({diameter:.4g} m across)" if options.size < diameter else "larger than the model"
+        )
+        raise UsageError(f"-g {options.size:g}: {what} in {path}, {extent:.4g} m wide; give a spacing in between")
+    inside = np.ones(len(x), dtype=bool)
+    for wall, sign in ((options.left_wall, 1.0), (options.right_wall, -1.0)):
+        if wall is not None:
+            row = np.flatnonzero(walls["id"] == wall)
+            if not len(row):
+                ids = ", ".join(map(str, walls["id"])) or "none"
+                raise HpcdemError(f"{path} has no wall {wall}; its walls: {ids}")
+            middle = 0.5 * (walls["p1"][row[0], 0] + walls["p2"][row[0], 0]) + move[0]
+            inside &= sign * (x - middle) >= 0.0
+    if not inside.any():
+        raise HpcdemError(f"{path}: no particle lies between the walls given with --leftwallid and --rightwallid")
+    return Snapshot(
+        path.stem, frame.step, frame.time, p["gid"], x, y, p["radius"], p.get("color", np.zeros(len(x), np.int32)),
+        inside, moments, volume, thickness, held,
+        {"id": walls["id"], "p1": walls["p1"] + move, "p2": walls["p2"] + move, "color": walls["color"]},
+    )  # fmt: skip
+
+
+# --- two frames ------------------------------------------------------------------------------------------------
+
+
+class Earlier:
+    """The frame before, as it comes from the rank that read it: all particles by id, and which of them are inside."""
+
+    def __init__(self, name: str, packed: np.ndarray) -> None:
+        """packed: see `packed`."""
+        self.name = name
+        gid, self.x, self.y, self.radius = (np.ascontiguousarray(c) for c in packed[:, :4].T)
+        self.gid, self.inside = gid.view(np.int64), packed[:, 4] > 0.0
+
+
+def packed(s: Snapshot) -> np.ndarray:
+    """(n, 5): gid (its bits), x, y, radius, inside."""
+    return np.stack([s.gid.astype(np.int64).view(np.float64), s.x, s.y, s.radius, s.inside.astype(float)], axis=1)
+
+
+class Link(NamedTuple):
+    """From a frame to the next: rows (n,) of the later frame's particles among those of the earlier one, -1 for new
+    ones, and dF (m, 4) of the earlier one's; in both frames only those inside count."""
+
+    rows: np.ndarray
+    df: np.ndarray
+
+
+def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = grids.sums) -> Link:
+    """Compare two frames. Raises HpcdemError when particles were added or deleted without leave."""
+    at = np.minimum(np.searchsorted(earlier.gid, now.gid), len(earlier.gid) - 1)
+    there = earlier.gid[at] == now.gid
+    added, deleted = int((~there).sum()), len(earlier.gid) - int(there.sum())
+    for number, leave, option, what in (
+        (added, options.addball, "--addball", "added"),
+        (deleted, options.delball, "--delball", "deleted"),
+    ):
+        if number and not leave:
+            raise HpcdemError(
+                f"between {earlier.name} and {now.name} {number} particle{'s were' if number > 1 else ' was'} {what}: "
+                f"give {option}, or take out of the folder the frames that do not belong to it"
+            )
+    both = there & now.inside
+    both[both] = earlier.inside[at[both]]
+    row = at[both]
+    df = np.full((len(earlier.gid), 4), np.nan)
+    x, y = earlier.x[row], earlier.y[row]
+    df[row] = strain.increment(options.size, x, y, earlier.radius[row], now.x[both] - x, now.y[both] - y, sums)
+    place = np.cumsum(earlier.inside) - 1
+    return Link(np.where(both, place[at], -1)[now.inside], df[earlier.inside])
+
+
+def carried(link: Link, f_earlier: np.ndarray | None) -> np.ndarray:
+    """(n, 4): F of the later frame's particles, identity for new ones; that of the pair alone without `f_earlier`."""
+    old = link.rows >= 0
+    f = np.tile(strain.IDENTITY, (len(old), 1))
+    k = link.rows[old]
+    f[old] = link.df[k] if f_earlier is None else strain.times(link.df[k], f_earlier[k])
+    return f
+
+
+# --- the section -----------------------------------------------------------------------------------------------
+
+
+def make_section(s: Snapshot, f: np.ndarray, size: float, sums: strain.Sums = grids.sums) -> Section:
+    """Grid fields and particle columns of a frame; f (n, 4) of the particles inside."""
+    k = np.flatnonzero(s.inside)
+    x, y, radius, m = s.x[k], s.y[k], s.radius[k], s.moments[k]
+    pseudo = m / s.volume[k, None]
+    ev, ed = strain.volumetric(f), strain.distortional(f)
+    grid = grids.cover(size, x, y, radius)
+    known = np.isfinite(ev)
+    total = sums(
+        grid, x, y,
+        {
+            "area": np.pi * radius * radius, "sxx": m[:, 0], "sxy": 0.5 * (m[:, 1] + m[:, 2]), "syy": m[:, 3],
+            "known": known.astype(float), "volumetric": np.where(known, ev, 0.0),
+            "distortional": np.where(known, ed, 0.0),
+        },
+        1.0,
+    )  # fmt: skip
+    material = (total["number"] > 0) & grids.touched(grid, x, y, radius)
+    solid = solid_fraction(grid, total, x, y, radius)
+    fields = {}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for name in ("volumetric", "distortional"):
+            fields[name] = np.where(material, total[name] / total["known"], np.nan)
+        extent = total["area"] / solid * s.thickness
+        tensor = [np.where(material, total[name] / extent, np.nan) for name in ("sxx", "sxy", "syy")]
+    mean, shear, angle = stress.principal(*tensor)
+    fields |= {"mean": mean, "shear": shear, **dict(zip(("sxx", "sxy", "syy"), tensor)), "direction": angle}
+    particles = {
+        "gid": s.gid[k], "x": x, "y": y, "radius": radius, "color": s.color[k],
+        "pxx": pseudo[:, 0], "pxy": 0.5 * (pseudo[:, 1] + pseudo[:, 2]), "pyy": pseudo[:, 3],
+        "fxx": f[:, 0], "fxy": f[:, 1], "fyx": f[:, 2], "fyy": f[:, 3], "volumetric": ev, "distortional": ed,
+    }  # fmt: skip
+    top = s.held[k] if s.held[k].any() else slice(None)
+    line = surface(x[top], y[top], radius[top], size, 0.1 * size)
+    return Section(s.name, s.step, s.time, size, grid.x, grid.y, fields, particles, line, s.walls)
+
+
+def solid_fraction(
+    grid: grids.Grid, total: dict[str, np.ndarray], x: np.ndarray, y: np.ndarray, radius: np.ndarray
+) -> np.ndarray:
+    """(ny, nx): area of discs per area of the section around each node, without the share of empty space outside.
+
+    The mean over the nodes at most AROUND spacings away that lie INSIDE spacings from any empty place; the mean over
+    all of these where there is none near; over all that discs reach where the model is thin everywhere.
+    """
+    inner = _each_way(np.logical_and, total["number"] > 0, INSIDE)
+    if not inner.any():
+        fine = grids.cover(2.0 * float(np.mean(radius)), x, y, radius)
+        reached = float(grids.touched(fine, x, y, radius).sum()) * fine.size**2
+        return np.full(inner.shape, float(np.sum(np.pi * radius**2)) / reached)
+    area = np.where(inner, total["area"], 0.0)
+    count = _each_way(np.add, inner.astype(float), AROUND)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        near = np.where(count > 0.0, _each_way(np.add, area, AROUND) / count, area.sum() / inner.sum())
+    return near / (np.pi * grid.size**2)
+
+
+def _each_way(combine: np.ufunc, values: np.ndarray, reach: int) -> np.ndarray:
+    """Each value combined with those up to `reach` places away in both directions; zero outside."""
+    for axis in (0, 1):
+        padded = np.pad(values, [(reach, reach) if a == axis else (0, 0) for a in (0, 1)])
+        result = np.take(padded, range(values.shape[axis]), axis)
+        for k in range(1, 2 * reach + 1):
+            result = combine(result, np.take(padded, range(k, k + values.shape[axis]), axis))
+        values = result
+    return values
+
+
+# --- all frames ------------------------------------------------------------------------------------------------
+
+
+class _Single(Alone):
+    """The communicator of a rank that goes through the frames by itself."""
+
+    mpi: Any = None
+
+    def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
+        return parts
+
+
+def _rounds(comm: Any, log: Any, frames: list[FrameFile], options: Options, folder: Path, sums: strain.Sums) -> None:
+    """Collective over `comm`: one frame per rank and round."""
+    last = _Last()
+    began = told = time.monotonic()
+    for first in range(0, len(frames), comm.size):
+        last = _round(comm, frames, first, last, options, folder, sums)
+        done, now = min(first + comm.size, len(frames)), time.monotonic()
+        if now - told >= QUIET_SECONDS or done == len(frames):
+            name, speed = frames[done - 1].path.name, done / max(now - began, 1e-9)
+            log.info(f"{done} of {len(frames)} frames, to {name}, {speed:.3g} frames/s")
+            told = now
+
+
+class _Last(NamedTuple):
+    """What rank 0 keeps of the last frame of a round: particles as `packed`, and F."""
+
+    packed: np.ndarray = np.zeros((0, 5))
+    f: np.ndarray = np.zeros((0, 4))
+
+
+def _round(
+    comm: Any, frames: list[FrameFile], first: int, last: _Last, options: Options, folder: Path, sums: strain.Sums
+) -> _Last:
+    mine = first + comm.rank
+    file = frames[mine] if mine < len(frames) else None
+    now = _each(comm, lambda: look(file.path, options) if file else None)
+    arrived = _to_next(comm, packed(now) if now else last.packed[:0])
+    before = Earlier(frames[mine - 1].path.stem, last.packed if comm.rank == 0 else arrived) if now and mine else None
+    found = _each(comm, lambda: link(before, now, options, sums) if before and now else None)
+
+    # F goes from rank to rank, and from the last one to rank 0, where the next round begins.
+    f, f_before = np.zeros((0, 4)), last.f
+    for turn in range(comm.size):
+        if comm.rank == turn and now:
+            f = carried(found, None if options.increment else f_before) if found else _none(now)
+        passed = _to_next(comm, f if comm.rank == turn else f[:0])
+        f_before = passed if len(passed) else f_before
+    _each(comm, lambda: _write(make_section(now, f, options.size, sums), options, frames[0], folder) if now else None)
+    return _Last(arrived, f_before)
+
+
+def _none(now: Snapshot) -> np.ndarray:
+    """F before anything has happened."""
+    return np.tile(strain.IDENTITY, (int(now.inside.sum()), 1))
+
+
+def _to_next(comm: Any, rows: np.ndarray) -> np.ndarray:
+    """Collective: every rank's rows (n, k) go to the next rank, the last one's to rank 0; what came from the one
+    before."""
+    parts = [rows if r == (comm.rank + 1) % comm.size else rows[:0] for r in range(comm.size)]
+    return comm.alltoallv(parts)[(comm.rank - 1) % comm.size]
+
+
+def _write(section: Section, options: Options, first: FrameFile, folder: Path) -> None:
+    since = "the frame before" if options.increment else first.path.stem
+    section_files.write_out(folder / f"{section.name}.out", section, since)
+    section_files.write_grid(folder / f"{section.name}.vtkhdf", section)
+    write_section(section, folder / f"{section.name}.npz")
+
+
+def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, folder: Path) -> None:
+    """Collective: rank 0 goes through the frames, all ranks sum their columns of the grids."""
+    error = None
+    if comm.rank == 0:
+
+        def shared(grid: grids.Grid, *what: Any, **how: Any) -> dict[str, np.ndarray]:
+            comm.bcast((grid, what, how))
+            parts = comm.gather(_my_columns(comm, grid, what, how)) or []
+            return {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
+
+        try:
+            _, error = _tried(lambda: _rounds(_Single(), log, frames, options, folder, shared))
+        finally:
+            with suppress(HpcdemError):
+                comm.bcast(None)
+    else:
+        while (task := comm.bcast(None)) is not None:
+            comm.gather(_my_columns(comm, *task))
+    comm.agree(error)
+
+
+def _my_columns(comm: Any, grid: grids.Grid, what: tuple, how: dict) -> dict[str, np.ndarray]:
+    how = {**how, "columns": (grid.nx * comm.rank // comm.size, grid.nx * (comm.rank + 1) // comm.size)}
+    return grids.sums(grid, *what, **how)
