@@ -23,6 +23,7 @@ class Discs(Collection):
         self, places: np.ndarray, radius: np.ndarray, shades: np.ndarray, kind: np.ndarray, line: float = 0.0
     ) -> None:
         super().__init__()
+        self.set_in_layout(False)  # it has no outline that a layout could ask for
         self.places, self.radius, self.shades, self.kind, self.line = places, radius, shades, kind, line
 
     def draw(self, renderer: Any) -> None:

@@ -1,0 +1,140 @@
+"""`zdemss --dir DIR`: pictures of stress and strain from what `hpcdem -s DIR` has computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcdem.cli.common import HELP, PATH
+from hpcdem.runtime import launch
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+FORMATS = ("jpg", "png", "pdf", "svg", "ps")
+
+
+class Switch(click.ParamType):
+    """ON or OFF in any case, and further words that an option takes."""
+
+    name = "switch"
+
+    def __init__(self, *others: str) -> None:
+        self.words = ("ON", "OFF", *others)
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
+        return "/".join(self.words)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, bool):
+            return value
+        word = str(value).strip().upper()
+        if word in ("ON", "OFF"):
+            return word == "ON"
+        for other in self.words[2:]:
+            if word == other.upper():
+                return other
+        self.fail(f"{value!r} is none of {', '.join(self.words)}", param, ctx)
+
+
+class Formats(click.ParamType):
+    """Words of FORMATS with commas between them; eps is ps, jpeg is jpg."""
+
+    name = "formats"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        words = [{"eps": "ps", "jpeg": "jpg"}.get(w, w) for w in str(value).lower().replace(" ", "").split(",")]
+        for word in words:
+            if word not in FORMATS:
+                self.fail(f"{word!r} is not a format of pictures; expected some of {', '.join(FORMATS)}", param, ctx)
+        return tuple(dict.fromkeys(words))
+
+
+SWITCH, POSITIVE = Switch(), click.FloatRange(0.0, min_open=True)
+
+
+def _switch(name: str, default: str, text: str, *more: str) -> Any:
+    return click.option(name, *more, type=SWITCH, default=default, help=f"{text} [{default}].")
+
+
+def _length(name: str, default: float | None, text: str, said: str | None = None) -> Any:
+    said = f"{default:g}" if said is None else said
+    return click.option(name, type=POSITIVE, default=default, metavar="VALUE", help=f"{text} [{said}].")
+
+
+@click.command(
+    context_settings=HELP, no_args_is_help=True, epilog="`hpcdem -s DIR` comes first: it computes what is drawn here."
+)
+@click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
+@_switch("--addball", "OFF", "Particles were added between the frames")
+@_switch("--delball", "OFF", "Particles were removed between the frames")
+@_switch("--strainvol", "ON", "Draw volumetric strain")
+@_switch("--strainshear", "ON", "Draw distortional strain")
+@_switch("--stressmean", "ON", "Draw mean stress")
+@_switch("--stressshear", "ON", "Draw maximum shear stress")
+@_switch("--sigma1", "OFF", "Draw the largest principal stress as bars over the distortional strain")
+@_length("--scale", 1.0, "Length of these bars: gridsize times this where the stress is largest")
+@_length("--gridsize", 600.0, "Side of the squares over which they are averaged (m)")
+@_switch("--showcolorbar", "ON", "Draw colour bars")
+@click.option(
+    "--showlable", "--showable", "--showlabel", "labels", type=Switch("abc"), default="OFF",
+    help="Name the panels; abc: by letters only [OFF].",
+)  # fmt: skip
+@click.option(
+    "--straincolormap",
+    default="default",
+    metavar="FILE",
+    help="GMT colour table (CPT) for both strains, or invar, invar2 [default].",
+)
+@_length("--maxstress", 300.0, "Stress at the end of the colour bar (MPa)")
+@_length("--xmax", None, "Where the x axis ends (km)", "all is shown")
+@_length("--ymax", None, "Where the y axis ends (km)", "all is shown")
+@click.option(
+    "--width", type=click.FloatRange(5.0, 100.0), default=14.0, metavar="VALUE", help="Width of the pictures (cm) [14]."
+)
+@click.option(
+    "--format", "formats", type=Formats(), default="jpg,ps", metavar="LIST",
+    help=f"Some of {', '.join(FORMATS)} with commas between them [jpg,ps].",
+)  # fmt: skip
+@click.version_option(launch.version(), "-v", "--version", prog_name="zdemss", message="%(prog)s %(version)s")
+def zdemss(**options: object) -> None:
+    """Draw stress and strain of the frames in DIR, after `hpcdem -s DIR`.
+
+    Pages as DIR/ss/*.jpg and DIR/ss/ps/*.ps, numbers in DIR/ss/data2ps, grids in DIR/ss/Tmp.
+    """
+
+
+def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """Collective: draw what the command line asks for. Raises HpcdemError on all ranks."""
+    from hpcdem.post.sections import draw, panels
+
+    switches = {
+        panels.VOLUMETRIC: "strainvol",
+        panels.DISTORTIONAL: "strainshear",
+        panels.MEAN: "stressmean",
+        panels.SHEAR: "stressshear",
+    }
+    kinds = tuple(kind for kind in panels.KINDS if kind is panels.DEFORMATION or options[switches[kind]])
+    colormap = options["straincolormap"]
+    request = draw.Request(
+        folder=options["folder"],
+        kinds=kinds,
+        formats=options["formats"],
+        addball=options["addball"],
+        delball=options["delball"],
+        colorbar=options["showcolorbar"],
+        labels={True: "on", False: "off"}.get(options["labels"], "abc"),
+        colormap=None if colormap.lower() == "default" else Path(colormap),
+        sigma1=(options["gridsize"], options["scale"]) if options["sigma1"] else None,
+        width=options["width"],
+        xmax=None if options["xmax"] is None else 1000.0 * options["xmax"],
+        ymax=None if options["ymax"] is None else 1000.0 * options["ymax"],
+        maxstress=options["maxstress"],
+    )
+    draw.refuse(request)
+    draw.draw_folder(request, comm, log)
