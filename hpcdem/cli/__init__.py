@@ -89,4 +89,5 @@ def start_zdemss() -> NoReturn:
 def start(name: str, words: list[str]) -> NoReturn:
     """A program that looks at finished runs: its module holds a command of the same name, and a function `work`."""
     module = importlib.import_module(f"hpcdem.cli.{name}")
-    run_program(getattr(module, name), name if name.startswith("zdem") else f"hpcdem {name}", words, module.work)
+    shown = {"strain_stress": "hpcdem", "movie": "hpcdem movie", "measure": "hpcdem measure"}.get(name, name)
+    run_program(getattr(module, name), shown, words, module.work)

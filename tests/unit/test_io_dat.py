@@ -13,7 +13,7 @@ from hpcdem.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.frame import Frame
-from tests.unit.io_synthetic import GROUPS, make_frame
+from tests.unit.io_synthetic import GROUPS, assert_same, make_frame
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -134,6 +134,25 @@ def test_only_the_tables_asked_for_are_read(tmp_path: Path) -> None:
     assert len(back.tables["particles"]) == 40 and len(back.walls["id"]) == 7
     assert [len(back.tables[k]) for k in ("contacts", "bonds", "wall_contacts")] == [0, 0, 0]
     assert len(read_dat(written(tmp_path, make_frame(40)), ()).tables["particles"]) == 0
+
+
+def test_tables_are_read_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever they are cut; with line ends of both kinds, and where files cannot be mapped."""
+    path = written(tmp_path, make_frame(200))
+    whole = read_dat(path)
+    text = path.read_bytes()
+    for size in (400, 777, 5000):
+        monkeypatch.setattr("hpcdem.io.dat._PIECE", size)
+        assert_same(read_dat(path), whole)
+    path.write_bytes(text.replace(b"\n", b"\r\n"))
+    assert_same(read_dat(path), whole)
+    path.write_bytes(text)
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OSError("no maps here")
+
+    monkeypatch.setattr("hpcdem.io.dat.mmap.mmap", refuse)
+    assert_same(read_dat(path), whole)
 
 
 def test_large_numbers_keep_their_places_apart(tmp_path: Path) -> None:

@@ -1,0 +1,78 @@
+"""`hpcdem -s DIR`: stress and strain of the frames of a finished run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcdem.cli.common import HELP, PATH
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+
+@click.command(context_settings=HELP, epilog="Draw the results with `zdemss --dir DIR`. Also under mpiexec or srun.")
+@click.option(
+    "-s", "--strain-stress", "--strin-stres", "folder", type=PATH, metavar="DIR", required=True,
+    help="Stress and strain of the frames in DIR, into DIR/ss/data.",
+)  # fmt: skip
+@click.option("-g", "--grid", "size", type=float, default=200.0, metavar="SIZE", help="Spacing of the grid in m [200].")
+@click.option("--addball", is_flag=True, help="Particles were added between frames (sedimentation).")
+@click.option("--delball", is_flag=True, help="Particles were deleted between frames (erosion).")
+@click.option("--leftwallid", type=int, metavar="ID", help="Leave out the particles to the left of this wall.")
+@click.option("--rightwallid", type=int, metavar="ID", help="Leave out the particles to the right of this wall.")
+@click.option("--xmove", type=float, default=0.0, metavar="X", help="Add X [m] to all x [0].")
+@click.option("--ymove", type=float, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
+@click.option("--increment", is_flag=True, help="Strain since the frame before, not since the first one.")
+@click.option(
+    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
+)
+def strain_stress(**options: Any) -> None:
+    """Stress and strain of the frames of a finished run, on a grid and on the particles.
+
+    Strain is that since the first frame of DIR. Results of an earlier call are replaced when the new ones are complete.
+    """
+
+
+def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """Collective: what the command does once the ranks are together; options by the names of its parameters."""
+    load_kernels(comm)
+    from hpcdem.post.strain_stress import Options, run
+
+    run(
+        comm,
+        log,
+        Options(
+            folder=Path(options["folder"]), size=options["size"], left_wall=options["leftwallid"],
+            right_wall=options["rightwallid"], xmove=options["xmove"], ymove=options["ymove"],
+            addball=options["addball"], delball=options["delball"], increment=options["increment"],
+        ),
+    )  # fmt: skip
+
+
+def load_kernels(comm: SerialComm) -> None:
+    """Collective: compile or load what writes text, in a cache folder of its own: that of the runs holds all kernels
+    of a run, or does not exist. Rank 0 goes first. Before any import of hpcdem.io."""
+    from hpcdem.runtime import warmup
+    from hpcdem.runtime.launch import patient_barrier
+
+    folder, _ = warmup.cache_folder()
+    folder = folder.with_name(f"{folder.name}-text")
+    for first in (True, False):
+        if (comm.rank == 0) is first:
+            warmup.load_kernels(folder, _write_a_little)
+        patient_barrier(comm)
+
+
+def _write_a_little() -> None:
+    import numpy as np
+
+    from hpcdem.io.textnum import INT, Column, TextTable, sci
+
+    numbers = np.array([1.5, np.nan])
+    columns = [(Column("id", INT, 11), np.array([1, 2])), (sci("x", 13), numbers), (sci("y"), numbers)]
+    for _ in TextTable(columns).blocks():
+        pass

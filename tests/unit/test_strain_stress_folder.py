@@ -1,0 +1,410 @@
+"""`hpcdem -s DIR`: from a folder of frames to sections, on any number of ranks; and what it refuses."""
+
+from __future__ import annotations
+
+import copy
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from hpcdem.cli.strain_stress import strain_stress as command
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io.dat import read_dat, write_dat
+from hpcdem.io.frame import Frame
+from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.post import strain, strain_stress
+from hpcdem.post.section import PARTICLE_FIELDS, UNITS, Section, read_section, write_section
+from tests.unit import bed
+
+ROOT = Path(__file__).resolve().parents[2]
+ALONE = SerialComm()
+
+
+class Log:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def info(self, text: str) -> None:
+        self.lines.append(text)
+
+    def warn(self, text: str) -> None:
+        self.lines.append(f"warning: {text}")
+
+
+def write(folder: Path, frames: list[Frame], names: list[str] | None = None) -> Path:
+    """Frames as VTKHDF under their steps, or under the names given (.dat or .vtkhdf)."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for k, frame in enumerate(frames):
+        path = folder / (names[k] if names else f"all_{frame.step:010d}.vtkhdf")
+        (write_dat if path.suffix == ".dat" else write_vtkhdf)(path, frame, ALONE)
+    return folder
+
+
+def compute(folder: Path, **options: Any) -> list[Section]:
+    """The sections of a folder, in the order of frames."""
+    options.setdefault("addball", True)
+    options.setdefault("delball", True)
+    strain_stress.run(ALONE, Log(), strain_stress.Options(folder, **options))
+    return sections(folder)
+
+
+def sections(folder: Path) -> list[Section]:
+    found = [read_section(path) for path in (folder / "ss" / "data").glob("*.npz")]
+    return sorted(found, key=lambda s: (s.step, not s.initial))
+
+
+def moved(frame: Frame, step: int, matrix: np.ndarray) -> Frame:
+    """The frame later, after x -> matrix x about its middle."""
+    later = copy.deepcopy(frame)
+    later.step = step
+    p = later.tables["particles"].columns
+    centre = np.array([3000.0, 1500.0])
+    p["x"], p["y"] = (np.stack([p["x"], p["y"]], axis=1) - centre).dot(matrix.T).T + centre[:, None]
+    return later
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[Frame]:
+    return list(bed.pushed())
+
+
+# --- what is computed --------------------------------------------------------------------------------------------
+
+
+def test_strain_adds_up_from_the_first_frame(frames: list[Frame], tmp_path: Path) -> None:
+    shear, turn = np.array([[1.0, 0.3], [0.0, 1.0]]), np.array([[0.0, -1.0], [1.0, 0.0]])
+    folder = write(tmp_path, [frames[0], moved(frames[0], 3500, shear), moved(frames[0], 4000, turn @ shear)])
+    first, second, third = compute(folder, addball=False, delball=False)
+    expected = np.sqrt(0.3**4 / 16.0 + 0.3**2 / 4.0)
+    for section, f, ed in ((first, np.eye(2), 0.0), (second, shear, expected), (third, turn @ shear, expected)):
+        p = section.particles
+        columns = np.stack([p[n] for n in ("fxx", "fxy", "fyx", "fyy")])
+        np.testing.assert_allclose(columns, f.reshape(4, 1) + 0.0 * p["x"], atol=1e-11)
+        # the sense of rotation is that of all that happened, the quarter turn included
+        sign = -1.0 if section is third else 1.0
+        np.testing.assert_allclose(p["distortional"], sign * ed, atol=1e-11)
+        for name, value in (("volumetric", 0.0), ("distortional", sign * ed)):
+            values = section.fields[name]
+            np.testing.assert_allclose(values[np.isfinite(values)], value, atol=1e-9)
+            assert np.isfinite(values).sum() > 100
+    increments = compute(folder, increment=True)
+    p = increments[2].particles
+    np.testing.assert_allclose([p["fxx"][7], p["fxy"][7]], [0.0, -1.0], atol=1e-11)
+    assert np.abs(p["distortional"]).max() < 1e-11
+
+
+def test_sections_say_what_they_hold(frames: list[Frame], tmp_path: Path) -> None:
+    found = compute(write(tmp_path, frames))
+    assert [s.step for s in found] == [f.step for f in frames]
+    for section, frame in zip(found, frames):
+        assert set(section.fields) == set(UNITS) and tuple(section.particles) == PARTICLE_FIELDS
+        assert all(v.shape == (len(section.y), len(section.x)) for v in section.fields.values())
+        assert (section.time, section.size) == (frame.time, 200.0)
+        np.testing.assert_array_equal(section.particles["gid"], frame.tables["particles"].columns["gid"])
+        np.testing.assert_array_equal(section.walls["p2"], frame.walls["p2"])
+        mean, shear, direction = (section.fields[n] for n in ("mean", "shear", "direction"))
+        sxx, sxy, syy = (section.fields[n] for n in ("sxx", "sxy", "syy"))
+        np.testing.assert_allclose(mean + shear * np.cos(2 * direction), sxx, atol=1e-6 * np.nanmax(mean))
+        np.testing.assert_allclose(shear * np.sin(2 * direction), sxy, atol=1e-6 * np.nanmax(mean))
+        np.testing.assert_allclose(mean - shear * np.cos(2 * direction), syy, atol=1e-6 * np.nanmax(mean))
+    # the wall has come in by 200 m and more: so much shorter is the bed, and so much more does it push back
+    first, second = found[:2]
+    way = frames[1].walls["p1"][frames[1].walls["id"] == 1][0, 0]
+    assert way > 190.0
+    assert np.mean(second.particles["fxx"]) - 1.0 == pytest.approx(-way / bed.WIDTH, rel=0.1)
+    assert np.mean(second.particles["fyy"]) > 1.005 and np.nanmean(second.fields["volumetric"]) < 0.0
+    assert np.nanmean(second.fields["sxx"]) > 1.5 * np.nanmean(first.fields["sxx"])
+
+
+def test_particles_added_and_deleted(frames: list[Frame], tmp_path: Path) -> None:
+    """The added begin without strain, the deleted are left out, and the others keep what they have."""
+    before, after = compute(write(tmp_path, frames[2:]))
+    new = ~np.isin(after.particles["gid"], before.particles["gid"])
+    assert 0 < new.sum() < 30
+    f = np.stack([after.particles[n] for n in ("fxx", "fxy", "fyx", "fyy")], axis=1)
+    np.testing.assert_array_equal(f[new], np.tile(strain.IDENTITY, (new.sum(), 1)))
+    assert (f[~new] != strain.IDENTITY).any(axis=1).all()
+    _, before, after = compute(write(tmp_path / "b", frames[:3]))
+    assert len(after.particles["gid"]) < len(before.particles["gid"])
+    assert np.isin(after.particles["gid"], before.particles["gid"]).all()
+
+
+def test_walls_cut_the_section(frames: list[Frame], tmp_path: Path) -> None:
+    whole = compute(write(tmp_path, frames[:2]))
+    wall = {int(i): 0.5 * (a[0] + b[0]) for i, a, b in zip(*(frames[1].walls[k] for k in ("id", "p1", "p2")))}
+    assert wall[1] > 100.0
+    later = copy.deepcopy(frames[1])
+    p = later.tables["particles"].columns
+    out = int(np.argmin(p["x"]))
+    p["x"][out] = wall[1] - 10.0  # squeezed out behind the wall
+    write(tmp_path, [later])
+    cut = compute(tmp_path, left_wall=1, addball=False, delball=False)
+    assert len(cut[1].particles["gid"]) == len(p["gid"]) - 1 and p["gid"][out] not in cut[1].particles["gid"]
+    assert p["gid"][out] in cut[0].particles["gid"]
+    assert len(compute(tmp_path, right_wall=2)[1].particles["gid"]) == len(p["gid"])
+    with pytest.raises(HpcdemError, match="no particle lies between the walls"):
+        compute(tmp_path, right_wall=1)
+    assert len(whole[1].particles["gid"]) == len(p["gid"])
+
+
+def test_a_shift_moves_everything_and_changes_nothing(frames: list[Frame], tmp_path: Path) -> None:
+    plain = compute(write(tmp_path, frames[:2]))[1]
+    shifted = compute(tmp_path, xmove=-1000.0, ymove=400.0)[1]
+    np.testing.assert_array_equal(shifted.x, plain.x - 1000.0)
+    np.testing.assert_array_equal(shifted.y, plain.y + 400.0)
+    np.testing.assert_allclose(shifted.walls["p1"], plain.walls["p1"] + [-1000.0, 400.0])
+    np.testing.assert_allclose(shifted.surface, plain.surface + [-1000.0, 400.0], atol=1e-6)
+    for name, values in plain.fields.items():
+        np.testing.assert_allclose(shifted.fields[name], values, rtol=1e-6, atol=1e-7 * np.nanmax(np.abs(values)))
+
+
+def test_dat_and_vtkhdf_give_the_same_section(frames: list[Frame], tmp_path: Path) -> None:
+    """To the digits of the text; also with the two mixed, and where a file of ZDEM has no contact points."""
+    exact = compute(write(tmp_path / "a", frames[:2]))[1]
+    names = [f"all_{f.step:010d}.dat" for f in frames[:2]]
+    text = compute(write(tmp_path / "b", frames[:2], names))[1]
+    mixed = compute(write(tmp_path / "c", frames[:2], [names[0], f"all_{frames[1].step:010d}.vtkhdf"]))[1]
+    bare = tmp_path / "d"
+    write(bare, frames[:2], names)
+    for name in names:
+        lines = (bare / name).read_text()
+        for table in ("wall_id", "id1"):  # as if x and y were called something else
+            lines = re.sub(
+                rf"(\n +{table} .*globalFy) +x +y ", lambda m: m[1] + " " * 16 + "q" + " " * 16 + "p ", lines
+            )
+        (bare / name).write_text(lines)
+    assert "x" not in read_dat(bare / names[0]).tables["contacts"].columns
+    for other in (text, mixed, compute(bare)[1]):
+        for name, values in exact.fields.items():
+            if name != "direction":
+                np.testing.assert_allclose(
+                    other.fields[name], values, atol=1e-6 * np.nanmax(np.abs(values)), err_msg=name
+                )
+        for name, values in exact.particles.items():
+            np.testing.assert_allclose(
+                other.particles[name], values, atol=1e-6 * np.nanmax(np.abs(values)), err_msg=name
+            )
+        np.testing.assert_allclose(other.surface, exact.surface, atol=1e-6)
+
+
+def test_a_file_as_zdem_writes_it(tmp_path: Path) -> None:
+    """Its walls have ids of their own and its contacts no places: particle 4 on the floor, y = 10, and its two contacts
+    are enough for its stress."""
+    text = (ROOT / "tests" / "unit" / "io_zdem_2.2.dat").read_text()
+    path = tmp_path / "all_0000000100.dat"
+    path.write_text(text)
+    seen = strain_stress.look(path, strain_stress.Options(tmp_path, size=110.0))
+    assert seen.gid.tolist() == [0, 4, 7] and seen.held.all()
+    centre = {0: (100.5, 61.25), 4: (61.0, 148.0), 7: (190.125, 80.0)}
+
+    def place(a: int, b: int, ra: float, rb: float) -> np.ndarray:
+        way = np.subtract(centre[b], centre[a])
+        d = np.hypot(*way)
+        return way * (ra - 0.5 * (ra + rb - d)) / d
+
+    # on 4: the opposite of what it does to 7, what 0 does to it, and the floor from half the overlap below its face
+    expected = -np.outer(place(4, 7, 50.0, 60.0), (-3e9, 2e9)) - np.outer(place(4, 0, 50.0, 50.0), (-4e9, 9e9))
+    floor = np.array([0.0, -0.5 * (50.0 + 138.0)])
+    expected -= np.outer(floor, (0.0, 250.5))
+    np.testing.assert_allclose(seen.moments[1], expected.ravel(), rtol=1e-9)
+
+
+# --- files -------------------------------------------------------------------------------------------------------
+
+
+def test_the_text_has_one_row_per_particle(frames: list[Frame], tmp_path: Path) -> None:
+    section = compute(write(tmp_path, frames[:2]))[1]
+    path = tmp_path / "ss" / "data" / f"{section.name}.out"
+    head, words = path.read_text().splitlines()[:2]
+    assert section.name in head and f"step {section.step}" in head and "200 m" in head and "since all_" in head
+    names = words.removeprefix("#").split()
+    assert names == "id x[m] y[m] rad[m] color pxx[Pa] pxy[Pa] pyy[Pa] Fxx Fxy Fyx Fyy ev[%] ed".split()
+    rows = np.loadtxt(path)
+    for column, values in zip(rows.T, (section.particles[n] for n in PARTICLE_FIELDS)):
+        np.testing.assert_allclose(column, values, rtol=1e-8)
+
+
+def test_paraview_reads_the_grid(frames: list[Frame], tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    section = compute(write(tmp_path, frames[:2]))[1]
+    mesh = pyvista.read(tmp_path / "ss" / "data" / f"{section.name}.vtkhdf")
+    assert isinstance(mesh, pyvista.ImageData)
+    assert mesh.dimensions == (len(section.x), len(section.y), 1)
+    assert mesh.origin == (section.x[0], section.y[0], 0.0) and mesh.spacing == (200.0, 200.0, 200.0)
+    for name, values in section.fields.items():
+        np.testing.assert_array_equal(mesh.point_data[name].reshape(values.shape), values)
+    assert np.isnan(mesh.point_data["mean"]).any()
+    np.testing.assert_array_equal(mesh.field_data["TimeValue"], [section.time])
+
+
+def test_sections_come_back(frames: list[Frame], tmp_path: Path) -> None:
+    section = compute(write(tmp_path, frames[:1]))[0]
+    path = tmp_path / "ss" / "data" / f"{section.name}.npz"
+    again = read_section(write_section(section, tmp_path / "b.npz"))
+    assert (tmp_path / "b.npz").read_bytes() == path.read_bytes()
+    for mine, theirs in ((section.fields, again.fields), (section.particles, again.particles)):
+        assert list(mine) == list(theirs)
+        for name, values in mine.items():
+            np.testing.assert_array_equal(values, theirs[name])
+    whole = path.read_bytes()
+    for damaged in (b"", b"text", whole[: len(whole) // 2], whole[:-30]):
+        path.write_bytes(damaged)
+        with pytest.raises(HpcdemError, match=r"\.npz: not a section written by hpcdem -s"):
+            read_section(path)
+    np.savez(path, other=np.zeros(3))
+    with pytest.raises(HpcdemError, match="not a section"):
+        read_section(path)
+
+
+def test_results_are_replaced_only_by_complete_ones(frames: list[Frame], tmp_path: Path) -> None:
+    compute(write(tmp_path, frames[:2]))
+    results = tmp_path / "ss" / "data"
+    (results / "notes.txt").write_text("mine")
+    old = {p.name: p.read_bytes() for p in results.iterdir()}
+    write(tmp_path, frames[2:3])
+    with pytest.raises(HpcdemError, match=r"\d+ particles were deleted: give --delball"):
+        compute(tmp_path, delball=False)
+    assert {p.name: p.read_bytes() for p in results.iterdir()} == old
+    assert [p.name for p in results.parent.iterdir()] == ["data"]
+    for path in tmp_path.glob("all_*"):
+        path.unlink()
+    compute(write(tmp_path, frames[3:]))
+    name = f"all_{frames[3].step:010d}"
+    assert {p.name for p in results.iterdir()} == {"notes.txt", f"{name}.npz", f"{name}.out", f"{name}.vtkhdf"}
+
+
+def test_ini_frames_come_first(frames: list[Frame], tmp_path: Path) -> None:
+    later = copy.deepcopy(frames[1])
+    later.step = frames[0].step
+    names = [f"all_{later.step:010d}{ini}.vtkhdf" for ini in ("_ini", "")]
+    first, second = compute(write(tmp_path, [frames[0], later], names))
+    assert first.initial and not second.initial and not first.particles["distortional"].any()
+    assert np.nanmax(np.abs(second.particles["distortional"])) > 0.02
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from mpi4py import MPI
+from hpcdem.cli.strain_stress import strain_stress, work
+from hpcdem.halo.comm import MpiComm
+from hpcdem.errors import HpcdemError
+from hpcdem.runtime.progress import Log
+
+comm = MpiComm(MPI.COMM_WORLD)
+try:
+    work(comm, Log(comm.rank), strain_stress.make_context("hpcdem", sys.argv[2:]).params)
+except HpcdemError as error:
+    comm.barrier()
+    print(f"rank {comm.rank}: {error}")
+"""
+
+
+@pytest.mark.mpi
+def test_any_number_of_ranks_writes_the_same_bytes(launch: Any, frames: list[Frame], tmp_path: Path) -> None:
+    """Three frames: shared in rounds by 1 and 2 ranks, each shared by 4."""
+    (tmp_path / "program.py").write_text(PROGRAM)
+    folder = write(tmp_path / "data", frames[1:])
+    results = folder / "ss" / "data"
+    files = {}
+    for ranks in (1, 2, 4):
+        shutil.rmtree(folder / "ss", ignore_errors=True)
+        done = launch.python(
+            ranks, "program.py", ROOT, "-s", folder, "--addball", "--delball", "--xmove", "-10", "--leftwallid", "1",
+            cwd=tmp_path, timeout=200,
+        )  # fmt: skip
+        assert done.returncode == 0 and "3 frames in" in done.stdout, done.stderr
+        assert ("share each frame" in done.stdout) == (ranks > 3)
+        files[ranks] = {p.name: p.read_bytes() for p in results.iterdir()}
+        assert len(files[ranks]) == 9
+    for ranks in (2, 4):
+        assert files[ranks].keys() == files[1].keys()
+        for name, data in files[1].items():
+            assert files[ranks][name] == data, (ranks, name)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [2, 4])
+def test_a_refusal_reaches_all_ranks(launch: Any, frames: list[Frame], tmp_path: Path, ranks: int) -> None:
+    (tmp_path / "program.py").write_text(PROGRAM)
+    folder = write(tmp_path / "data", frames[1:])
+    done = launch.python(ranks, "program.py", ROOT, "-s", folder, cwd=tmp_path, timeout=200)
+    assert done.returncode == 0, done.stderr
+    assert sorted(re.findall(r"rank (\d): between all_0000005000 and all_0000006000 \d+ particles were deleted",
+                             done.stdout)) == [str(r) for r in range(ranks)]  # fmt: skip
+    assert list((folder / "ss").iterdir()) == []
+
+
+# --- what is refused ---------------------------------------------------------------------------------------------
+
+
+def test_one_frame_has_stress_only(frames: list[Frame], tmp_path: Path) -> None:
+    log = Log()
+    folder = write(tmp_path, frames[:1])
+    strain_stress.run(ALONE, log, strain_stress.Options(folder))
+    assert any("only frame: its strain is zero" in line for line in log.lines)
+    (section,) = sections(folder)
+    assert not section.particles["volumetric"].any() and np.nanmax(section.fields["mean"]) > 1e7
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"size": 0.0}, r"-g 0: .* larger than 0"),
+        ({"size": -5.0}, r"-g -5: .* larger than 0"),
+        ({"size": float("nan")}, r"-g nan: .* larger than 0"),
+        ({"size": 100.0}, r"-g 100: smaller than a particle \(1\d\d"),
+        ({"size": 7000.0}, r"-g 7000: larger than the model in .*\.vtkhdf, 6\d\d\d m wide"),
+        ({"left_wall": 17}, r"all_0000003000.vtkhdf has no wall 17; its walls: 0, 1, 2"),
+        ({"addball": False, "delball": True}, r"between all_0000006000 and all_0000006500 20 .* added: give --addball"),
+        ({"delball": False}, r"between all_0000005000 and all_0000006000 \d+ .* deleted: give --delball"),
+    ],
+)
+def test_what_makes_no_sense_is_named(frames: list[Frame], tmp_path: Path, options: dict, message: str) -> None:
+    with pytest.raises(HpcdemError, match=message):
+        compute(write(tmp_path, frames), **options)
+
+
+def test_folders_without_frames(frames: list[Frame], tmp_path: Path) -> None:
+    with pytest.raises(HpcdemError, match="cannot read the folder"):
+        compute(tmp_path / "none")
+    (tmp_path / "letter.txt").write_text("not a frame")
+    with pytest.raises(HpcdemError, match="holds no frames"):
+        compute(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["letter.txt"]
+    empty = copy.deepcopy(frames[0])
+    for table in empty.tables.values():
+        table.columns, table.total = {k: v[:0] for k, v in table.columns.items()}, 0
+    with pytest.raises(HpcdemError, match="has no particles; take it out"):
+        compute(write(tmp_path / "b", [empty]))
+    broken = copy.deepcopy(frames[0])
+    broken.tables["particles"].columns["x"][3] = np.nan
+    with pytest.raises(HpcdemError, match="the place of particle 3 is not a number"):
+        compute(write(tmp_path / "c", [broken]))
+    (tmp_path / "d").mkdir()
+    (tmp_path / "d" / "all_0000000001.dat").write_text("rubbish")
+    with pytest.raises(HpcdemError, match="no frame of ZDEM or hpcdem"):
+        compute(tmp_path / "d")
+
+
+def test_the_command_line_is_that_of_the_manual() -> None:
+    words = "--xmove -1000.0 --ymove -1000.0 -j 12 --addball --delball -s ./datass".split()
+    values = command.make_context("zdem", words).params
+    assert values == {
+        "folder": Path("datass"), "size": 200.0, "addball": True, "delball": True, "leftwallid": None,
+        "rightwallid": None, "xmove": -1000.0, "ymove": -1000.0, "increment": False, "threads": 12,
+    }  # fmt: skip
+    for name in ("--strin-stres", "--strain-stress"):
+        assert command.make_context("zdem", [name, "a", "--grid", "50", "--leftwallid", "0"]).params["leftwallid"] == 0
+    shown = CliRunner().invoke(command, ["--hlep"]).output
+    assert "--delball" in shown and "DIR/ss/data" in shown
+    with pytest.raises(UsageError, match="-g 0"):
+        strain_stress.run(ALONE, Log(), strain_stress.Options(Path("."), size=0.0))
