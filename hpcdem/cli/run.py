@@ -205,10 +205,10 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 @click.command(
     context_settings=HELP,
     no_args_is_help=True,
-    epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s --help), `hpcdem measure "
-    "DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs. Exit "
-    "codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a checkpoint "
-    "(go on with --resume).",
+    epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s DIR --help), `hpcdem "
+    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs. "
+    "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a "
+    "checkpoint (go on with --resume).",
 )
 @click.argument("script", type=PATH)
 @click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")
