@@ -21,6 +21,6 @@ class Settings:
     print: int = 0
     ps: int = 0
     vtk: int = 0
-    seed: int = 3
+    seed: int = 5
     wallside: str = "both"
     gentry: float = 0.0

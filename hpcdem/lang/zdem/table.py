@@ -343,7 +343,7 @@ _SETTINGS = (
     _interval("print", "a frame .dat and .vtkhdf every so many steps"),
     _interval("ps", "a vector picture every so many steps"),
     _interval("vtk", "a .vtk file every so many steps"),
-    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="3", source="X"),
+    Option("seed", "start of the random numbers of GEN", kind=INDEX, default="5", source="X"),
     Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
            kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
     Option("gentry", "attempts of GEN per particle asked for; not set: GEN gives up after 1000 failures in a row",
