@@ -89,7 +89,7 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
     "--straincolormap",
     default="default",
     metavar="FILE",
-    help="GMT colour table (CPT) for both strains, or invar, invar2 [default].",
+    help="GMT colour table (CPT) for both strains, or invar, invar2 [default: invar2 for the distortional one].",
 )
 @_length("--maxstress", 300.0, "Stress at the end of the colour bar (MPa)")
 @_length("--xmax", None, "Where the x axis ends (km)", "all is shown")

@@ -32,7 +32,8 @@ def frame_name(step: int, suffix: str, ini: bool = False, stem: str = "all") -> 
 
 
 def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
-    """The frames in a folder by step, the `_ini` one before the other of the same step.
+    """The frames in a folder in the order of time: by step, the `_ini` one after the other of the same step, since it
+    shows what was done between two commands.
 
     Where a frame is there in several formats, the first of FORMATS is taken. Raises HpcdemError if the folder
     cannot be read.
@@ -45,9 +46,9 @@ def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
     for name in sorted(names):
         found = _NAME.fullmatch(name)
         if found and found[3] in FORMATS:
-            key = int(found[1]), found[2] is None
+            key = int(found[1]), found[2] is not None
             best[key] = min(best.get(key, (len(FORMATS), "")), (FORMATS.index(found[3]), name))
-    return [FrameFile(Path(folder) / name, step, not plain) for (step, plain), (_, name) in sorted(best.items())]
+    return [FrameFile(Path(folder) / name, step, ini) for (step, ini), (_, name) in sorted(best.items())]
 
 
 def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:

@@ -75,7 +75,7 @@ def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
         return
     x, y, radius = (np.asarray(columns[name], dtype=float) for name in ("x", "y", "radius"))
     kept = np.isfinite(x) & np.isfinite(y) & (radius > 0.0)
-    kept[kept] = _in_large_pieces(x[kept], y[kept], radius[kept])
+    kept[kept] = in_large_pieces(x[kept], y[kept], radius[kept])
     if not kept.any():
         return
     x, y, radius = x[kept], y[kept], radius[kept]
@@ -86,7 +86,7 @@ def surface(frame: Frame, ax: Any, look: Look = USUAL) -> None:
     _polylines(ax, [line], INK, 0.75 * look.line)
 
 
-def _in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
+def in_large_pieces(x: np.ndarray, y: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Whether each disc is in a piece of at least LOOSE of all. Discs hang together where the squares of a grid, as
     wide as the largest diameter, do."""
     from scipy import ndimage

@@ -23,7 +23,7 @@ _EXACT = 160
 
 
 def pages(folder: str | os.PathLike) -> list[Path]:
-    """The numbered pictures *.jpg of a folder in the order of their steps, the `_ini` one first; the most frequent
+    """The numbered pictures *.jpg of a folder in the order of time, as `frames.list_frames`; the most frequent
     kind where there are several. Raises HpcdemError where there is none."""
     try:
         names = sorted(os.listdir(folder))
@@ -32,7 +32,7 @@ def pages(folder: str | os.PathLike) -> list[Path]:
     kinds: dict[tuple[str, str], list[tuple[int, bool, str]]] = {}
     for name in names:
         if found := _PAGE.fullmatch(name):
-            kinds.setdefault((found[1], found[4]), []).append((int(found[2]), found[3] is None, name))
+            kinds.setdefault((found[1], found[4]), []).append((int(found[2]), found[3] is not None, name))
     if not kinds:
         raise HpcdemError(f"no pictures <name><step>.jpg in {os.fspath(folder)}: make them with zdemss first")
     most = max(kinds, key=lambda kind: len(kinds[kind]))

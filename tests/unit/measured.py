@@ -84,12 +84,12 @@ def thrust(folder: Path) -> Path:
     """Four frames, the first two before wall 1 moves; then the thrust slips by SLIP twice, as the wall comes in.
 
     All neighbours in a row are bonded until step 2000; at 3000 the bonds of grains 0-1 (still touching) and 10-11 are
-    broken, and grains 100 and 101 are deleted after that (`_ini` frame). walls.csv: wall 1 is pushed back by 2e6 N per m
-    of its way.
+    broken, and grains 100 and 101 are deleted after that (`_ini` frame). walls.csv: wall 1 is pushed back by 2e5 N for
+    each metre of its way.
     """
     x, y = lattice(LENGTH, DEPTH)
     bonds = chain(x, y)
-    heave = SLIP * np.cos(np.radians(DIP))
+    heave = float(SLIP * np.cos(np.radians(DIP)))
     color = (y // 1000.0).astype(np.int32)
     write(folder, frame(1000, x, y + 500.0, 0.0, color=color))
     write(folder, frame(2000, x, y, 0.0, color=color, bonds=bonds), ini=True)
@@ -104,7 +104,7 @@ def thrust(folder: Path) -> Path:
     write(folder, frame(4000, (x + 2 * dx)[keep], (y + 2 * dy)[keep], 2 * heave, gid, color, held))
     rows = ["step,time,wall,x1,y1,x2,y2,fx,fy"]
     for step, way in ((1000, 0.0), (2000, 0.0), (3000, heave), (4000, 2 * heave)):
-        rows.append(f"{step},{0.05 * step},0,0.0,0.0,{LENGTH},0.0,0.0,-5e9")
-        rows.append(f"{step},{0.05 * step},1,{way!r},9000.0,{way!r},0.0,{-2e6 * way!r},1e3")
+        rows.append(f"{step},{0.05 * step},0,0.0,0.0,{LENGTH},0.0,0.0,-5e8")
+        rows.append(f"{step},{0.05 * step},1,{way!r},9000.0,{way!r},0.0,{-2e5 * way!r},1e3")
     (folder / "walls.csv").write_text("\n".join(rows) + "\n")
     return folder

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hpcdem.errors import UsageError
-from hpcdem.post.cpt import INVAR, INVAR2, parse_cpt, read_cpt, stress_table
+from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, parse_cpt, read_cpt, stress_table
 
 
 def colour(text: str, value: float) -> list[float]:
@@ -146,7 +146,7 @@ def test_an_empty_or_missing_table_is_refused(tmp_path: Path) -> None:
         read_cpt(tmp_path / "no.cpt")
 
 
-@pytest.mark.parametrize("table", [INVAR, INVAR2], ids=lambda t: t.name)
+@pytest.mark.parametrize("table", [INVAR, INVAR2, VOLUME], ids=lambda t: t.name)
 def test_the_strain_tables_are_white_at_zero_and_black_outside(table) -> None:
     breaks = table.breaks
     shades = np.round(255 * table.colours(breaks)).astype(int).tolist()
@@ -161,6 +161,7 @@ def test_the_strain_tables_are_white_at_zero_and_black_outside(table) -> None:
 def test_the_breaks_of_the_strain_tables() -> None:
     assert INVAR.breaks.tolist() == [-10000, -20, -1, -0.1, -0.03, 0, 0.02, 0.3, 1, 20, 10000]
     assert INVAR2.breaks.tolist() == [-16000, -800, -80, -4.8, -0.16, 0, 0.16, 4.8, 80, 800, 16000]
+    np.testing.assert_allclose(VOLUME.breaks, 100.0 * INVAR.breaks, rtol=1e-15)
 
 
 def test_the_stress_table_goes_from_dark_blue_to_dark_red_and_stays_there() -> None:

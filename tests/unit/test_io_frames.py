@@ -38,8 +38,8 @@ def test_frames_are_listed_by_step_the_initial_one_first(tmp_path: Path) -> None
     assert [(f.path.name, f.step, f.ini) for f in list_frames(tmp_path)] == [
         ("all_0000000000_ini.vtkhdf", 0, True),
         ("all_0000000500.vtkhdf", 500, False),
-        ("all_0000001000_ini.vtkhdf", 1000, True),
         ("all_0000001000.dat", 1000, False),
+        ("all_0000001000_ini.vtkhdf", 1000, True),
         ("all_12345678901.dat", 12345678901, False),
     ]
     with pytest.raises(HpcdemError, match="cannot read the folder"):

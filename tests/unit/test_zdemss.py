@@ -17,7 +17,7 @@ from hpcdem.cli.zdemss import work, zdemss
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
-from hpcdem.post.cpt import INVAR, INVAR2, parse_cpt, stress_table
+from hpcdem.post.cpt import INVAR2, VOLUME, parse_cpt, stress_table
 from hpcdem.post.section import Section, read_section
 from hpcdem.post.sections import draw, panels, survey
 from hpcdem.post.sections.pages import MINUS, Style, bar_ticks, bars_of, section_page, series_page, thinned
@@ -27,7 +27,7 @@ from tests.unit.section_synthetic import wedge, write_wedges
 pytestmark = pytest.mark.figures
 SEEN = View(0.0, 40000.0, 0.0, 10000.0)
 STRESS = stress_table(250.0)
-STYLE = Style({"volumetric": INVAR2, "distortional": INVAR, "mean": STRESS, "shear": STRESS})
+STYLE = Style({"volumetric": VOLUME, "distortional": INVAR2, "mean": STRESS, "shear": STRESS})
 
 
 def options(line: str) -> dict[str, Any]:
@@ -312,8 +312,8 @@ def test_known_values_have_their_colours() -> None:
     figure = section_page(section, SEEN, panels.KINDS, STYLE)
     picture = pixels(figure)
     expected = {
-        "volumetric": (INVAR2, -2.0),
-        "distortional": (INVAR, 0.2),
+        "volumetric": (VOLUME, -2.0),
+        "distortional": (INVAR2, 0.2),
         "mean": (STRESS, 180.0),
         "shear": (STRESS, 40.0),
     }
@@ -532,7 +532,7 @@ def test_a_table_says_itself_what_is_labelled() -> None:
 def test_kinds_of_the_same_colours_share_a_bar() -> None:
     headings = [bar.heading for bar in bars_of(panels.KINDS, STYLE)]
     assert headings == ["Volumetric strain (%)", "Distortional strain", "Mean stress,\nMaximum shear stress (MPa)"]
-    both = replace(STYLE, tables={**STYLE.tables, "distortional": INVAR2})
+    both = replace(STYLE, tables={**STYLE.tables, "volumetric": INVAR2})
     assert next(bar.heading for bar in bars_of(panels.KINDS, both)) == "Volumetric strain (%),\nDistortional strain"
     assert bars_of(panels.KINDS, replace(STYLE, bars=False)) == []
 
@@ -549,8 +549,8 @@ def test_the_colours_of_a_bar_are_those_of_the_table() -> None:
     picture = pixels(figure, 300)
     strain, stress = figure.axes[2:]
     for value in (-400.0, -3.0, 0.1, 3.0, 40.0, 10000.0):
-        at = float(INVAR2.position(np.array(value)))
-        np.testing.assert_allclose(shade(picture, strain, at, 0.5), INVAR2.colours(np.array(value)), atol=0.04)
+        at = float(VOLUME.position(np.array(value)))
+        np.testing.assert_allclose(shade(picture, strain, at, 0.5), VOLUME.colours(np.array(value)), atol=0.04)
     for value in (20.0, 125.0, 230.0):
         np.testing.assert_allclose(shade(picture, stress, value, 0.5), STRESS.colours(np.array(value)), atol=0.04)
 
@@ -563,7 +563,7 @@ def test_a_colour_table_of_ones_own_is_used_for_both_strains(tmp_path: Path) -> 
     assert tables["volumetric"].colours(np.array(100.0)).tolist() == [0.0, 0.0, 1.0]
     assert draw.colour_tables(replace(request, colormap=Path("invar2")))["distortional"] is INVAR2
     default = draw.colour_tables(replace(request, colormap=None))
-    assert (default["distortional"], default["volumetric"]) == (INVAR, INVAR2)
+    assert (default["distortional"], default["volumetric"]) == (INVAR2, VOLUME)
     write_wedges(tmp_path / "d", [wedge(3, radius=300.0)])
     log = run(f"-d {tmp_path / 'd'} --straincolormap {tmp_path / 'own.cpt'} --format png")
     assert "HINGE is ignored" in log
@@ -572,9 +572,9 @@ def test_a_colour_table_of_ones_own_is_used_for_both_strains(tmp_path: Path) -> 
         run(f"-d {tmp_path / 'd'} --straincolormap {tmp_path / 'own.cpt'}")
 
 
-def test_sections_are_taken_by_step_with_the_initial_one_first(tmp_path: Path) -> None:
+def test_sections_are_taken_in_the_order_of_time(tmp_path: Path) -> None:
     write_wedges(tmp_path, [wedge(k, 0.0, ini, 300.0) for k, ini in ((20, False), (20, True), (3, False))])
     (tmp_path / "ss" / "data" / "notes.npz").write_bytes(b"")
     files = draw.section_files(tmp_path / "ss" / "data")
-    assert [p.stem for p in files] == ["all_0000000003", "all_0000000020_ini", "all_0000000020"]
+    assert [p.stem for p in files] == ["all_0000000003", "all_0000000020", "all_0000000020_ini"]
     assert [read_section(p).step for p in files] == [3, 20, 20]

@@ -16,7 +16,7 @@ from typing import Any
 
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.io.files import atomic_path, explain, make_folder
-from hpcdem.post.cpt import INVAR, INVAR2, ColourTable, read_cpt, stress_table
+from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
 from hpcdem.post.section import Section, read_section
 from hpcdem.post.sections import panels, survey
 from hpcdem.post.sections.files import write_grids, write_tables
@@ -30,8 +30,8 @@ DPI = 300
 @dataclass(frozen=True)
 class Request:
     """What is asked for. folder: of the frames, with ss/data in it; kinds: panels from top to bottom; colormap: a file,
-    or invar or invar2, for both strains, None: invar for the distortional and invar2 for the volumetric one; sigma1:
-    square [m] and scale of its bars; width [cm]; xmax, ymax [m]; maxstress [MPa]."""
+    or invar or invar2, for both strains, None: invar2 for the distortional one and invar in per cent for the volumetric
+    one; sigma1: square [m] and scale of its bars; width [cm]; xmax, ymax [m]; maxstress [MPa]."""
 
     folder: Path
     kinds: tuple[panels.Kind, ...] = panels.KINDS
@@ -98,14 +98,14 @@ def draw_folder(request: Request, comm: Any, log: Any) -> None:
 
 
 def section_files(folder: Path) -> list[Path]:
-    """The sections in a folder by step, the `_ini` one first. Raises HpcdemError if there are none."""
+    """The sections in a folder in the order of time, as `frames.list_frames`. Raises HpcdemError if there are none."""
     try:
         names = os.listdir(folder)
     except FileNotFoundError:
         names = []
     except OSError as failure:
         raise HpcdemError(explain(folder, failure, "read the folder")) from None
-    found = [(int(match[1]), match[2] is None, match[0]) for match in map(_NAME.fullmatch, names) if match]
+    found = [(int(match[1]), match[2] is not None, match[0]) for match in map(_NAME.fullmatch, names) if match]
     if not found:
         frames = folder.parent.parent
         raise HpcdemError(f"no stress and strain in {folder}: run `hpcdem -s {frames}` first")
@@ -120,8 +120,8 @@ def colour_tables(request: Request) -> dict[str, ColourTable]:
         own = built_in.get(str(request.colormap).lower()) or read_cpt(request.colormap)
     stress = stress_table(request.maxstress)
     return {
-        panels.VOLUMETRIC.key: own or INVAR2,
-        panels.DISTORTIONAL.key: own or INVAR,
+        panels.VOLUMETRIC.key: own or VOLUME,
+        panels.DISTORTIONAL.key: own or INVAR2,
         panels.MEAN.key: stress,
         panels.SHEAR.key: stress,
     }

@@ -1,0 +1,147 @@
+"""`hpcdem measure DIR [WHAT ...]`: numbers and figures of a finished run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.pictures import finite, positive
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
+FORMATS = ("png", "jpg", "pdf", "svg")
+
+
+class Words(click.ParamType):
+    """Words with commas between them."""
+
+    name = "list"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return [w for w in (word.strip() for word in value.split(",")) if w] if isinstance(value, str) else value
+
+
+class Numbers(Words):
+    """Whole numbers with commas between them."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        words = super().convert(value, param, ctx)
+        try:
+            return [int(word) for word in words]
+        except ValueError:
+            self.fail(f"'{value}': whole numbers with commas between them are expected", param, ctx)
+
+
+class Point(click.ParamType):
+    """X,Y"""
+
+    name = "x,y"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            x, y = (float(word) for word in value.split(","))
+        except ValueError:
+            self.fail(f"'{value}': two numbers with a comma between them are expected", param, ctx)
+        return x, y
+
+
+class Formats(Words):
+    """Some of FORMATS with commas between them, or none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        words = [word.lower() for word in super().convert(value, param, ctx)]
+        if words == ["none"]:
+            return []
+        for word in words:
+            if word not in FORMATS:
+                self.fail(f"'{word}' is not one of {', '.join(FORMATS)}, none", param, ctx)
+        return list(dict.fromkeys(words))
+
+
+def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
+    names = (name, more) if more else (name,)
+    return click.option(*names, type=float, callback=positive, metavar=metavar, help=text)
+
+
+@click.command(
+    context_settings=HELP, no_args_is_help=True,
+    epilog="Without WHAT all that the folder allows. Also under mpiexec or srun: ranks share the frames.",
+)  # fmt: skip
+@click.argument("folder", type=PATH, metavar="DIR")
+@click.argument("what", type=click.Choice(WHAT), nargs=-1, metavar="[WHAT]...")
+@click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for the results [DIR/measure].")
+@click.option("--wall", "walls", type=int, multiple=True, metavar="ID", help="Wall that pushes (wedge, shortening); "
+              "walls of wallforce, may be given again [the one that goes farthest; all walls].")  # fmt: skip
+@click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles of these groups.")
+@click.option("--colors", "--colours", type=Words(), default="", metavar="A,B", help="Only particles of these colours, "
+              "by name or number.")  # fmt: skip
+@click.option("--from", "first", type=click.IntRange(0), metavar="STEP", help="First step [where the wall that "
+              "pushes begins to move].")  # fmt: skip
+@click.option("--to", "last", type=click.IntRange(0), metavar="STEP", help="Last step [the last].")
+@click.option("--xmove", type=float, default=0.0, callback=finite, metavar="X", help="Add X [m] to all x [0].")
+@click.option("--ymove", type=float, default=0.0, callback=finite, metavar="Y", help="Add Y [m] to all y [0].")
+@_length("--width", "W", "Width of the columns of the surface, and of cells for strain, in m [about three radii].")
+@click.option("--format", "formats", type=Formats(), default="png", metavar="LIST",
+              help=f"Figures: {', '.join(FORMATS)}, with commas between them, or none [png].")  # fmt: skip
+@_length("--strain", "E", "faults: threshold of |strain| [0.5 in sections, 0.2 from frame to frame].")
+@_length("--length", "L", "faults: shortest band in m [6 cells].")
+@click.option("--skin", type=float, callback=finite, metavar="H", help="faults: leave out what is nearer "
+              "than H m to the base and to the wall that pushes [2 cells].")  # fmt: skip
+@click.option("--increment", is_flag=True, help="faults: strain from frame to frame even where there are sections.")
+@click.option("--ids", type=Numbers(), default="", metavar="I,J", help="tracks: particles of these ids.")
+@click.option("--near", "points", type=Point(), multiple=True, metavar="X,Y", help="tracks: the particles nearest to "
+              "this point (m) in the first frame; may be given again.")  # fmt: skip
+@click.option("--number", type=click.IntRange(1), default=1, metavar="N", help="tracks: so many to each point [1].")
+@click.option("--log", type=PATH, metavar="FILE", help="cracks: log of the run, which counts breaks in tension and in "
+              "shear.")  # fmt: skip
+def measure(**options: Any) -> None:
+    """Measure the frames in DIR: tables (CSV) and figures of
+
+    \b
+    surface    profiles of the surface
+    wedge      crest, toe, height, width, slopes and taper
+    faults     bands of strain: place, length, dip, vergence
+    wallforce  forces on walls over their way, and work
+    tracks     paths of particles: --ids, --near, all of --groups or --colors, or some spread over the bed
+    layers     areas of colours and groups
+    cracks     broken bonds and damage
+    """
+
+
+def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """Collective: what the command does once the ranks are together."""
+    from hpcdem.post.measure import report
+
+    report.run(comm, log, request(options))
+
+
+def request(options: dict[str, Any]) -> Any:
+    """What the options ask for. Raises UsageError."""
+    from hpcdem.errors import UsageError
+    from hpcdem.lang.zdem.table import COLORS
+    from hpcdem.post.measure.scene import Request
+
+    colors = []
+    for word in options["colors"]:
+        number = COLORS.get(word.lower(), int(word) if word.isdigit() else -1)
+        if not 0 <= number <= 9:
+            raise UsageError(f"--colors {word}: no such colour; there are {', '.join(COLORS)}, or 0 to 9")
+        colors.append(number)
+    if options["last"] is not None and options["last"] < (options["first"] or 0):
+        raise UsageError(f"--to {options['last']} is before --from {options['first']}")
+    return Request(
+        folder=Path(options["folder"]), what=tuple(dict.fromkeys(options["what"])), output=options["output"],
+        walls=tuple(dict.fromkeys(options["walls"])), groups=tuple(options["groups"]), colors=tuple(colors),
+        first=options["first"], last=options["last"], xmove=options["xmove"], ymove=options["ymove"],
+        width=options["width"], formats=tuple(options["formats"]), strain=options["strain"], length=options["length"],
+        skin=options["skin"], increment=options["increment"], ids=tuple(options["ids"]), points=options["points"],
+        number=options["number"], log=options["log"], color_names={number: name for name, number in COLORS.items()},
+    )  # fmt: skip

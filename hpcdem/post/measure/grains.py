@@ -1,0 +1,155 @@
+"""The particles of a frame as measurements see them: plain columns in the order of ids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io.frame import Frame, Table
+from hpcdem.io.frames import FrameFile, list_frames, read_frame
+
+Walls = dict[int, tuple[tuple[float, float], tuple[float, float]]]
+_COLUMNS = ("gid", "x", "y", "r", "color", "group")
+
+
+def _no_pairs() -> np.ndarray:
+    return np.zeros((0, 2), np.int64)
+
+
+@dataclass(frozen=True)
+class Grains:
+    """The particles of a frame in the order of ids, and its walls (id: ((x1, y1), (x2, y2)), BOX -1 to -4).
+
+    gid, x, y, r [m], color, group (names): (n,) each; bonds, contacts: (m, 2) ids of the pairs, where they were read;
+    time [s]; ini: the state before the first step of a command.
+    """
+
+    step: int
+    gid: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    r: np.ndarray
+    color: np.ndarray
+    group: np.ndarray
+    walls: Walls
+    time: float = float("nan")
+    ini: bool = False
+    bonds: np.ndarray = field(default_factory=_no_pairs)
+    contacts: np.ndarray = field(default_factory=_no_pairs)
+
+    def __len__(self) -> int:
+        return len(self.gid)
+
+    def take(self, keep: np.ndarray) -> Grains:
+        """The grains chosen by a mask or by rows; pairs stay."""
+        return replace(self, **{name: getattr(self, name)[keep] for name in _COLUMNS})
+
+    def moved(self, x: float, y: float) -> Grains:
+        """Everything moved by (x, y) [m]."""
+        walls = {i: ((a[0] + x, a[1] + y), (b[0] + x, b[1] + y)) for i, (a, b) in self.walls.items()}
+        return replace(self, x=self.x + x, y=self.y + y, walls=walls)
+
+    def drawn(self, walls: int = 5) -> Frame:
+        """A frame that holds what pictures need, walls in this colour; without the sides of the BOX."""
+        columns = {"gid": self.gid, "x": self.x, "y": self.y, "radius": self.r, "color": self.color}
+        shown = {i: ends for i, ends in self.walls.items() if i >= 0}
+        ends = np.array([*shown.values()], dtype=float).reshape(-1, 2, 2)
+        table = {"id": np.array([*shown], np.int64), "p1": ends[:, 0], "p2": ends[:, 1]}
+        table["color"] = np.full(len(shown), walls, np.int32)
+        return Frame(self.step, self.time, 0.0, {}, table, {"particles": Table(columns, 0, len(self))})
+
+
+def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grains:
+    """The grains of one frame file. tables: "bonds" and "contacts", where wanted. Raises HpcdemError."""
+    frame = read_frame(path, ["particles", *tables])
+    p = frame.tables["particles"].columns
+    none = np.zeros(0)
+    gid = np.asarray(p.get("gid", none), dtype=np.int64)
+    order = np.argsort(gid, kind="stable")
+    x, y, r = (np.asarray(p.get(name, none), dtype=float)[order] for name in ("x", "y", "radius"))
+    bad = ~np.isfinite(x + y + r)
+    if bad.any():
+        raise HpcdemError(f"{path}: the place of particle {gid[order][bad][0]} is not a number")
+    color = np.asarray(p.get("color", np.zeros(len(gid))), dtype=np.int64)[order]
+    names = np.array([*frame.group_names, ""], dtype=object)
+    row = np.asarray(p.get("group", np.full(len(gid), -1)), dtype=np.int64)[order]
+    pairs = {name: _pairs(frame, name) for name in tables}
+    group = names[np.where((row >= 0) & (row < len(names)), row, len(names) - 1)]
+    return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs)
+
+
+def _walls(frame: Frame) -> Walls:
+    none = np.zeros((0, 2))
+    ends = zip(frame.walls.get("id", none), frame.walls.get("p1", none), frame.walls.get("p2", none))
+    return {int(i): (tuple(a.tolist()), tuple(b.tolist())) for i, a, b in ends}
+
+
+def walls_of(path: Path) -> Walls:
+    """The walls of a frame file alone. Raises HpcdemError."""
+    return _walls(read_frame(path, ()))
+
+
+def _pairs(frame: Frame, name: str) -> np.ndarray:
+    columns = frame.tables[name].columns if name in frame.tables else {}
+    if "id1" not in columns:
+        return _no_pairs()
+    return np.stack([columns["id1"], columns["id2"]], axis=1).astype(np.int64)
+
+
+def in_time(folder: Path, first: int = 0, last: int | None = None) -> list[FrameFile]:
+    """The frames of a folder from step `first` to `last` in the order in which they were written.
+
+    At one step the last frame of a command comes before the `_ini` frame of the next: in between the script may have
+    added and deleted particles.
+    """
+    return [f for f in list_frames(folder) if f.step >= first and (last is None or f.step <= last)]
+
+
+def series(folder: Path, first: int = 0, ini: bool = False) -> list[Grains]:
+    """All frames of a folder from a step on; those before the first cycle of a command only if asked for, after
+    the others of the same step."""
+    return [grains(f.path, f.ini) for f in list_frames(folder) if f.step >= first and (ini or not f.ini)]
+
+
+def common(a: Grains, b: Grains) -> tuple[Grains, Grains]:
+    """The grains that both frames hold, in the same order."""
+    _, ia, ib = np.intersect1d(a.gid, b.gid, assume_unique=True, return_indices=True)
+    return a.take(ia), b.take(ib)
+
+
+def middle(walls: Walls, wall: int) -> np.ndarray:
+    """(2,): middle of a wall [m]; NaN where there is none."""
+    return np.mean(walls[wall], axis=0) if wall in walls else np.full(2, np.nan)
+
+
+def gone(first: Walls, last: Walls, wall: int) -> float:
+    """How far the middle of a wall went along x [m]; 0 where it is not in both."""
+    return abs(float(middle(last, wall)[0] - middle(first, wall)[0])) if wall in first and wall in last else 0.0
+
+
+def driving_wall(first: Walls, last: Walls) -> int | None:
+    """Id of the wall whose middle went farthest along x, None where none went."""
+    ways = {i: gone(first, last, i) for i in first if i >= 0}
+    wall = max(ways, key=lambda i: ways[i], default=None)
+    return wall if wall is not None and ways[wall] > 0.0 else None
+
+
+def when_it_moves(frames: Sequence[FrameFile], wall: int) -> int:
+    """Number of the last frame before a wall leaves its place; 0 if it never does. Raises HpcdemError."""
+    start = walls_of(frames[0].path)
+    low, high = 0, len(frames)  # at rest, gone
+    while high - low > 1:
+        k = (low + high) // 2
+        low, high = (low, k) if gone(start, walls_of(frames[k].path), wall) > 0.0 else (k, high)
+    return low if high < len(frames) else 0
+
+
+def columns_of(r: np.ndarray) -> float:
+    """Width of columns and cells [m] that suits grains of these radii: about three radii, a round number."""
+    wanted = 3.0 * float(np.max(r))
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(min((m * power for m in (1.0, 2.0, 2.5, 5.0, 10.0)), key=lambda c: abs(np.log(c / wanted))))

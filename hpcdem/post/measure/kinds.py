@@ -1,0 +1,343 @@
+"""Each measurement in two halves: what is taken from a frame (on the rank that reads it), and the table that the parts
+of all frames make (on rank 0)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError
+from hpcdem.post.measure import cracks, faults, layers, wedge
+from hpcdem.post.measure.grains import Grains, Walls, middle
+from hpcdem.post.measure.scene import Plan, Scene, Stamp
+from hpcdem.post.measure.surface import surface
+from hpcdem.post.section import read_section
+
+Done = list[tuple[Stamp, Any]]
+"""The parts of all frames, in the order of time; None for a frame of which there is nothing to say."""
+NAN = float("nan")
+TOTAL, STEP = 0.5, 0.2
+"""Thresholds of strain for faults: of that since the first section, and of that from frame to frame."""
+SHORTEST, SKIN = 6.0, 2.0
+"""Shortest band, and how near to the base and to the wall strain is that of these, in cells."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table to be written: name of the file, words of the header, rows."""
+
+    name: str
+    head: Sequence[str]
+    rows: Iterable[Sequence[Any]]
+
+
+# --- surface and wedge -----------------------------------------------------------------------------------------
+
+
+def surface_part(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
+    """Surface points of the frame."""
+    bed = scene.bed
+    return surface(bed.x, bed.y, scene.plan.cell) if len(bed) else None
+
+
+def surface_sheets(done: Done, plan: Plan) -> list[Sheet]:
+    rows = ((*stamp.row, x, y) for stamp, part in done if part for x, y in zip(*part))
+    return [Sheet("surface", (*Stamp.HEAD, "x[m]", "height[m]"), rows)]
+
+
+def wedge_part(scene: Scene) -> wedge.Shape | None:
+    """Shape of the wedge in front of the wall; x is mirrored if that pushes to the left."""
+    bed, plan = scene.bed, scene.plan
+    sign = plan.forward
+    walls = {i: ((sign * a[0], a[1]), (sign * b[0], b[1])) for i, (a, b) in bed.walls.items()}
+    back = None if plan.wall not in walls else float(np.mean(walls[plan.wall], axis=0)[0])
+    try:
+        return wedge.shape(sign * bed.x, bed.y, bed.r, walls, plan.cell, back)
+    except ValueError:
+        return None
+
+
+WEDGE_HEAD = (
+    "shortening[m]", "crest_x[m]", "crest_y[m]", "toe_x[m]", "toe_y[m]", "height[m]", "width[m]", "surface_slope[deg]",
+    "base_slope[deg]", "taper[deg]",
+)  # fmt: skip
+
+
+def wedge_rows(done: Done, plan: Plan) -> np.ndarray:
+    """(frames, columns of WEDGE_HEAD); NaN where there is no wedge."""
+
+    def row(stamp: Stamp, s: wedge.Shape | None) -> list[float]:
+        if s is None:
+            return [stamp.shortening] + [NAN] * (len(WEDGE_HEAD) - 1)
+        (cx, cy), (tx, ty) = s.wedge.crest, s.wedge.toe
+        sign = plan.forward
+        return [stamp.shortening, sign * cx, cy, sign * tx, ty, s.height, s.width, s.wedge.slope, s.base, s.taper]
+
+    return np.array([row(stamp, part) for stamp, part in done])
+
+
+def wedge_sheets(done: Done, plan: Plan) -> list[Sheet]:
+    rows = ((*stamp.row, *numbers) for (stamp, _), numbers in zip(done, wedge_rows(done, plan).tolist()))
+    return [Sheet("wedge", (*Stamp.HEAD, *WEDGE_HEAD), rows)]
+
+
+# --- faults ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Bands of a frame; the field they were picked in, and the particles to draw below, for the last frame."""
+
+    bands: list[faults.Band]
+    total: bool
+    threshold: float
+    x: np.ndarray | None = None
+    y: np.ndarray | None = None
+    strain: np.ndarray | None = None
+    grains: Grains | None = None
+
+
+def faults_part(scene: Scene) -> Faults | None:
+    """Bands in the section of the frame where the folder has sections, else in the strain since the frame before."""
+    plan, now = scene.plan, scene.all
+    total = bool(plan.sections)
+    if total:
+        if scene.file.path.stem not in plan.sections:
+            return None
+        request = plan.request
+        section = read_section(request.folder / "ss" / "data" / f"{scene.file.path.stem}.npz")
+        p, move = section.particles, np.array([request.xmove, request.ymove])
+        x, y, field = section.x + move[0], section.y + move[1], section.fields["distortional"]
+        ends = zip(section.walls["id"], section.walls["p1"] + move, section.walls["p2"] + move)
+        walls: Walls = {int(i): (tuple(a.tolist()), tuple(b.tolist())) for i, a, b in ends}
+        rows = p["x"] + move[0], p["y"] + move[1], p["radius"], p["color"]
+        now = Grains(now.step, p["gid"], *rows, np.full(len(p["gid"]), "", object), walls)
+    else:
+        found = None if scene.before is None else faults.between(scene.before, now, plan.cell)
+        if found is None:
+            return None
+        x, y, field = found
+    request = plan.request
+    cell = float(x[1] - x[0]) if len(x) > 1 else plan.cell
+    threshold = request.strain if request.strain is not None else TOTAL if total else STEP
+    skin = request.skin if request.skin is not None else SKIN * cell
+    rise, height = wedge.base(now.x, now.y, now.r, now.walls, cell, float(now.x.min()), float(now.x.max()))
+    shortest = request.length if request.length is not None else SHORTEST * cell
+    low = height + rise * x + skin
+    if plan.wall in now.walls:
+        face = float(middle(now.walls, plan.wall)[0])
+        low = np.where(plan.forward * (x - face) < skin, np.inf, low)
+    picked = faults.bands(x, y, field, threshold, shortest, low[None, :])
+    return Faults(picked, total, threshold, x, y, np.where(y[:, None] >= low, field, NAN), now)
+
+
+def drawn(parts: Sequence[Faults | None]) -> Faults | None:
+    """What is drawn: the last with a band, else the last, of those that still have their field."""
+    some = [part for part in parts if part is not None and part.strain is not None]
+    return next((part for part in reversed(some) if part.bands), some[-1] if some else None)
+
+
+def without_fields(part: Faults) -> Faults:
+    """The bands alone, to send over."""
+    return Faults(part.bands, part.total, part.threshold)
+
+
+FAULT_HEAD = (
+    "fault", "x[m]", "y[m]", "length[m]", "dip[deg]", "dips_to", "vergence", "sense", "mean_strain", "area[m2]",
+    "x1[m]", "y1[m]", "x2[m]", "y2[m]", "strain_since",
+)  # fmt: skip
+
+
+def faults_sheets(done: Done, plan: Plan) -> list[Sheet]:
+    def rows() -> Iterable[Sequence[Any]]:
+        for stamp, part in done:
+            for k, b in enumerate(part.bands if part else (), 1):
+                yield (
+                    *stamp.row, k, *b.centre, b.length, abs(b.dip), "left" if b.dip > 0.0 else "right",
+                    "right" if b.vergence > 0 else "left", "reverse" if b.reverse else "normal", b.mean, b.area,
+                    *b.ends[0], *b.ends[1], "first section" if part.total else "frame before",
+                )  # fmt: skip
+
+    return [Sheet("faults", (*Stamp.HEAD, *FAULT_HEAD), rows())]
+
+
+# --- tracks and layers -----------------------------------------------------------------------------------------
+
+
+def tracks_part(scene: Scene) -> np.ndarray:
+    """(n, 3): id, x, y of the particles that are followed."""
+    g = scene.all
+    rows = np.flatnonzero(np.isin(g.gid, scene.plan.followed))
+    return np.stack([g.gid[rows], g.x[rows], g.y[rows]], axis=1)
+
+
+def paths(done: Done) -> dict[int, np.ndarray]:
+    """(m, 3) by id: number of the frame, x, y."""
+    table = np.array([[row[0], k, row[1], row[2]] for k, (_, part) in enumerate(done) for row in part])
+    table = table.reshape(-1, 4)
+    return {int(i): table[table[:, 0] == i][:, 1:] for i in np.unique(table[:, 0])}
+
+
+def tracks_sheets(done: Done, plan: Plan) -> list[Sheet]:
+    found = paths(done)
+    missing = sorted({*plan.followed.tolist()} - {*found})
+    if missing:
+        raise HpcdemError(f"tracks: no frame has particle {', '.join(map(str, missing[:10]))}")
+    start = {i: path[0] for i, path in found.items()}
+    rows = (
+        (*stamp.row, int(i), x, y, x - start[int(i)][1], y - start[int(i)][2])
+        for stamp, part in done
+        for i, x, y in part.tolist()
+    )
+    return [Sheet("tracks", (*Stamp.HEAD, "id", "x[m]", "y[m]", "dx[m]", "dy[m]"), rows)]
+
+
+def layers_part(scene: Scene) -> dict[tuple[str, str], layers.Area]:
+    return layers.areas(scene.grains)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One colour or group over time; all (frames,), areas in m2. Changes: relative to the first frame that has it."""
+
+    kind: str
+    name: str
+    grains: np.ndarray
+    discs: np.ndarray
+    envelope: np.ndarray
+
+    def change(self, areas: np.ndarray) -> np.ndarray:
+        """Relative change of `discs` or `envelope`; NaN before there was any."""
+        some = np.flatnonzero(areas > 0.0)
+        if not len(some):
+            return np.full(len(areas), NAN)
+        change = areas / areas[some[0]] - 1.0
+        change[: some[0]] = NAN
+        return change
+
+
+def layer_series(done: Done) -> list[Layer]:
+    keys = sorted(
+        {key for _, part in done for key in part}, key=lambda k: ("all color group".split().index(k[0]), k[1])
+    )
+    none = layers.Area(0, 0.0, 0.0)
+    result = []
+    for key in keys:
+        a = [part.get(key, none) for _, part in done]
+        columns = (np.array([getattr(one, name) for one in a]) for name in ("grains", "discs", "envelope"))
+        result.append(Layer(*key, *columns))
+    return result
+
+
+def layers_sheets(done: Done, plan: Plan) -> list[Sheet]:
+    def rows() -> Iterable[Sequence[Any]]:
+        for layer in layer_series(done):
+            name = plan.request.color(layer.name) if layer.kind == "color" else layer.name
+            changes = layer.change(layer.discs), layer.change(layer.envelope)
+            for k, (stamp, _) in enumerate(done):
+                discs, envelope = float(layer.discs[k]), float(layer.envelope[k])
+                pores = 1.0 - discs / envelope if envelope > 0.0 else NAN
+                numbers = int(layer.grains[k]), discs, envelope, pores, float(changes[0][k]), float(changes[1][k])
+                yield *stamp.row, layer.kind, name, *numbers
+
+    head = ("kind", "name", "particles", "particle_area[m2]", "envelope_area[m2]", "porosity", "particle_change",
+            "envelope_change")  # fmt: skip
+    return [Sheet("layers", (*Stamp.HEAD, *head), rows())]
+
+
+# --- cracks ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cracks:
+    """Bonds of a frame; what changed since the frame before (all bonds of the first frame are new); ids of the
+    particles asked for."""
+
+    bonds: int
+    change: cracks.Change
+    gid: np.ndarray
+
+
+def cracks_part(scene: Scene) -> Cracks:
+    now, before = scene.all, scene.before
+    if before is None:
+        before = replace(now.take(np.zeros(0, np.int64)), bonds=now.bonds[:0])
+    change = cracks.change(before, now)
+    gid = scene.grains.gid
+    if len(gid) < len(now):  # both ends must be asked for
+        broken, made = (np.isin(pairs, gid).all(axis=1) for pairs in (change.broken, change.made))
+        change = cracks.Change(
+            change.broken[broken], change.place[broken], change.parted[broken], change.made[made], change.lost
+        )
+    bonds = int(np.isin(now.bonds, gid).all(axis=1).sum())
+    return Cracks(bonds, change, gid)
+
+
+@dataclass(frozen=True)
+class Cracking:
+    """Over time (frames,): bonds held, made, broken, parted, and lost with deleted particles so far; share of the
+    bonded particles with damage from each of LEVELS on (frames, levels); and the damage at the end."""
+
+    bonds: np.ndarray
+    made: np.ndarray
+    broken: np.ndarray
+    parted: np.ndarray
+    lost: np.ndarray
+    beyond: np.ndarray
+    damage: cracks.Damage
+
+
+def cracking(done: Done) -> Cracking:
+    damage = cracks.Damage(np.concatenate([part.change.made.ravel() for _, part in done]))
+    beyond = []
+    for _, part in done:
+        damage.add(part.change.made, part.change.broken)
+        values = damage.of(part.gid)[2]
+        values = values[np.isfinite(values)]
+        beyond.append([float(np.mean(values >= level)) if len(values) else NAN for level in cracks.LEVELS])
+    parts = [part for _, part in done]
+    made, broken, parted, lost = (
+        np.cumsum([count(p.change) for p in parts])
+        for count in (lambda c: len(c.made), lambda c: len(c.broken), lambda c: c.parted.sum(), lambda c: c.lost)
+    )
+    return Cracking(np.array([p.bonds for p in parts]), made, broken, parted, lost, np.array(beyond), damage)
+
+
+def cracks_sheets(done: Done, plan: Plan, final: Grains) -> list[Sheet]:
+    c = cracking(done)
+    if not c.made[-1]:
+        raise HpcdemError(f"cracks: no frame in {plan.request.folder} has bonds")
+    levels = [f"particles_from_{level:g}" for level in cracks.LEVELS]
+    head = (*Stamp.HEAD, "bonds", "made", "broken", "parted", "touching", "deleted", "broken_share", *levels)
+    table = (
+        (
+            *stamp.row, int(c.bonds[k]), int(c.made[k]), int(c.broken[k]), int(c.parted[k]),
+            int(c.broken[k] - c.parted[k]), int(c.lost[k]), float(c.broken[k] / c.made[k]) if c.made[k] else NAN,
+            *c.beyond[k].tolist(),
+        )
+        for k, (stamp, _) in enumerate(done)
+    )  # fmt: skip
+    broken = (
+        (*stamp.row, *pair, *place, int(apart))
+        for stamp, part in done
+        for pair, place, apart in zip(
+            part.change.broken.tolist(), part.change.place.tolist(), part.change.parted.tolist()
+        )
+    )
+    had, broke, share = c.damage.of(final.gid)
+    some = np.flatnonzero(had > 0)
+    particles = (
+        (int(final.gid[k]), float(final.x[k]), float(final.y[k]), int(had[k]), int(broke[k]), float(share[k]))
+        for k in some
+    )
+    sheets = [
+        Sheet("cracks", head, table),
+        Sheet("cracks_bonds", (*Stamp.HEAD, "id1", "id2", "x[m]", "y[m]", "parted"), broken),
+        Sheet("cracks_particles", ("id", "x[m]", "y[m]", "bonds", "broken", "damage"), particles),
+    ]
+    if plan.request.log is not None:
+        sheets.append(Sheet("cracks_log", ("step", "tension", "shear"), cracks.read_log(plan.request.log).tolist()))
+    return sheets

@@ -1,0 +1,234 @@
+"""Measuring all frames of a folder: frames are shared over the ranks, tables and figures written by rank 0."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
+from hpcdem.io.files import atomic_path, explain
+from hpcdem.io.frames import FrameFile
+from hpcdem.post.measure import cracks, figures, kinds
+from hpcdem.post.measure import walls as curves
+from hpcdem.post.measure.grains import Grains
+from hpcdem.post.measure.kinds import Done, Sheet
+from hpcdem.post.measure.scene import KINDS, Plan, Request, Scene, look, make_plan
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How one measurement is done. part: of a frame; sheets and figure: of all; previous: it needs the frame before."""
+
+    part: Callable[[Scene], Any]
+    sheets: Callable[..., list[Sheet]]
+    figure: Callable[..., Any]
+    previous: bool = False
+
+
+FRAMES = {
+    "surface": Kind(kinds.surface_part, kinds.surface_sheets, figures.surface),
+    "wedge": Kind(kinds.wedge_part, kinds.wedge_sheets, figures.wedge),
+    "faults": Kind(kinds.faults_part, kinds.faults_sheets, figures.faults, previous=True),
+    "tracks": Kind(kinds.tracks_part, kinds.tracks_sheets, figures.tracks),
+    "layers": Kind(kinds.layers_part, kinds.layers_sheets, figures.layers),
+    "cracks": Kind(kinds.cracks_part, kinds.cracks_sheets, figures.damage, previous=True),
+}
+
+
+def run(comm: Any, log: Any, request: Request) -> list[Path]:
+    """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, else exactly
+    what is asked for. Raises HpcdemError on all ranks."""
+    began = time.monotonic()
+    what = [kind for kind in KINDS if kind in request.what or not request.what]
+    of_frames = [kind for kind in what if kind in FRAMES]
+    written: list[Path] = []
+    if of_frames:
+        plan, final = _shared(comm, lambda: make_plan(request, of_frames))
+        _tell(log, plan)
+        parts = _measure(comm, log, plan, of_frames)
+    _shared(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
+    for kind in what:
+        if kind == "wallforce":
+            work = lambda: _wallforce(request)  # noqa: E731
+        else:
+            work = lambda: _write(kind, parts[kind], plan, final)  # noqa: B023, E731
+        files, problem = _shared(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
+        if problem is not None:
+            log.info(f"left out: {problem}")
+        elif files:
+            log.info(f"{kind}: {', '.join(path.name for path in files)}")
+        written += files
+    log.info(f"{request.target}: {len(written)} files in {time.monotonic() - began:.1f} s")
+    return written
+
+
+def _tell(log: Any, plan: Plan) -> None:
+    first, last = plan.frames[0], plan.frames[-1]
+    count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
+    wall = "no wall moves along x" if plan.wall is None else f"wall {plan.wall} moves"
+    hint = "; --from 0 for those before it moves" if plan.request.first is None and first.step > 0 else ""
+    log.info(f"{count}; {wall}{hint}; columns of {plan.cell:g} m")
+
+
+def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str | None]:
+    """What was written, or why nothing was; failures are raised if it must be."""
+    try:
+        return work(), None
+    except _NothingThere as failure:
+        if must:
+            raise
+        return [], str(failure)
+
+
+class _NothingThere(HpcdemError):
+    """The folder does not hold what a measurement needs."""
+
+
+def _shared(comm: Any, action: Callable[[], _T]) -> _T:
+    """Collective: the result of rank 0 on all ranks, its failure too."""
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except HpcdemError as failure:
+            error = str(failure), failure.exit_code
+        except OSError as failure:
+            error = explain(failure.filename or "the results", failure), HpcdemError.exit_code
+    result, error = comm.bcast((result, error))
+    if error is not None:
+        raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
+    return result  # type: ignore[return-value]
+
+
+# --- frames ----------------------------------------------------------------------------------------------------
+
+
+def _measure(comm: Any, log: Any, plan: Plan, what: Sequence[str]) -> dict[str, Done]:
+    """Collective: the parts of all frames by measurement, on rank 0 (empty elsewhere).
+
+    Each rank takes a stretch of consecutive frames, and reads the frame before it where that is needed.
+    """
+    n = len(plan.frames)
+    first, last = n * comm.rank // comm.size, n * (comm.rank + 1) // comm.size
+    pairs = any(FRAMES[kind].previous for kind in what) and not ("cracks" not in what and plan.sections)
+    tables = ("bonds", "contacts") if "cracks" in what else ()
+    mine: list[tuple[Any, dict[str, Any]]] = []
+    error = None
+    told = time.monotonic()
+    try:
+        before = _read(plan.frames[first - 1], plan, tables) if pairs and 0 < first < last else None
+        for k in range(first, last):
+            now = _read(plan.frames[k], plan, tables)
+            scene = Scene(plan.frames[k], k, now, before, plan)
+            parts = {kind: FRAMES[kind].part(scene) for kind in what}
+            mine.append((scene.stamp, parts))
+            if "faults" in what:
+                _one_field([row[1] for row in mine])
+            before = now if pairs else None
+            if time.monotonic() - told > 5.0:
+                told = time.monotonic()
+                log.info(f"{plan.frames[k].path.name}: {k - first + 1} of {last - first} frames read")
+    except HpcdemError as failure:
+        error = str(failure)
+    except OSError as failure:
+        error = explain(failure.filename or plan.request.folder, failure, "read")
+    comm.agree(error)
+    gathered = comm.gather(mine) or []
+    rows = [row for part in gathered for row in part]
+    return {kind: [(stamp, parts[kind]) for stamp, parts in rows] for kind in what} if rows else {k: [] for k in what}
+
+
+def _read(file: FrameFile, plan: Plan, tables: tuple[str, ...]) -> Grains:
+    return look(file, plan.request, tables)
+
+
+def _one_field(parts: list[dict[str, Any]]) -> None:
+    """Only one frame is drawn: the other fields are let go."""
+    drawn = kinds.drawn([part["faults"] for part in parts])
+    for part in parts:
+        if part["faults"] is not None and part["faults"] is not drawn:
+            part["faults"] = kinds.without_fields(part["faults"])
+
+
+# --- files -----------------------------------------------------------------------------------------------------
+
+
+def _write(kind: str, done: Done, plan: Plan, final: Grains) -> list[Path]:
+    """Table and figure of one measurement."""
+    request, recipe = plan.request, FRAMES[kind]
+    _refuse(kind, done, plan)
+    more = (final,) if kind == "cracks" else ()
+    files = [write_sheet(request.target, sheet) for sheet in recipe.sheets(done, plan, *more)]
+    if request.formats:
+        log = (cracks.read_log(request.log),) if kind == "cracks" and request.log is not None else ()
+        figure = recipe.figure(done, plan, final, *log)
+        files += [figures.save(figure, request.target / f"{kind}.{suffix}") for suffix in request.formats]
+    return files
+
+
+def _refuse(kind: str, done: Done, plan: Plan) -> None:
+    """Raise where there is nothing to measure."""
+    where = plan.request.folder
+    some = [part for _, part in done if part is not None and (kind != "tracks" or len(part))]
+    if kind == "faults" and not some:
+        names = "the sections in ss/data are of other frames; with --increment the frames themselves are compared"
+        raise _NothingThere(f"faults: {names if plan.sections else f'{where} has only one frame, and no sections'}")
+    if kind == "wedge" and not some:
+        raise _NothingThere(f"wedge: no frame in {where} has a surface that falls away from its highest point")
+    if kind == "cracks" and not any(len(part.change.made) for part in some):
+        raise _NothingThere(f"cracks: no frame in {where} has bonds")
+
+
+def _wallforce(request: Request) -> list[Path]:
+    path = request.folder / "walls.csv"
+    if not path.exists():
+        raise _NothingThere(f"wallforce: there is no {path}")
+    found = curves.read_walls(path, request.first, request.last)
+    if not found:
+        raise _NothingThere(f"wallforce: {path} has no rows of these steps")
+    missing = [wall for wall in request.walls if wall not in found]
+    if missing:
+        raise UsageError(f"--wall {missing[0]}: not in {path}; there are {', '.join(map(str, sorted(found)))}")
+    driver = curves.driver(found)
+    asked = request.walls or tuple(wall for wall in found if wall >= 0) or tuple(found)
+    chosen = {wall: found[wall] for wall in asked}
+    head = ("step", "time[s]", "wall", "dx[m]", "dy[m]", "way[m]", "fx[N]", "fy[N]", "work[J]")
+    rows = (
+        (*row[:2], wall, *row[2:])
+        for wall, c in sorted(chosen.items())
+        for row in zip(c.step.tolist(), c.time.tolist(), *c.moved.T.tolist(), c.way.tolist(), *c.force.T.tolist(),
+                       c.work.tolist())
+    )  # fmt: skip
+    files = [write_sheet(request.target, Sheet("wallforce", head, rows))]
+    if request.formats:
+        figure = figures.wallforce(chosen, None if driver is None else found[driver], f"wall {driver}")
+        files += [figures.save(figure, request.target / f"wallforce.{suffix}") for suffix in request.formats]
+    return files
+
+
+def write_sheet(folder: Path, sheet: Sheet) -> Path:
+    """Write a table as CSV, complete or not at all; numbers with ten digits, nothing where there is none."""
+    path = folder / f"{sheet.name}.csv"
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(sheet.head)
+    writer.writerows([_word(value) for value in row] for row in sheet.rows)
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8") as file:
+        file.write(text.getvalue())
+    return path
+
+
+def _word(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, float):
+        return f"{value + 0.0:.10g}" if math.isfinite(value) else ""
+    return str(int(value))

@@ -1,0 +1,222 @@
+"""What is asked for, what holds for all frames of a folder, and what is known of one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.frames import FrameFile
+from hpcdem.post import layers as drawing
+from hpcdem.post.measure import tracks
+from hpcdem.post.measure.grains import (
+    Grains,
+    columns_of,
+    driving_wall,
+    grains,
+    in_time,
+    middle,
+    walls_of,
+    when_it_moves,
+)
+
+KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
+"""What can be measured, by its word on the command line."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked for. Lengths in m.
+
+    what: of KINDS, all that the folder allows if empty; walls: ids, the first one is that which pushes; groups, colors:
+    only particles of these; first, last: steps, by default from the
+    last frame before the wall moves to the last; xmove, ymove: added to all coordinates; width: of columns and cells;
+    formats: of figures; strain, length, skin: threshold, shortest band and height above the base for faults; increment:
+    strain from frame to frame even if there are sections; ids, points, number: particles to follow; log: of the run.
+    """
+
+    folder: Path
+    what: tuple[str, ...] = ()
+    output: Path | None = None
+    walls: tuple[int, ...] = ()
+    groups: tuple[str, ...] = ()
+    colors: tuple[int, ...] = ()
+    first: int | None = None
+    last: int | None = None
+    xmove: float = 0.0
+    ymove: float = 0.0
+    width: float | None = None
+    formats: tuple[str, ...] = ("png",)
+    strain: float | None = None
+    length: float | None = None
+    skin: float | None = None
+    increment: bool = False
+    ids: tuple[int, ...] = ()
+    points: tuple[tuple[float, float], ...] = ()
+    number: int = 1
+    log: Path | None = None
+    color_names: dict[int, str] = field(default_factory=dict)
+
+    @property
+    def target(self) -> Path:
+        """The folder for the results."""
+        return self.folder / "measure" if self.output is None else self.output
+
+    def color(self, number: int | str) -> str:
+        """Name of a colour."""
+        return self.color_names.get(int(number), str(number))
+
+    def chosen(self, g: Grains) -> np.ndarray:
+        """(n,): which particles are of the groups and colours that are asked for."""
+        keep = np.ones(len(g), bool)
+        if self.groups:
+            keep &= np.isin(g.group.astype(str), self.groups)
+        if self.colors:
+            keep &= np.isin(g.color, self.colors)
+        return keep
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What holds for all frames: in the order of time, which have sections, width of columns [m], the wall that pushes,
+    the direction +1 or -1 into which it pushes, its place in the first frame [m], ids of particles to follow."""
+
+    request: Request
+    frames: list[FrameFile]
+    sections: frozenset[str]
+    cell: float
+    wall: int | None
+    forward: int
+    start: float
+    followed: np.ndarray
+
+    def shortening(self, g: Grains) -> float:
+        """How far the wall that pushes has come [m]; NaN where there is none."""
+        return float("nan") if self.wall is None else self.forward * (float(middle(g.walls, self.wall)[0]) - self.start)
+
+
+def make_plan(request: Request, what: Sequence[str]) -> tuple[Plan, Grains]:
+    """The plan, and the last frame that has particles. Raises HpcdemError."""
+    frames = in_time(request.folder, request.first or 0, request.last)
+    if not frames:
+        between = (f" from step {request.first}" if request.first else "") + (
+            f" to step {request.last}" if request.last is not None else ""
+        )
+        raise HpcdemError(f"{request.folder} holds no frames (all_<step>.vtkhdf or all_<step>.dat){between}")
+    wall = _wall(request, frames)
+    if request.first is None and wall is not None:
+        frames = frames[when_it_moves(frames, wall) :]
+    first = _with_particles(request, frames)
+    last = _with_particles(request, frames[::-1])
+    start = float("nan") if wall is None else float(middle(first.walls, wall)[0])
+    forward = -1 if start > float(np.mean(first.x)) else 1
+    cell = columns_of(first.r) if request.width is None else request.width
+    folder = request.folder / "ss" / "data"
+    sections = frozenset() if request.increment else frozenset(p.stem for p in folder.glob("all_*.npz"))
+    followed = _followed(request, first, last) if "tracks" in what else np.zeros(0, np.int64)
+    return Plan(request, frames, sections, cell, wall, forward, start, followed), last
+
+
+def _wall(request: Request, frames: Sequence[FrameFile]) -> int | None:
+    """The wall that pushes."""
+    first, last = walls_of(frames[0].path), walls_of(frames[-1].path)
+    if not request.walls:
+        return driving_wall(first, last)
+    wall = request.walls[0]
+    if wall not in first:
+        ids = ", ".join(map(str, sorted(first))) or "none"
+        raise UsageError(f"--wall {wall}: no such wall in {frames[0].path.name}; its walls: {ids}")
+    return wall
+
+
+def _with_particles(request: Request, frames: Sequence[FrameFile]) -> Grains:
+    """The first of these frames that has particles that are asked for."""
+    groups: set[str] = set()
+    colors: set[int] = set()
+    for file in frames:
+        g = look(file, request)
+        if request.chosen(g).any():
+            return g.take(request.chosen(g))
+        groups |= {*g.group.tolist()}
+        colors |= {*np.unique(g.color).tolist()}
+    if not colors:
+        raise HpcdemError(f"no frame in {request.folder} has particles")
+    raise UsageError(
+        f"no particle in {request.folder} is of the groups and colours that are asked for; groups: "
+        f"{', '.join(sorted(filter(None, groups))) or 'none'}; colours: {', '.join(map(request.color, sorted(colors)))}"
+    )
+
+
+def look(file: FrameFile, request: Request, tables: tuple[str, ...] = ()) -> Grains:
+    """A frame, moved as asked for."""
+    return grains(file.path, file.ini, tables).moved(request.xmove, request.ymove)
+
+
+def _followed(request: Request, first: Grains, last: Grains) -> np.ndarray:
+    """Ids of the particles to follow: those named; else the nearest to points in the first frame; else all of the
+    groups and colours; else some spread over the bed."""
+    if request.ids:
+        return np.unique(np.array(request.ids, np.int64))
+    if request.points:
+        return tracks.nearest(first, np.array(request.points), request.number)
+    if request.groups or request.colors:
+        return first.gid
+    return tracks.nearest(first, tracks.spread(bed_of(first)))
+
+
+def bed_of(g: Grains) -> Grains:
+    """Without flying bits, unless there is nothing else."""
+    kept = drawing.in_large_pieces(g.x, g.y, g.r)
+    return g.take(kept) if kept.any() else g
+
+
+@dataclass
+class Scene:
+    """One frame: all its particles, and those asked for; the frame before; its number and what holds for all."""
+
+    file: FrameFile
+    number: int
+    all: Grains
+    before: Grains | None
+    plan: Plan
+
+    @cached_property
+    def grains(self) -> Grains:
+        """The particles asked for."""
+        return self.all.take(self.plan.request.chosen(self.all))
+
+    @cached_property
+    def bed(self) -> Grains:
+        """Those asked for without flying bits."""
+        return bed_of(self.grains)
+
+    @property
+    def stamp(self) -> Stamp:
+        """When it is."""
+        return Stamp(self.all.step, self.all.ini, self.all.time, self.plan.shortening(self.all))
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """When a frame is: step, whether before the first step of a command, time [s], shortening [m]."""
+
+    step: int
+    ini: bool
+    time: float
+    shortening: float
+
+    HEAD = ("step", "ini", "time[s]")
+
+    @property
+    def row(self) -> tuple[int, int, float]:
+        """The first columns of every table."""
+        return self.step, int(self.ini), self.time
+
+    @property
+    def label(self) -> str:
+        """Name for a figure."""
+        return f"step {self.step}"

@@ -1,0 +1,108 @@
+"""Shape of a thrust wedge: crest, toe, slopes, taper.
+
+The crest is the highest point of the surface, the toe the point farthest from the straight line between crest and far
+end, the slope the straight line fitted to the surface between them, a fifth left out at either end: the rule of the
+public program Quantitative-wedge (see `surface.py`). *Forward* is +x, the wall that pushes stands on the left; mirror x
+for anything else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.post.measure.grains import Walls
+from hpcdem.post.measure.surface import surface
+
+
+@dataclass(frozen=True)
+class Wedge:
+    """Crest and toe [m], surface slope between them [degrees, positive where the surface falls to the right]."""
+
+    crest: tuple[float, float]
+    toe: tuple[float, float]
+    slope: float
+
+
+def wedge(xs: np.ndarray, ys: np.ndarray, trim: float = 0.2) -> Wedge:
+    """Wedge of a surface by the rule in the head of this file.
+
+    Raises ValueError if the crest is the last point, so that there is no slope to measure.
+    """
+    crest = int(np.argmax(ys))
+    px, py = xs[crest:], ys[crest:]
+    if len(px) < 3:
+        raise ValueError("no surface in front of the crest")
+    ex, ey = px[-1] - px[0], py[-1] - py[0]
+    away = np.abs(ex * (py - py[0]) - ey * (px - px[0])) / np.hypot(ex, ey)
+    toe = int(np.argmax(away))
+    skip = int(toe * trim)
+    inside = slice(skip, toe - skip + 1)
+    if toe - 2 * skip < 1:
+        raise ValueError("fewer than two surface points between crest and toe")
+    slope = np.polyfit(px[inside], py[inside], 1)[0]
+    return Wedge((float(px[0]), float(py[0])), (float(px[toe]), float(py[toe])), float(np.degrees(np.arctan(-slope))))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A wedge above its base. height: of the crest's grain top above the base below it; width: from the back to the
+    toe [m]; base: slope of the base [degrees, positive where it falls to the left, towards the back]."""
+
+    wedge: Wedge
+    back: float
+    height: float
+    width: float
+    base: float
+
+    @property
+    def taper(self) -> float:
+        """Sum of both slopes [degrees]."""
+        return self.wedge.slope + self.base
+
+
+def shape(x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, back: float | None = None) -> Shape:
+    """Shape of the wedge of all these grains. back: where it begins, the face of the wall that pushes [m]; the
+    leftmost grain by default. Raises ValueError where there is no wedge: no slope in front of the crest, or the crest
+    less than the largest diameter above the toe."""
+    if not len(x):
+        raise ValueError("no particles")
+    found = wedge(*surface(x, y, cell))
+    if found.crest[1] - found.toe[1] < 2.0 * float(np.max(r)):
+        raise ValueError("the surface is flat")
+    back = float(np.min(x - r)) if back is None else back
+    rise, height = base(x, y, r, walls, cell, found.crest[0], found.toe[0])
+    top = surface(x, y + r, cell)[1].max()
+    slope = float(np.degrees(np.arctan(rise)))
+    return Shape(found, back, float(top - (height + rise * found.crest[0])), found.toe[0] - back, slope)
+
+
+def base(
+    x: np.ndarray, y: np.ndarray, r: np.ndarray, walls: Walls, cell: float, left: float, right: float
+) -> tuple[float, float]:
+    """(rise, height at x = 0) of the straight base under the stretch from `left` to `right`.
+
+    The wall on which the grains lie there: one flatter than 45 degrees under the whole stretch, at most one column away
+    from their lowest points. Where there is none, the line fitted to the lowest points of the grains in each column.
+    """
+    some = (x >= left - cell) & (x <= right + cell)
+    if not some.any():
+        some = np.ones(len(x), bool)
+    low = (y - r)[some]
+    px, py = surface(x[some], -low, cell)
+    py = -py
+    best: tuple[float, float, float] | None = None
+    for (x1, y1), (x2, y2) in walls.values():
+        if abs(x2 - x1) <= abs(y2 - y1) or min(x1, x2) > left or max(x1, x2) < right:
+            continue
+        rise = (y2 - y1) / (x2 - x1)
+        away = float(np.median(np.abs(py - (y1 + rise * (px - x1)))))
+        if away <= cell and (best is None or away < best[0]):
+            best = away, rise, y1 - rise * x1
+    if best is not None:
+        return best[1], best[2]
+    if len(px) < 2:
+        return 0.0, float(py.min())
+    rise, height = np.polyfit(px, py, 1)
+    return float(rise), float(height)
