@@ -58,7 +58,7 @@ def compute(folder: Path, **options: Any) -> list[Section]:
 
 def sections(folder: Path) -> list[Section]:
     found = [read_section(path) for path in (folder / "ss" / "data").glob("*.npz")]
-    return sorted(found, key=lambda s: (s.step, not s.initial))
+    return sorted(found, key=lambda s: (s.step, s.initial))
 
 
 def moved(frame: Frame, step: int, matrix: np.ndarray) -> Frame:

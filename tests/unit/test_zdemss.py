@@ -540,6 +540,7 @@ def test_kinds_of_the_same_colours_share_a_bar() -> None:
 def test_labels_of_a_bar_are_thinned_about_the_middle() -> None:
     ticks = bar_ticks(INVAR2)
     assert thinned(ticks, 2.0, 8.0) == ticks
+    assert thinned(ticks, 0.8, 8.0) == ticks[1:-1]  # without "more than" at the ends
     fewer = thinned(ticks, 0.4, 8.0)
     assert len(fewer) < len(ticks) and (5.0, "0") in fewer
 
