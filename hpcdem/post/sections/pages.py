@@ -271,10 +271,12 @@ def text_widths(texts: Sequence[str], font: float) -> list[float]:
 
 
 def thinned(ticks: list[tuple[float, str]], scale: float, font: float) -> list[tuple[float, str]]:
-    """As many of the ticks as can be read side by side, the middle one among them. scale: cm per unit of place."""
+    """As many of the ticks as can be read side by side, the middle one among them; "more than" at the ends goes first.
+    scale: cm per unit of place."""
     widths = text_widths([text for _, text in ticks], 0.85 * font)
-    for step in range(1, len(ticks)):
-        chosen = range(len(ticks) // 2 % step, len(ticks), step)
+    numbered = range(ticks[0][1].startswith("<"), len(ticks) - ticks[-1][1].startswith(">")) if ticks else ()
+    strides = (range(len(ticks) // 2 % step, len(ticks), step) for step in range(2, len(ticks)))
+    for chosen in (range(len(ticks)), numbered, *strides):
         if all((ticks[b][0] - ticks[a][0]) * scale > 0.5 * (widths[a] + widths[b]) + 0.06 for a, b in pairwise(chosen)):
             return [ticks[k] for k in chosen]
     return ticks[:1]

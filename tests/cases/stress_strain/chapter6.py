@@ -14,7 +14,7 @@ PICKED = [
     "0000002000_ini", "0000004000", "0000005000_ini", "0000007000", "0000007600_ini", "0000009600", "0000012600",
 ]  # fmt: skip
 """Frames of the short push_add_del.py by the rule of 6.3.1: settled and coloured, cut off, deposits at rest, each
-before the push, and some of the pushes. Those of the whole one are 6000_ini 26000 36000_ini 56000 58000_ini 78000 108000."""
+before the push, and some of the pushes."""
 
 SIGMA1 = (
     "zdemss --dir ./datass --strainvol OFF --strainshear ON --sigma1 ON --scale 1.0 --gridsize 600.0 --stressmean OFF "
