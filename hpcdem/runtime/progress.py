@@ -83,7 +83,8 @@ class Log:
         self._speaks = rank == 0
         self._stream = stream if stream is not None else sys.stdout
         self._now = now
-        self._terminal = self._speaks and self._stream.isatty()
+        # Open MPI gives its processes a terminal of their own, wherever their output goes in the end.
+        self._terminal = self._speaks and self._stream.isatty() and "OMPI_COMM_WORLD_SIZE" not in os.environ
         self._bar: Bar | None = None
         self._warned: set[str] = set()
         self._script_steps = 0
