@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from hpcdem.halo.comm import SerialComm
     from hpcdem.io.axes import View
     from hpcdem.post.plots import Style
 
@@ -149,21 +148,3 @@ def common_view(files: Sequence[Path], style: Style) -> View:
     return View(
         min(v.left for v in seen), max(v.right for v in seen), min(v.bottom for v in seen), max(v.top for v in seen)
     )
-
-
-def on_first(comm: SerialComm, action: Callable[[], Any]) -> Any:
-    """Collective: what `action` gives on rank 0, on all ranks; its HpcdemError too."""
-    from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
-
-    result, error = None, None
-    if comm.rank == 0:
-        try:
-            result = action()
-        except HpcdemError as problem:
-            error = str(problem), problem.exit_code
-        except OSError as problem:
-            error = f"{problem.filename or 'files'}: {problem.strerror}", HpcdemError.exit_code
-    result, error = comm.bcast((result, error))
-    if error is not None:
-        raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
-    return result

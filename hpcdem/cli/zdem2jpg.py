@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import ManualCommand, looks, number, on_first, positive, style_of
+from hpcdem.cli.pictures import ManualCommand, looks, number, positive, style_of
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def zdem2jpg(**options: Any) -> None:
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw all frames of the folder. Raises HpcdemError on all ranks."""
     from hpcdem.errors import HpcdemError
+    from hpcdem.io.files import on_first
     from hpcdem.io.frames import list_frames
     from hpcdem.post.series import Job, draw_all
 

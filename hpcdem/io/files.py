@@ -12,12 +12,14 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
 from hpcdem.io.textnum import TextTable
+
+_T = TypeVar("_T")
 
 PIECE = 4 << 20
 """Most bytes sent to rank 0 in one message."""
@@ -121,6 +123,22 @@ def _folder_to_disk(path: str) -> None:
 def _remove(path: str) -> None:
     with suppress(OSError):
         os.remove(path)
+
+
+def on_first(comm: Any, action: Callable[[], _T]) -> _T:
+    """Collective: what `action` gives on rank 0, on all ranks; its HpcdemError or OSError too."""
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = action()
+        except HpcdemError as failure:
+            error = str(failure), failure.exit_code
+        except OSError as failure:
+            error = explain(failure.filename or "the results", failure), HpcdemError.exit_code
+    result, error = comm.bcast((result, error))
+    if error is not None:
+        raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
+    return result  # type: ignore[return-value]
 
 
 def make_folder(path: str | os.PathLike, comm: Any) -> None:

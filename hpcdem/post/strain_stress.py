@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io.files import Alone, explain
+from hpcdem.io.files import Alone, explain, on_first
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
 from hpcdem.post import grid as grids
 from hpcdem.post import section_files, strain, stress
@@ -58,10 +58,10 @@ def run(comm: Any, log: Any, options: Options) -> Path:
     if not (np.isfinite(options.size) and options.size > 0.0):
         raise UsageError(f"-g {options.size:g}: the spacing of the grid must be larger than 0")
     began = time.monotonic()
-    frames = _shared(comm, lambda: _frames(options.folder))
+    frames = on_first(comm, lambda: _frames(options.folder))
     results = options.folder / "ss" / "data"
     fresh = results.with_name("data.tmp")
-    _shared(comm, lambda: _make_fresh(fresh))
+    on_first(comm, lambda: _make_fresh(fresh))
     many = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
     ranks = f", {comm.size} ranks share {'the frames' if len(frames) >= comm.size else 'each frame'}"
     log.info(f"stress and strain of {many} in {options.folder}, grid {options.size:g} m{ranks * (comm.size > 1)}")
@@ -72,7 +72,7 @@ def run(comm: Any, log: Any, options: Options) -> Path:
             _rounds(comm, log, frames, options, fresh, grids.sums)
         else:
             _together(comm, log, frames, options, fresh)
-        _shared(comm, lambda: _replace(fresh, results, [f.path.stem for f in frames]))
+        on_first(comm, lambda: _replace(fresh, results, [f.path.stem for f in frames]))
     except HpcdemError:
         if comm.rank == 0:
             shutil.rmtree(fresh, ignore_errors=True)
@@ -108,11 +108,6 @@ def _replace(fresh: Path, results: Path, names: list[str]) -> None:
     for name in sorted(ours):
         os.replace(fresh / name, results / name)
     fresh.rmdir()
-
-
-def _shared(comm: Any, action: Callable[[], _T]) -> _T:
-    """Collective: the result of rank 0 on all ranks, its failure too."""
-    return comm.bcast(_each(comm, lambda: action() if comm.rank == 0 else None))
 
 
 def _each(comm: Any, action: Callable[[], _T]) -> _T:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
-from hpcdem.io.files import atomic_path, explain
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.files import atomic_path, explain, on_first
 from hpcdem.io.frames import FrameFile
 from hpcdem.post.measure import cracks, figures, kinds
 from hpcdem.post.measure import walls as curves
@@ -51,16 +51,16 @@ def run(comm: Any, log: Any, request: Request) -> list[Path]:
     of_frames = [kind for kind in what if kind in FRAMES]
     written: list[Path] = []
     if of_frames:
-        plan, final = _shared(comm, lambda: make_plan(request, of_frames))
+        plan, final = on_first(comm, lambda: make_plan(request, of_frames))
         _tell(log, plan)
         parts = _measure(comm, log, plan, of_frames)
-    _shared(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
+    on_first(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
     for kind in what:
         if kind == "wallforce":
             work = lambda: _wallforce(request)  # noqa: E731
         else:
             work = lambda: _write(kind, parts[kind], plan, final)  # noqa: B023, E731
-        files, problem = _shared(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
+        files, problem = on_first(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
         if problem is not None:
             log.info(f"left out: {problem}")
         elif files:
@@ -90,22 +90,6 @@ def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str 
 
 class _NothingThere(HpcdemError):
     """The folder does not hold what a measurement needs."""
-
-
-def _shared(comm: Any, action: Callable[[], _T]) -> _T:
-    """Collective: the result of rank 0 on all ranks, its failure too."""
-    result, error = None, None
-    if comm.rank == 0:
-        try:
-            result = action()
-        except HpcdemError as failure:
-            error = str(failure), failure.exit_code
-        except OSError as failure:
-            error = explain(failure.filename or "the results", failure), HpcdemError.exit_code
-    result, error = comm.bcast((result, error))
-    if error is not None:
-        raise (UsageError if error[1] == EXIT_USAGE else HpcdemError)(error[0])
-    return result  # type: ignore[return-value]
 
 
 # --- frames ----------------------------------------------------------------------------------------------------

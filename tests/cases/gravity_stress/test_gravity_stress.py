@@ -62,14 +62,14 @@ def profile(sim: Simulation, width: float, low: float, high: float) -> tuple[np.
 
 
 def check(sim: Simulation, width: float) -> None:
-    """Slope within 3 % of rho_bulk g, each band within 7 % of the weight above; no shear without friction."""
+    """Slope within 3 % of rho_bulk g, each band within 5 % of the weight above; no shear without friction."""
     height, stress, density = profile(sim, width, 500.0, 3500.0)
     slope = np.polyfit(height, stress[:, 1, 1], 1)[0]
     print(f"stress gradient / rho_bulk g = {-slope / (density.mean() * G):.4f}")
     assert -slope == pytest.approx(density.mean() * G, rel=0.03)
     y, area = sim.particles["y"], width * 2.0 * sim.particles["radius"].mean()
     above = np.array([sim.body[y > h, 0].sum() for h in height]) * G / area
-    assert stress[:, 1, 1] == pytest.approx(above, rel=0.07)  # a band is hardly wider than a particle
+    assert stress[:, 1, 1] == pytest.approx(above, rel=0.05)  # a band is hardly wider than a particle
     assert np.abs(stress[:, 0, 1] - stress[:, 1, 0]).max() < 1e-6 * stress[:, 1, 1].max()  # moments balance
     assert np.abs(stress[:, 0, 1]).max() < 0.02 * stress[:, 1, 1].max()
 
@@ -89,7 +89,7 @@ def test_resting_sphere_carries_its_weight(tmp_path: Path) -> None:
 
 def test_settled_bed(tmp_path: Path) -> None:
     """8 km of the bed of A3, settled here."""
-    sim = support.model(tmp_path, dt=5e-2, disk="off", gravity=(0.0, -G))
+    sim = support.model(tmp_path, dt=5e-2, disk="off", gravity=(0.0, -G), seed=1, gentry=2.75)
     walls.wall(sim, 0, ((0.0, 0.0), (8000.0, 0.0)))
     walls.wall(sim, 1, ((0.0, 10000.0), (0.0, 0.0)))
     walls.wall(sim, 2, ((8000.0, 0.0), (8000.0, 10000.0)))
