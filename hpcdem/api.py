@@ -440,7 +440,7 @@ class Simulation:
         except ValueError as error:
             raise ScriptError(*_place(), f"field '{name}' has {len(self)} values on this rank: {error}") from error
         engine.look_soon()
-        if name == "radius":
+        if name in ("radius", "fix"):
             engine.tables_changed()
 
     def gather(self, *names: str) -> Any:

@@ -186,7 +186,7 @@ def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -
     gid = columns["gid"]
     order = np.argsort(owner, kind="stable")
     ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
-    sim.hist = Histories(ptr, partner[order], fs[order], extra[order], bond[order])
+    sim.hist = Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order])
     return np.column_stack([columns["x0"], columns["y0"]])
 
 

@@ -17,19 +17,21 @@ from typing import Any
 import numpy as np
 
 from hpcdem import guards
+from hpcdem.cells import columns, keys
 from hpcdem.clock import Clock
 from hpcdem.decomp import strips
 from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.fields import FX, TORQUE, X, Y
+from hpcdem.fields import FX, TORQUE, WIDTH
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
+from hpcdem.memory import aligned, take_rows
 from hpcdem.model.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.model.particles import Particles
 from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
-from hpcdem.physics.dem import contacts, mass, motion, neighbours
+from hpcdem.physics.dem import contacts, mass, motion, neighbours, pair_forces
 from hpcdem.physics.dem import walls as wall_kernels
 from hpcdem.physics.dem.neighbours import Histories
 from hpcdem.timers import Timers
@@ -40,6 +42,7 @@ SHORT_LIVED, LONG_LIVED = 60, 200
 """Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
 LONGEST_WATCH = 64
 """Most steps between two looks at how far particles have moved."""
+EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
 
 
 @dataclass
@@ -147,21 +150,24 @@ class Simulation:
 
         Returns what the outside asked for (0 nothing, 1 save, 2 save and stop), agreed by all ranks.
         """
-        timers, request = self.timers, 0
+        timers, halo, request = self.timers, self.halo, 0
         with timers("move"):
-            self._move(self.lists.n_blocks, *self._move_args)
-            self.walls.move(self.clock.dt)
+            for first, last in halo.border:
+                self._move(self.lists.n_blocks, first, last, *self._move_args)
+            halo.start()
+            self._move(self.lists.n_blocks, *halo.inside, *self._move_args)
+            if self._walls_move:
+                self.walls.move(self.clock.dt)
         self.lattice.age += 1
         self.lattice.countdown -= 1
         stale = False
         if self.lattice.countdown == 0:
             with timers("reduce"):
                 stale, request = self._look()
+        with timers("halo"):
+            halo.finish()
         if stale:
             self.rebuild()
-        else:
-            with timers("halo"):
-                self.halo.refresh()
         with timers("force"):
             self._forces()
         self.clock.tick()
@@ -257,7 +263,7 @@ class Simulation:
         self._longest2 = self.lists.longest_bond2()
         self._hist = self.lists.histories(p.ihot)
         self.halo.close()
-        p.set_owned(p.hot[p.owned].copy(), p.cold)
+        p.set_owned(p.hot[p.owned], p.cold)
         self._lists = None
 
     def _harvest(self) -> None:
@@ -279,26 +285,28 @@ class Simulation:
     def _close(self, frozen: bool = False, least_skin: float = 0.0) -> None:
         """From open to closed. frozen: keep the lattice as it is (restart); least_skin [m]: bond search."""
         with self.timers("neighbour"):
-            self._choose_lattice(frozen, least_skin)
-            self._drop_outside_box()
-        self._share_out()
+            box = self.walls.box()
+            outside = self._choose_lattice(frozen, least_skin, box)
+            if outside and box is not None:
+                self._drop_outside(box)
+        cell = self._share_out()
+        p, lattice, borders = self.particles, self.lattice, self.ownership.borders
         with self.timers("neighbour"):
-            p, lattice = self.particles, self.lattice
-            cx, cy = strips.cells(p["x"], p["y"], lattice.side)
-            order = strips.global_order(cx, cy, p["gid"])
-            hot, cold = p.hot[order], p.cold[order]
-            hist = self.hist.take(order)
+            order = strips.global_order(cell, p["gid"])
+            cell = cell[order]
         with self.timers("halo"):
-            storage, self.halo = connect(self.comm, hot, cx[order], self.ownership.borders)
+            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads)
         with self.timers("neighbour"):
-            p.place(storage, cold, self.halo.n_left)
-            cx, cy = strips.cells(storage[:, X], storage[:, Y], lattice.side)
+            halo, hist = self.halo, self.hist
+            p.place(storage, take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads), halo.n_left)
+            left, right = storage[: halo.n_left], storage[halo.n_left + p.n_own :]
+            cell = np.concatenate([keys(left, lattice.side), cell, keys(right, lattice.side)])
             self.origin = p.positions()
             self.walls.travel[:] = 0.0
             self._wall_table = self.walls.table()
             self._lists = neighbours.build(
-                storage, cx, cy, p.n_left, p.n_own, hist, self._wall_table, lattice.skin,
-                min(lattice.side, lattice.bond_reach + lattice.skin), self.threads,
+                storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, lattice.side, self.largest_radius,
+                lattice.skin, min(lattice.side, lattice.bond_reach + lattice.skin), self.threads,
             )  # fmt: skip
             self._count_bonds(hist)
             self._hist = None
@@ -309,7 +317,9 @@ class Simulation:
 
     def _count_bonds(self, hist: Histories) -> None:
         """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
-        found = np.array([np.count_nonzero(hist.bond), self.lists.bonds_placed], np.int64)
+        if self.bonds == 0:
+            return
+        found = np.array([hist.bonded(), self.lists.bonds_placed], np.int64)
         self.comm.sum_into(found)
         if found[0] != 2 * found[1]:
             raise PhysicsError(
@@ -319,14 +329,18 @@ class Simulation:
             )
         self.bonds = int(found[1])
 
-    def _choose_lattice(self, frozen: bool, least_skin: float) -> None:
-        """Skin and cell side for the next lists, from global values only."""
+    def _choose_lattice(self, frozen: bool, least_skin: float, box: tuple[float, float, float, float] | None) -> bool:
+        """Skin and cell side for the next lists, from global values only.
+
+        Returns whether a particle is outside the box (left, right, bottom, top) [m]: it rides on the same reduction.
+        """
         lattice, p = self.lattice, self.particles
-        seen = np.array([p["radius"].max() if len(p) else 0.0, self._longest2])
+        seen = np.array([0.0, self._longest2, 0.0])
+        seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)
         self.comm.max_into(seen)
-        self.largest_radius = float(seen[0])
+        self.largest_radius, outside = float(seen[0]), bool(seen[2])
         if frozen:
-            return
+            return outside
         lattice.bond_reach = math.sqrt(seen[1])
         if 0 < lattice.age < SHORT_LIVED:
             lattice.skin_factor = WIDE
@@ -337,15 +351,11 @@ class Simulation:
         while 0.0 < side < lattice.bond_reach + lattice.skin:
             side *= 1.05  # in steps, so that the lattice seldom changes
         lattice.side = side if side > 0.0 else 1.0
+        return outside
 
-    def _drop_outside_box(self) -> None:
-        """Particles whose centre has left the BOX are deleted, with a line in the log."""
-        box = self.walls.box()
-        if box is None:
-            return
+    def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
+        """Particles whose centre has left the BOX are deleted, with a line in the log. Collective."""
         gone = guards.outside(self.particles, box)
-        if not self.comm.any(bool(gone.any())):
-            return
         names = guards.places(self.particles, gone, self.comm)
         number = self.remove(gone)
         if self.log is not None:
@@ -365,20 +375,36 @@ class Simulation:
         self.ownership.wanted = True
         return len(gone)
 
-    def _share_out(self) -> None:
-        """Move borders if it pays, then send every particle and its histories to the owner of its column."""
+    def _share_out(self) -> np.ndarray:
+        """Move borders if it pays, then send every particle and its histories to the owner of its column.
+
+        Returns the cells of the particles that are owned now (n_own,) i8.
+        """
         p, side = self.particles, self.lattice.side
-        cx, _ = strips.cells(p["x"], p["y"], side)
+        with self.timers("neighbour"):
+            cell = keys(p.hot, side)
         with self.timers("balance"):
             box = self.walls.box()
             room = None if box is None else (box[0], box[1])
-            self.ownership.renew(cx, side, self.clock.step, self.timers.seconds(), room)
+            self.ownership.renew(columns(cell), side, self.clock.step, self.timers.seconds(), room)
         with self.timers("migrate"):
-            migration = Migration(self.comm, self.ownership.owner_of(cx))
-            if migration.nobody:
-                return
-            self.hist = Histories.from_rows(*migration.move_ragged(self.hist.counts(), self.hist.rows()))
-            p.set_owned(migration.move(p.hot[p.owned]), migration.move(p.cold))
+            leave = strips.strays(cell, self.ownership.borders, self.comm.rank)
+            migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
+            leave = migration.leave
+            hist = self.hist.take(leave)
+            arrived, counts, entries = migration.exchange(
+                np.hstack([p.hot[leave], p.cold[leave]]), hist.counts(), hist.rows
+            )
+            if not len(leave) and not len(arrived):
+                return cell
+            stay = migration.stay()
+            self.hist = self.hist.take(stay).joined(counts, entries)
+            hot, cold = (aligned((len(stay) + len(arrived), WIDTH)) for _ in range(2))
+            take_rows(p.hot, stay, hot[: len(stay)], self.threads)
+            take_rows(p.cold, stay, cold[: len(stay)], self.threads)
+            hot[len(stay) :], cold[len(stay) :] = arrived[:, :WIDTH], arrived[:, WIDTH:]
+            p.set_owned(hot, cold)
+            return np.concatenate([cell[stay], keys(arrived, side)])
 
     def broken(self) -> tuple[int, int]:
         """Bonds broken so far in tension and in shear. Collective."""
@@ -410,27 +436,27 @@ class Simulation:
             return
         p, s, lists = self.particles, self.settings, self.lists
         rows, n_mat = self.materials.rows, len(self.materials)
-        r, mat = p["radius"], p["material"]
-        body = np.zeros((p.n_own, 4))
-        body[:, 0] = rows["density"][mat] * mass.volume(r, s.disk)
-        body[:, 1] = mass.inertia(body[:, 0], r, s.disk)
-        body[:, 2] = rows["damp"][mat]
-        self.body = body
+        dt, b = self.clock.dt, lists.blocks
+        self.body = aligned((p.n_own, 8))
+        motion.fill_body(
+            p.hot, p.ihot, p.icold, p.n_left, rows["density"].copy(), rows["damp"].copy(), mass.shape(s.disk), dt,
+            self.body,
+        )  # fmt: skip
         self.pair_laws = contacts.pair_table(rows)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
         self.bond_laws = self.bond_types.as_floats()
         self._wall_table = self.walls.table()
+        self._walls_move = bool(self.walls.v.any())
         threaded = lists.n_blocks > 1
-        self._move = motion.move_threaded if threaded else motion.move
-        self._pair_forces = contacts.forces_threaded if threaded else contacts.forces
+        self._move: Any = motion.move_threaded if threaded else motion.move
+        self._pair_forces = pair_forces.forces_threaded if threaded else pair_forces.forces
         self._wall_forces = wall_kernels.forces_threaded if threaded else wall_kernels.forces
-        dt, b = self.clock.dt, lists.blocks
         self._move_args = (
-            p.hot, p.cold, p.icold, p.n_left, b.cut, b.lo, b.foff, lists.force, body, s.gx, s.gy, s.lsm, dt,
+            p.hot, p.cold, p.n_left, b.cut, b.lo, b.foff, lists.force, self.body, s.gx, s.gy, s.lsm, dt,
         )  # fmt: skip
         self._pair_args = (
-            p.hot, p.ihot, *b, lists.ptr, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
-            self.pair_laws, self.bond_laws, n_mat, dt, mass.SPHERES[s.disk], lists.tally,
+            p.hot, p.ihot, *b, lists.ptr, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
+            self.pair_laws, contacts.bond_table(self.bond_laws), n_mat, dt, mass.SPHERES[s.disk], lists.tally,
         )  # fmt: skip
         self._wall_args = (
             p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, self._wall_table, lists.slot_row, lists.slot_wall,

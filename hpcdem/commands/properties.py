@@ -90,8 +90,10 @@ def prop(
 def fix(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
     """FIX: the components in `dofs` ("x", "y", "spin") keep the velocity they have."""
     sim.particles["fix"][chosen(sim, where)] |= sum(FIX_BITS[d] for d in set(dofs))
+    sim.tables_changed()
 
 
 def free(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:
     """FREE: undo FIX."""
     sim.particles["fix"][chosen(sim, where)] &= ~sum(FIX_BITS[d] for d in set(dofs))
+    sim.tables_changed()

@@ -8,30 +8,119 @@ computes, never what: the order of particles depends on the cells alone.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-FARTHEST = 1 << 28
-"""Cell indices are clamped to +- this, so that an escaped particle costs nothing."""
+from hpcdem.cells import COLUMN, FARTHEST, column, columns, keys, row
+
+__all__ = ["FARTHEST", "cells", "cut", "global_order", "owner_of", "separate", "strays"]
+
+CELLS_PER_PARTICLE = 4
+"""Room that is sorted by counting; a model that is thinner than that, or has runaways, is sorted by comparing."""
+SMALL = 65536
+"""Cells that are always few enough."""
+CROWD = 64
+"""Particles in a cell from which on they are sorted by comparing, if they have to be."""
 
 
 def cells(x: np.ndarray, y: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cell indices (i8) of points [m]; not-a-number goes to the last cell."""
-    out = []
-    for values in (x, y):
-        scaled = np.floor(values / h)
-        scaled = np.where(scaled < FARTHEST, np.maximum(scaled, -FARTHEST), FARTHEST)
-        out.append(scaled.astype(np.int64))
-    return out[0], out[1]
+    """Columns and rows (i8) of points [m]; not-a-number goes to the last cell."""
+    numbers = keys(np.column_stack([x, y]).astype(float), h)
+    cx = columns(numbers)
+    return cx, numbers - cx * COLUMN
 
 
-def global_order(cx: np.ndarray, cy: np.ndarray, gid: np.ndarray) -> np.ndarray:
-    """Indices that sort by (column, row, gid): the one order of the whole model."""
-    if not len(cx):
+def global_order(cell: np.ndarray, gid: np.ndarray) -> np.ndarray:
+    """Indices that sort by (column, row, gid): the one order of the whole model. cell, gid (n,) i8; cell: see cells.py.
+
+    Linear in the number of particles, unless there are far more cells than particles between the outermost ones.
+    """
+    if not len(cell):
         return np.empty(0, np.int64)
-    x0, y0 = int(cx.min()), int(cy.min())
-    rows, gids = int(cy.max()) - y0 + 1, int(gid.max()) + 1
-    if (int(cx.max()) - x0 + 1) * rows * gids < 1 << 62:
-        return np.argsort(((cx - x0) * rows + (cy - y0)) * gids + gid, kind="stable")
-    return np.lexsort((gid, cy, cx))
+    left, right, bottom, top = _extent(cell)
+    rows = top - bottom + 1
+    number = (right - left + 1) * rows
+    if number <= CELLS_PER_PARTICLE * len(cell) + SMALL:
+        order = _count_out(cell, left, bottom, rows, number)
+    else:
+        order = np.argsort(cell, kind="stable")
+    _sort_ids(order, cell, gid)
+    return order
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _extent(cell):
+    """First and last column, first and last row."""
+    left, right = column(cell.min()), column(cell.max())
+    bottom = top = row(cell[0])
+    for key in cell:
+        at = row(key)
+        bottom, top = min(bottom, at), max(top, at)
+    return left, right, bottom, top
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _count_out(cell, left, bottom, rows, number):
+    """Order by cell; those of one cell stay in the order in which they come."""
+    begin = np.zeros(number + 1, np.int32)
+    place = np.empty(len(cell), np.int32)
+    for i in range(len(cell)):
+        place[i] = (column(cell[i]) - left) * rows + row(cell[i]) - bottom
+        begin[place[i] + 1] += 1
+    for k in range(number):
+        begin[k + 1] += begin[k]
+    order = np.empty(len(cell), np.int64)
+    for i in range(len(cell)):
+        at = begin[place[i]]
+        order[at] = i
+        begin[place[i]] = at + 1
+    return order
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sort_ids(order, cell, gid):
+    """Put those of one cell in the order of their ids. Nearly always they are."""
+    n = len(order)
+    k = 1
+    while k < n:
+        i = order[k]
+        if cell[order[k - 1]] != cell[i] or gid[order[k - 1]] < gid[i]:
+            k += 1
+            continue
+        begin = k - 1
+        while begin > 0 and cell[order[begin - 1]] == cell[i]:
+            begin -= 1
+        end = k + 1
+        while end < n and cell[order[end]] == cell[i]:
+            end += 1
+        if end - begin > CROWD:
+            crowd = order[begin:end].copy()
+            order[begin:end] = crowd[np.argsort(gid[crowd])]
+        else:
+            for m in range(k, end):
+                moving = order[m]
+                at = m
+                while at > begin and gid[order[at - 1]] > gid[moving]:
+                    order[at] = order[at - 1]
+                    at -= 1
+                order[at] = moving
+        k = end
+
+
+def strays(cell: np.ndarray, borders: np.ndarray, rank: int) -> np.ndarray:
+    """Indices of the particles that are not in the columns of this rank."""
+    first = borders[rank] if rank > 0 else -FARTHEST
+    end = borders[rank + 1] if rank + 2 < len(borders) else FARTHEST + 1
+    return _outside(cell, first * COLUMN - COLUMN // 2, end * COLUMN - COLUMN // 2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _outside(cell, first, end):
+    found = np.empty(len(cell), np.int64)
+    n = 0
+    for i in range(len(cell)):
+        found[n] = i
+        n += (cell[i] < first) | (cell[i] >= end)
+    return found[:n].copy()
 
 
 def owner_of(cx: np.ndarray, borders: np.ndarray) -> np.ndarray:

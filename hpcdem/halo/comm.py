@@ -86,6 +86,9 @@ class MpiComm(SerialComm):
     """The same verbs over an mpi4py communicator."""
 
     def __init__(self, mpi: Any) -> None:
+        from mpi4py import MPI
+
+        self._wait_all, self._test_all = MPI.Request.Waitall, MPI.Request.Testall
         self.mpi = mpi
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
@@ -93,12 +96,14 @@ class MpiComm(SerialComm):
 
     def wait(self, *requests: Any) -> None:
         """Until all these requests are done."""
-        from mpi4py import MPI
+        self.wait_all(list(requests))
 
+    def wait_all(self, requests: list) -> None:
+        """Until all requests of the list are done."""
         if not self.crowded:
-            MPI.Request.Waitall(list(requests))
+            self._wait_all(requests)
             return
-        while not MPI.Request.Testall(list(requests)):
+        while not self._test_all(requests):
             time.sleep(NAP)
 
     def barrier(self) -> None:

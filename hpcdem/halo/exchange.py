@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.cells import COLUMN
+from hpcdem.memory import aligned, take_rows
+
 TO_LEFT, TO_RIGHT = 11, 12
 
 
@@ -20,16 +23,26 @@ class Halo:
     """The exchange with the two neighbours for one set of lists.
 
     n_left, n_right: ghosts; first, last: owned rows sent to the left (the first `first`) and right (the last `last`).
+    border: these rows as ranges of owned particles, inside: the others. Who moves the border first and calls `start`
+    lets the messages travel while the inside is moved.
     """
 
     def __init__(self, comm: Any, n_own: int, first: int, last: int) -> None:
         self.comm, self.n_own, self.first, self.last = comm, n_own, first, last
         self.requests: list = []
+        # Owned particles first : last that others wait for, in up to two pieces, and the rest between them.
+        first, last = min(first, n_own), min(last, n_own)
+        if first + last >= n_own:
+            self.border, self.inside = [(0, n_own)] if first + last > 0 else [], (0, 0 if first + last else n_own)
+        else:
+            self.border = [piece for piece in ((0, first), (n_own - last, n_own)) if piece[0] < piece[1]]
+            self.inside = (first, n_own - last)
         self.n_left = self.n_right = 0
         if comm.mpi is None:
             return
         from mpi4py import MPI
 
+        self._start_all = MPI.Prequest.Startall
         self.left = comm.rank - 1 if comm.rank > 0 else MPI.PROC_NULL
         self.right = comm.rank + 1 if comm.rank + 1 < comm.size else MPI.PROC_NULL
         counts = np.zeros(2, np.int64)
@@ -71,13 +84,20 @@ class Halo:
             if len(piece):
                 self.requests.append(start(_bytes(piece), peer, tag))
 
-    def refresh(self) -> None:
-        """Ghosts carry the owners' present state in; nothing comes out."""
+    def start(self) -> None:
+        """Begin to renew the ghosts. Until `finish` the rows of `border` must not change, ghosts must not be read."""
         if self.requests:
-            from mpi4py import MPI
+            self._start_all(self.requests)
 
-            MPI.Prequest.Startall(self.requests)
-            self.comm.wait(*self.requests)
+    def finish(self) -> None:
+        """Ghosts carry the owners' state of the moment of `start`; nothing comes out."""
+        if self.requests:
+            self.comm.wait_all(self.requests)
+
+    def refresh(self) -> None:
+        """Both in one: ghosts carry the owners' present state."""
+        self.start()
+        self.finish()
 
     def close(self) -> None:
         """Give the requests back to MPI."""
@@ -90,15 +110,21 @@ def _bytes(rows: np.ndarray) -> np.ndarray:
     return rows.reshape(-1).view(np.uint8)
 
 
-def connect(comm: Any, hot: np.ndarray, cx: np.ndarray, borders: np.ndarray) -> tuple[np.ndarray, Halo]:
-    """Storage with ghosts for owned rows `hot` (n, w) sorted by column `cx` (n,), and the halo that keeps it fresh."""
-    first = int(np.searchsorted(cx, borders[comm.rank], side="right")) if comm.rank > 0 else 0
-    last = 0
+def connect(
+    comm: Any, hot: np.ndarray, order: np.ndarray, cell: np.ndarray, borders: np.ndarray, threads: int
+) -> tuple[np.ndarray, Halo]:
+    """Storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it fresh.
+
+    cell (n,) i8: cells of the owned particles in this order, ascending.
+    """
+    first = last = 0
+    if comm.rank > 0:
+        first = int(np.searchsorted(cell, (int(borders[comm.rank]) + 1) * COLUMN - COLUMN // 2))
     if comm.rank + 1 < comm.size:
-        last = len(cx) - int(np.searchsorted(cx, borders[comm.rank + 1] - 1, side="left"))
-    halo = Halo(comm, len(hot), first, last)
-    storage = np.empty((halo.n_left + len(hot) + halo.n_right, hot.shape[1]))
-    storage[halo.n_left : halo.n_left + len(hot)] = hot
+        last = len(cell) - int(np.searchsorted(cell, (int(borders[comm.rank + 1]) - 1) * COLUMN - COLUMN // 2))
+    halo = Halo(comm, len(order), first, last)
+    storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
+    take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
     halo.fill(storage)
     halo.keep_fresh(storage)
     return storage, halo

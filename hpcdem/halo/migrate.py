@@ -8,37 +8,42 @@ import numpy as np
 
 
 class Migration:
-    """One change of ownership: row i of any per-particle table goes to rank owner[i].
+    """One change of ownership: of n particles on this rank those at `leave` (indices) go to the ranks `owner`.
 
-    Rows that stay are not copied through MPI. The new rows are [stayed | arrived from rank 0, 1, ...], the same order
-    in every table.
+    The new order on a rank is [stayed | arrived from rank 0, 1, ...]. leave: those that go, by destination.
     """
 
-    def __init__(self, comm: Any, owner: np.ndarray) -> None:
+    def __init__(self, comm: Any, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
         self.comm = comm
-        self.stay = np.flatnonzero(owner == comm.rank)
-        leave = np.flatnonzero(owner != comm.rank)
-        self.leave = leave[np.argsort(owner[leave], kind="stable")]
-        self.cuts = np.searchsorted(owner[self.leave], np.arange(1, comm.size))
-        self.nobody = not comm.any(len(leave) > 0)
+        by_owner = np.argsort(owner, kind="stable")
+        self.leave = leave[by_owner]
+        self.cuts = np.searchsorted(owner[by_owner], np.arange(1, comm.size))
+        self.n = n
 
-    def move(self, table: np.ndarray) -> np.ndarray:
-        """This rank's new rows of a table (n, ...). Collective."""
-        if self.nobody:
-            return table
-        arrived = self.comm.alltoallv(np.split(table[self.leave], self.cuts))
-        return np.concatenate([table[self.stay], *arrived])
+    def stay(self) -> np.ndarray:
+        """Indices of those that do not leave."""
+        stays = np.ones(self.n, bool)
+        stays[self.leave] = False
+        return np.flatnonzero(stays)
 
-    def move_ragged(self, counts: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same for rows of which particle i has counts[i], one particle after the other. Collective."""
-        if self.nobody:
-            return counts, rows
-        first = np.cumsum(counts) - counts
-
-        def entries(of: np.ndarray) -> np.ndarray:
-            n = counts[of]
-            return rows[np.repeat(first[of] - (np.cumsum(n) - n), n) + np.arange(n.sum())]
-
-        cuts = np.concatenate(([0], np.cumsum(counts[self.leave])))[self.cuts]
-        arrived = self.comm.alltoallv(np.split(entries(self.leave), cuts))
-        return self.move(counts), np.concatenate([entries(self.stay), *arrived])
+    def exchange(
+        self, rows: np.ndarray, counts: np.ndarray, entries: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Send what belongs to `leave`: rows (k, w) f8; entries (m, v) f8, of which particle i has counts[i], one
+        particle after the other. Returns what arrives, in the same form. Collective: one exchange.
+        """
+        parcels = []
+        begin = np.cumsum(counts) - counts
+        for mine in np.split(np.arange(len(rows)), self.cuts):
+            first, end = (begin[mine[0]], begin[mine[-1]] + counts[mine[-1]]) if len(mine) else (0, 0)
+            parts = (np.array([len(mine)]), counts[mine], rows[mine].view(np.int64), entries[first:end].view(np.int64))
+            parcels.append(np.concatenate([part.reshape(-1) for part in parts]) if len(mine) else np.empty(0, np.int64))
+        new_rows, new_counts, new_entries = [rows[:0]], [counts[:0]], [entries[:0]]
+        for parcel in self.comm.alltoallv(parcels):
+            if len(parcel):
+                n = int(parcel[0])
+                of_counts, of_rows, of_entries = np.split(parcel[1:], np.cumsum((n, n * rows.shape[1])))
+                new_counts.append(of_counts)
+                new_rows.append(of_rows.view(np.float64).reshape(n, -1))
+                new_entries.append(of_entries.view(np.float64).reshape(-1, entries.shape[1]))
+        return np.concatenate(new_rows), np.concatenate(new_counts), np.concatenate(new_entries)

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from hpcdem import cells
+from hpcdem.cells import COLUMN
 from hpcdem.decomp import strips
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)
@@ -55,25 +57,35 @@ def cells_and_ids(span: int, most: int):
     )  # fmt: skip
 
 
-@quick
-@given(st.one_of(cells_and_ids(3, 100), cells_and_ids(10**4, 10**7), cells_and_ids(strips.FARTHEST, 10**12)))
-def test_order_is_column_row_id(rows):
-    """Also where the three do not fit one 62-bit key, and lexsort takes over."""
+def order_of(rows: list[tuple[int, int, int]]) -> np.ndarray:
+    """The order of particles given as (column, row, id)."""
     cx, cy, gid = np.array(rows, dtype=np.int64).reshape(-1, 3).T
-    order = strips.global_order(cx, cy, gid)
-    assert [rows[k] for k in order] == sorted(rows)
+    return strips.global_order(cx * COLUMN + cy, gid.copy())
 
 
-def test_the_fallback_is_taken_and_agrees():
-    """The same particles, once near together, once with a runaway that stretches the key beyond 62 bits."""
+@quick
+@given(st.one_of(cells_and_ids(1, 100), cells_and_ids(10**4, 10**7), cells_and_ids(strips.FARTHEST, 10**12)))
+def test_order_is_column_row_id(rows):
+    """Also where there are too many cells to be counted."""
+    assert [rows[k] for k in order_of(rows)] == sorted(rows)
+
+
+def test_a_runaway_changes_the_method_but_not_the_order():
+    """The same particles, once near together, once with a runaway that is far beyond any table of cells."""
     random = np.random.default_rng(5)
     cx, cy = random.integers(-50, 50, (2, 500))
-    gid = random.permutation(500)
-    plain = strips.global_order(cx, cy, gid)
+    rows = list(zip(cx.tolist(), cy.tolist(), random.permutation(500).tolist()))
     far = strips.FARTHEST
-    stretched = strips.global_order(np.append(cx, far), np.append(cy, -far), np.append(gid, 1 << 40))
-    assert (2 * far) * (2 * far) * (1 << 40) > 1 << 62
-    assert (stretched == np.append(plain, 500)).all()
+    stretched = order_of([*rows, (far, -far, 1 << 40)])
+    assert (2 * far) ** 2 > strips.CELLS_PER_PARTICLE * 501 + strips.SMALL
+    assert (stretched == np.append(order_of(rows), 500)).all()
+
+
+@pytest.mark.parametrize("crowd", [2, strips.CROWD, strips.CROWD + 1, 1000])
+def test_a_crowd_in_one_cell_is_sorted_by_id(crowd):
+    random = np.random.default_rng(crowd)
+    rows = [(0, 0, g) for g in random.permutation(crowd).tolist()] + [(0, -1, crowd), (0, 1, crowd + 1)]
+    assert [rows[k] for k in order_of(rows)] == sorted(rows)
 
 
 @quick
@@ -82,8 +94,7 @@ def test_order_does_not_depend_on_where_particles_come_from(rows, random):
     shuffled = rows.copy()
     random.shuffle(shuffled)
     for values in (rows, shuffled):
-        cx, cy, gid = np.array(values, dtype=np.int64).reshape(-1, 3).T
-        assert [values[k] for k in strips.global_order(cx, cy, gid)] == sorted(rows)
+        assert [values[k] for k in order_of(values)] == sorted(rows)
 
 
 # ---- borders -----------------------------------------------------------------------------------------------------
@@ -150,3 +161,14 @@ def test_every_column_has_one_owner(w, start, n, columns):
 
 def test_one_rank_owns_all():
     assert not strips.owner_of(np.array([-(1 << 28), 0, 1 << 28]), np.array([0, 1])).any()
+
+
+@quick
+@given(st.lists(st.tuples(st.integers(-20, 20), st.integers(-9, 9)), max_size=40), st.integers(-9, 9), ranks)
+def test_strays_are_those_that_belong_to_others(places, start, n):
+    """Columns beyond the outermost borders belong to the first and the last rank."""
+    key = np.array([cx * COLUMN + cy for cx, cy in places] + [strips.FARTHEST * COLUMN, -strips.FARTHEST * COLUMN])
+    borders = start + 2 * np.arange(n + 1)
+    owner = strips.owner_of(cells.columns(key), borders)
+    for rank in range(n):
+        assert strips.strays(key, borders, rank).tolist() == np.flatnonzero(owner != rank).tolist()

@@ -1,9 +1,7 @@
-"""Particle-particle contacts and bonds: the loops over the pair list.
+"""Particle-particle contacts and bonds: their tables, what they report, how bonds are made and broken.
 
-The list is cut into blocks of consecutive rows, one per thread (neighbours.py). A block owns the rows
-``cut[t] : cut[t+1]`` of the particle storage and adds to a force array of its own, which also takes what falls on
-rows outside the block; those entries are never read. Every owned particle therefore receives the same terms in the
-same order whatever the number of blocks and ranks, and no result depends on them.
+The force loop itself is pair_forces.py. A block owns consecutive rows of the list (neighbours.py); what several blocks
+see is counted by the one that owns the earlier partner.
 """
 
 from __future__ import annotations
@@ -11,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
-from hpcdem.fields import GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.fields import GID, MATERIAL, RADIUS, X, Y
 from hpcdem.physics.dem import laws
 
 # Columns of the pair law table (row = material_i * n_materials + material_j).
@@ -24,127 +22,16 @@ KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
 LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _direction(dx, dy, d):
     """Unit vector from the earlier to the later partner; +x if both centres are in one place (rows from one corner)."""
     if d == 0.0:
         return 1.0, 0.0
-    return dx / d, dy / d
+    inverse = 1.0 / d
+    return dx * inverse, dy * inverse
 
 
-@njit(cache=True, nogil=True)
-def _block(
-    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
-    pairs, bonds, n_mat, dt, spheres, tally,
-):  # fmt: skip
-    """Forces of block t at the current positions; shear histories move on by dt, bonds may break.
-
-    hot (n, 8) f8 and ihot, the same memory as int64; cut .. foff: neighbours.Blocks; partner (m,) i4, fs (m,)
-    f8 [N], bond (m,) i4 (row of `bonds`), u_made (m,) f8 [m]; force (k, 4) f8: fx, fy, torque.
-    """
-    first, begin, end, shift = lo[t], cut[t], cut[t + 1], foff[t] - lo[t]
-    for r in range(shift + first, shift + hi[t]):
-        force[r, 0] = 0.0
-        force[r, 1] = 0.0
-        force[r, 2] = 0.0
-    longest2 = 0.0
-    in_tension = 0
-    in_shear = 0
-    p = poff[t] - first
-    for i in range(first, end):
-        xi, yi, vxi, vyi = hot[i, X], hot[i, Y], hot[i, VX], hot[i, VY]
-        wi, ri = hot[i, SPIN], hot[i, RADIUS]
-        row = ihot[i, MATERIAL] * n_mat
-        fx = 0.0
-        fy = 0.0
-        torque = 0.0
-        for k in range(ptr[p + i], ptr[p + i + 1]):
-            j = partner[k]
-            dx = hot[j, X] - xi
-            dy = hot[j, Y] - yi
-            rj = hot[j, RADIUS]
-            reach = ri + rj
-            d2 = dx * dx + dy * dy
-            kind = bond[k]
-            if kind == 0 and d2 > reach * reach:
-                fs[k] = 0.0
-                continue
-            d = math.sqrt(d2)
-            nx, ny = _direction(dx, dy, d)
-            u = reach - d
-            la = ri - 0.5 * u
-            lb = rj - 0.5 * u
-            vs = ny * (vxi - hot[j, VX]) + nx * (hot[j, VY] - vyi) - wi * la - hot[j, SPIN] * lb
-            two_rt = 4.0 * ri * rj / reach
-            q = row + ihot[j, MATERIAL]
-            if u >= 0.0:
-                fn, ks = laws.contact(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u)
-            elif bonds[kind, KIND] == laws.ELASTIC_BOND:
-                area = laws.bond_area(two_rt, spheres)
-                fn, ks = laws.elastic_bond(bonds[kind, E_MOD], bonds[kind, G_MOD], area, reach, u)
-            else:
-                fn, ks = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
-            s = fs[k] + ks * vs * dt
-            if kind != 0:
-                longest2 = max(longest2, d2)
-                failure = laws.bond_failure(
-                    bonds[kind, KIND], fn, s, bonds[kind, TENSILE], bonds[kind, SHEAR], pairs[q, MU],
-                    laws.bond_area(two_rt, spheres),
-                )  # fmt: skip
-                if failure != laws.HOLDS:
-                    bond[k] = 0
-                    kind = 0
-                    if fn < 0.0:
-                        fn = 0.0
-                    if i >= begin:  # the block of the earlier partner counts, so each break counts once
-                        if failure == laws.BREAKS_IN_TENSION:
-                            in_tension += 1
-                        else:
-                            in_shear += 1
-            if kind == 0:
-                s = laws.coulomb(s, pairs[q, MU] * fn)
-            else:
-                s = s + 0.0
-            fs[k] = s
-            ax = s * -ny - fn * nx
-            ay = s * nx - fn * ny
-            fx += ax
-            fy += ay
-            torque += s * la
-            r = shift + j
-            force[r, 0] -= ax
-            force[r, 1] -= ay
-            force[r, 2] += s * lb
-        r = shift + i
-        force[r, 0] += fx
-        force[r, 1] += fy
-        force[r, 2] += torque
-    tally[t, LONGEST2] = longest2
-    tally[t, TENSION_BREAKS] += in_tension
-    tally[t, SHEAR_BREAKS] += in_shear
-
-
-@njit(cache=True, nogil=True)
-def forces(n_blocks, *args):
-    """All blocks, one after the other."""
-    for t in range(n_blocks):
-        _block(t, *args)
-
-
-@njit(cache=True, parallel=True)
-def forces_threaded(
-    n_blocks, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
-    pairs, bonds, n_mat, dt, spheres, tally,
-):  # fmt: skip
-    """All blocks, one thread each (numba's threads take no tuples, hence the list of names)."""
-    for t in prange(n_blocks):
-        _block(
-            t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, fs, bond, u_made, force,
-            pairs, bonds, n_mat, dt, spheres, tally,
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n_mat, spheres, out, iout):
     """Touching or bonded pairs of block t as rows, each pair once in the whole model; returns the number of rows.
 
@@ -200,7 +87,7 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def stiffness(t, hot, ihot, blocks, ptr, partner, pairs, n_mat, n_left, out):
     """Add the tangent normal stiffness of every touching pair of block t to its owned particles, out (n_own,) f8
     [N/m]."""
@@ -225,7 +112,7 @@ def stiffness(t, hot, ihot, blocks, ptr, partner, pairs, n_mat, n_left, out):
                 out[j - n_left] += kn
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, chosen, renewed, fresh, tolerate, rext):
     """Bond the pairs of block t with both ends chosen: d - (Ra + Rb) rext <= tolerate, or renew the bond they have.
 
@@ -258,7 +145,7 @@ def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, c
     return made, longest2
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def break_bonds(t, blocks, ptr, partner, bond, chosen):
     """Remove the bonds of block t with both ends chosen; returns how many (of pairs whose earlier end the block
     owns)."""
@@ -272,6 +159,18 @@ def break_bonds(t, blocks, ptr, partner, bond, chosen):
                 if i >= cut[t]:
                     gone += 1
     return gone
+
+
+def bond_table(bonds: np.ndarray) -> np.ndarray:
+    """Bond types for the force loop: (types, 4) f8 [E, G, tensile, shear].
+
+    bonds (types, 5) f8: columns KIND to SHEAR. A negative tensile strength says "no bond" (row 0), a negative modulus
+    "contact bond", so that a row is as wide as four lanes.
+    """
+    table = bonds[:, E_MOD : SHEAR + 1].copy()
+    table[bonds[:, KIND] == laws.CONTACT_BOND, 0] = -1.0
+    table[bonds[:, KIND] == 0.0, 2] = -1.0
+    return table
 
 
 def pair_table(materials: np.ndarray) -> np.ndarray:

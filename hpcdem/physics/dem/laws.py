@@ -19,7 +19,7 @@ ELASTIC_BOND, CONTACT_BOND = 1, 2  # 0: no bond
 HOLDS, BREAKS_IN_TENSION, BREAKS_IN_SHEAR = 0, 1, 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def series_stiffness(ka, kb):
     """Two springs in series [N/m]: ka kb / (ka + kb); zero if either is zero."""
     if ka <= 0.0 or kb <= 0.0:
@@ -27,13 +27,13 @@ def series_stiffness(ka, kb):
     return ka * kb / (ka + kb)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def hertz_normal_factor(g, nu):
     """Factor A of Fn = A sqrt(2 Rt U) U [Pa]: A = 2 G / (3 (1 - nu)), mean moduli of the pair."""
     return 2.0 * g / (3.0 * (1.0 - nu))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def mindlin_shear_factor(g, nu):
     """Factor B of the tangent shear stiffness ks = B sqrt(2 Rt U) [Pa]: B = 2 G / (2 - nu).
 
@@ -43,7 +43,7 @@ def mindlin_shear_factor(g, nu):
     return 2.0 * g / (2.0 - nu)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def contact(model, a, b, two_rt, u):
     """Normal force Fn [N] and shear stiffness ks [N/m] of a touching pair (u >= 0).
 
@@ -56,7 +56,7 @@ def contact(model, a, b, two_rt, u):
     return a * u, b
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def tangent_normal_stiffness(model, a, two_rt, u):
     """dFn/dU [N/m] at overlap u: 1.5 A sqrt(2 Rt U), or the spring itself."""
     if model == HERTZ:
@@ -64,7 +64,7 @@ def tangent_normal_stiffness(model, a, two_rt, u):
     return a
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def coulomb(fs, limit):
     """Shear force cut to |Fs| <= limit. Adding 0.0 turns -0.0 into 0.0, so that an empty history is all zero bits."""
     if fs > limit:
@@ -74,7 +74,7 @@ def coulomb(fs, limit):
     return fs + 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bond_area(two_rt, spheres):
     """Cross-section of a bond [m^2]: pi Rt^2 between spheres, 2 Rt x 1 m between disks."""
     if spheres:
@@ -82,13 +82,13 @@ def bond_area(two_rt, spheres):
     return two_rt
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def elastic_bond(e, g, area, length, u):
     """Open elastic bond (u < 0): Fn = E A/L U (tension), ks = G A/L. No moment is carried."""
     return e * area / length * u, g * area / length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def contact_bond(model, a, b, two_rt, u_made, u):
     """Open contact bond (u < 0): the contact's own springs go on in tension.
 
@@ -100,7 +100,7 @@ def contact_bond(model, a, b, two_rt, u_made, u):
     return a * u, b
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bond_failure(kind, fn, fs, tensile, shear, mu, area):
     """HOLDS, BREAKS_IN_TENSION or BREAKS_IN_SHEAR.
 
@@ -117,7 +117,7 @@ def bond_failure(kind, fn, fs, tensile, shear, mu, area):
     return HOLDS
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def damped(force, velocity, alpha):
     """Local damping (Cundall): F - alpha |F| sgn(v), sgn(0) = +1."""
     if velocity < 0.0:

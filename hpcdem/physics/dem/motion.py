@@ -14,52 +14,68 @@ import math
 import numpy as np
 from numba import njit, prange
 
-from hpcdem.fields import ANGLE, FIX, FIX_SPIN, FIX_X, FIX_Y, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.fields import ANGLE, FIX, FIX_SPIN, FIX_X, FIX_Y, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.physics.dem import laws
+
+# Columns of the body table (n_own, 8) f8: mass [kg], inertia [kg m^2], local damping alpha, a spare one, and what turns
+# a force into a change of velocity: dt / m for x and y, dt / I for the spin, zero where the component is fixed.
+MASS, INERTIA, ALPHA, _, KICK_X, KICK_Y, KICK_SPIN = range(7)
 
 # What a check of the motion returns per block (float64), all to be reduced by maximum.
 PATH2, SPEED2, STRIDE, BROKEN = range(4)
 
 
-@njit(cache=True, nogil=True)
-def _block(t, hot, cold, icold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt):
-    """Move the owned particles of block t by dt. body (n, 4) f8: mass [kg], inertia [kg m^2], alpha, spare."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def _block(t, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt):
+    """Move those of the owned particles first : last that belong to block t by dt."""
     shift = foff[t] - lo[t]
-    for i in range(cut[t], cut[t + 1]):
+    for i in range(max(cut[t], n_left + first), min(cut[t + 1], n_left + last)):
         c = i - n_left
-        m = body[c, 0]
-        alpha = body[c, 2]
-        fix = icold[c, FIX]
         r = shift + i
-        if not fix & FIX_X:
-            v = hot[i, VX]
-            hot[i, VX] = v + laws.damped(force[r, 0] + m * gx - eta * v, v, alpha) / m * dt
-        if not fix & FIX_Y:
-            v = hot[i, VY]
-            hot[i, VY] = v + laws.damped(force[r, 1] + m * gy - eta * v, v, alpha) / m * dt
-        if not fix & FIX_SPIN:
-            w = hot[i, SPIN]
-            hot[i, SPIN] = w + laws.damped(force[r, 2], w, alpha) / body[c, 1] * dt
-        hot[i, X] += hot[i, VX] * dt
-        hot[i, Y] += hot[i, VY] * dt
-        cold[c, ANGLE] += hot[i, SPIN] * dt
+        m, alpha = body[c, MASS], body[c, ALPHA]
+        vx, vy, w = hot[i, VX], hot[i, VY], hot[i, SPIN]
+        vx += laws.damped(force[r, 0] + m * gx - eta * vx, vx, alpha) * body[c, KICK_X]
+        vy += laws.damped(force[r, 1] + m * gy - eta * vy, vy, alpha) * body[c, KICK_Y]
+        w += laws.damped(force[r, 2], w, alpha) * body[c, KICK_SPIN]
+        hot[i, VX], hot[i, VY], hot[i, SPIN] = vx, vy, w
+        hot[i, X] += vx * dt
+        hot[i, Y] += vy * dt
+        cold[c, ANGLE] += w * dt
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def move(n_blocks, *args):
     """All blocks, one after the other."""
     for t in range(n_blocks):
         _block(t, *args)
 
 
-@njit(cache=True, parallel=True)
-def move_threaded(n_blocks, hot, cold, icold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt):
+@njit(cache=True, parallel=True, error_model="numpy")
+def move_threaded(n_blocks, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt):
     """All blocks, one thread each."""
     for t in prange(n_blocks):
-        _block(t, hot, cold, icold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt)
+        _block(t, first, last, hot, cold, n_left, cut, lo, foff, force, body, gx, gy, eta, dt)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill_body(hot, ihot, icold, n_left, density, damp, shape, dt, body):
+    """The body table of the owned particles; density, damp: per material; shape: mass.shape of the rule."""
+    factor, cubed, gyration = shape
+    for c in range(len(body)):
+        i = n_left + c
+        r, material, fix = hot[i, RADIUS], ihot[i, MATERIAL], icold[c, FIX]
+        volume = factor * r * r
+        if cubed:
+            volume *= r
+        m = density[material] * volume
+        inertia = gyration * m * r * r
+        body[c, MASS], body[c, INERTIA], body[c, ALPHA] = m, inertia, damp[material]
+        body[c, KICK_X] = 0.0 if fix & FIX_X else dt / m
+        body[c, KICK_Y] = 0.0 if fix & FIX_Y else dt / m
+        body[c, KICK_SPIN] = 0.0 if fix & FIX_SPIN else dt / inertia
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def survey(hot, n_left, n_own, origin, dt, out):
     """Largest path since the list was built squared, speed squared, |v| dt / R, and 1 if a number is not finite.
 

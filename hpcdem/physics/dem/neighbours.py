@@ -11,15 +11,25 @@ the rows before it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.cells import COLUMN, column
 from hpcdem.fields import GID, RADIUS, WIDTH, X, Y
-from hpcdem.physics.dem import walls as wall_kernels
+from hpcdem.memory import aligned
+from hpcdem.physics.dem import histories, wall_slots
 from hpcdem.physics.dem.contacts import LONGEST2
+from hpcdem.physics.dem.histories import BOND, EXTRA, PARTNER, SHEAR, Histories
+
+__all__ = ["Blocks", "ContactLists", "Histories", "build", "make_blocks"]
+
+U = np.uint64
+USUAL = 8
+"""As many contacts as a particle usually has, or more."""
+SLOTS_PER_ROW = 6
+"""Room for the list at first; discs of similar size need half of it."""
 
 
 class Blocks(NamedTuple):
@@ -33,179 +43,149 @@ class Blocks(NamedTuple):
     foff: np.ndarray
 
 
-@dataclass
-class Histories:
-    """What contacts remember, per owned particle (CSR): partner gid (-1 - w for wall w), shear force [N], a second
-    number (overlap at bonding of a pair [m]; side of a wall contact) and the bond type. Both partners of a pair carry
-    it."""
-
-    ptr: np.ndarray
-    partner: np.ndarray
-    fs: np.ndarray
-    extra: np.ndarray
-    bond: np.ndarray
-
-    @staticmethod
-    def empty(n: int) -> Histories:
-        """No memory for n particles."""
-        return Histories(
-            np.zeros(n + 1, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0), np.empty(0, np.int32)
-        )
-
-    def counts(self) -> np.ndarray:
-        """Number of entries per particle (n,)."""
-        return np.diff(self.ptr)
-
-    def rows(self) -> np.ndarray:
-        """Entries packed as (m, 4) f8 rows for travel: partner and bond as int64 bits."""
-        out = np.empty((len(self.partner), 4))
-        bits = out.view(np.int64)
-        bits[:, 0], out[:, 1], out[:, 2], bits[:, 3] = self.partner, self.fs, self.extra, self.bond
-        return out
-
-    @staticmethod
-    def from_rows(counts: np.ndarray, rows: np.ndarray) -> Histories:
-        """Inverse of `counts` and `rows`."""
-        ptr = np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
-        bits = rows.view(np.int64)
-        return Histories(
-            ptr, bits[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy(), bits[:, 3].astype(np.int32)
-        )  # fmt: skip
-
-    def take(self, order: np.ndarray) -> Histories:
-        """The histories of the particles in `order` (indices, with or without some left out)."""
-        counts = self.counts()[order]
-        ptr = np.concatenate(([0], np.cumsum(counts, dtype=np.int64)))
-        index = np.repeat(self.ptr[:-1][order] - ptr[:-1], counts) + np.arange(ptr[-1])
-        return Histories(ptr, self.partner[index], self.fs[index], self.extra[index], self.bond[index])
-
-    def extended(self, n: int) -> Histories:
-        """With n more particles at the end that remember nothing."""
-        ptr = np.concatenate((self.ptr, np.full(n, self.ptr[-1])))
-        return Histories(ptr, self.partner, self.fs, self.extra, self.bond)
-
-    def keep(self, mask: np.ndarray) -> Histories:
-        """Only the entries where mask (m,) is true."""
-        owner = np.repeat(np.arange(len(self.ptr) - 1), self.counts())[mask]
-        ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(self.ptr) - 1), dtype=np.int64)))
-        return Histories(ptr, self.partner[mask], self.fs[mask], self.extra[mask], self.bond[mask])
+@njit(cache=True, nogil=True, error_model="numpy")
+def _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, row, partner):
+    """Pairs of block t into the slots begin : begin + room, row by row: nearer than contact plus skin, or than the root
+    of bond2. Returns the slots needed; an upper bound if the room is too small."""
+    a, b, last = cut[t], cut[t + 1], hi[t]
+    k = U(begin)
+    overflow = 0
+    s = lo[t]
+    above = right = right_end = s
+    ptr[poff[t]] = begin
+    while s < b:
+        # All particles of a cell have the same candidates: the rest of their cell and the cell above, which follow
+        # each other in storage, and the three cells next to them in the next column, which do so too.
+        key = cell[s]
+        e = s + 1
+        while e < last and cell[e] == key:
+            e += 1
+        above = max(above, e)
+        while above < last and cell[above] <= key + 1:
+            above += 1
+        right = max(right, above)
+        while right < last and cell[right] < key + COLUMN - 1:
+            right += 1
+        right_end = max(right_end, right)
+        while right_end < last and cell[right_end] <= key + COLUMN + 1:
+            right_end += 1
+        for i in range(s, min(e, b)):
+            first, first_end, second, second_end = i + 1, above, right, right_end
+            if i < a:  # a row that reaches in from before the block: pairs with the block only
+                first, first_end = max(first, a), min(first_end, b)
+                second, second_end = max(second, a), min(second_end, b)
+            wish = max(first_end - first, 0) + max(second_end - second, 0)
+            if overflow > 0 or np.int64(k) - begin + wish > room:
+                overflow += wish
+                continue
+            # Written for every candidate, kept if near: a jump that nobody can foresee would cost more.
+            xi, yi, ri = hot[U(i), X], hot[U(i), Y], hot[U(i), RADIUS]
+            for j in range(U(first), U(max(first, first_end))):
+                dx = hot[j, X] - xi
+                dy = hot[j, Y] - yi
+                reach = ri + hot[j, RADIUS] + skin
+                row[k], partner[k] = i, j
+                k += U(dx * dx + dy * dy <= max(reach * reach, bond2))
+            for j in range(U(second), U(max(second, second_end))):
+                dx = hot[j, X] - xi
+                dy = hot[j, Y] - yi
+                reach = ri + hot[j, RADIUS] + skin
+                row[k], partner[k] = i, j
+                k += U(dx * dx + dy * dy <= max(reach * reach, bond2))
+            ptr[poff[t] + i + 1 - lo[t]] = k
+        s = e
+    return np.int64(k) - begin + overflow
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made):
+    """Give the slots begin : end what their pairs remember, which stands with both ends."""
+    for k in range(U(begin), U(end)):
+        i, j = np.int64(row[k]), np.int64(partner[k])
+        own_i = n_left <= i < n_left + n_own
+        gid = ihot[U(j if own_i else i), GID]
+        c = U(where[U((i if own_i else j) - n_left)])
+        first, last = hptr[c], hptr[c + U(1)]
+        found, q = np.int64(-1), first
+        if first + USUAL <= len(hbits):  # always as many, so that no jump depends on their number
+            for d in range(USUAL):
+                q = first + d
+                found = q if (hbits[U(q), PARTNER] == gid) & (q < last) else found
+            q = first + USUAL
+        while q < last:
+            found = q if hbits[U(q), PARTNER] == gid else found
+            q += 1
+        at = U(max(found, 0))
+        fs[k] = hrows[at, SHEAR] if found >= 0 else 0.0
+        bond[k] = hbits[at, BOND] if found >= 0 else 0
+        u_made[k] = hrows[at, EXTRA] if found >= 0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
+    """Keep the pairs of block t that are near or bonded. Returns slots, bonds (counted where the block owns the earlier
+    partner), longest bonded distance squared."""
+    begin = ptr[poff[t]]
+    k = first = begin
+    bonds_here = 0
+    longest2 = 0.0
+    for i in range(lo[t], cut[t + 1]):
+        last = ptr[poff[t] + i + 1 - lo[t]]
+        for q in range(first, last):
+            j = partner[q]
+            dx = hot[j, X] - hot[i, X]
+            dy = hot[j, Y] - hot[i, Y]
+            d2 = dx * dx + dy * dy
+            reach = hot[i, RADIUS] + hot[j, RADIUS] + skin
+            bonded = bond[q] != 0
+            row[k], partner[k], fs[k], bond[k], u_made[k] = i, j, fs[q], bond[q], u_made[q]
+            longest2 = max(longest2, d2 if bonded else 0.0)
+            bonds_here += bonded & (i >= cut[t])
+            k += bonded | (d2 <= reach * reach)
+        first = last
+        ptr[poff[t] + i + 1 - lo[t]] = k
+    return k - begin, bonds_here, longest2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
-    t, begin, room, hot, ihot, cx, cy, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    hptr, hpartner, hfs, hextra, hbond, ptr, partner, fs, bond, u_made,
+    t, begin, room, hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
 
-    Returns slots needed, bonds placed (counted where the block owns the earlier partner), longest bonded distance
-    squared.
+    bond2 [m^2]: bonded pairs are listed up to this distance, negative if there are none. Returns slots needed, bonds
+    placed, longest bonded distance squared.
     """
-    a, b, last = cut[t], cut[t + 1], hi[t]
-    n = 0
-    bonds_here = 0
-    longest2 = 0.0
-    col = 0
-    other = lo[t]
-    for i in range(lo[t], b):
-        ptr[poff[t] + i - lo[t]] = begin + n
-        if i == lo[t] or cx[i] != col:
-            col = cx[i]
-            while other < last and cx[other] <= col:
-                other += 1
-        while other < last and cx[other] == col + 1 and cy[other] < cy[i] - 1:
-            other += 1
-        xi, yi, ri, gi = hot[i, X], hot[i, Y], hot[i, RADIUS], ihot[i, GID]
-        own_i = n_left <= i < n_left + n_own
-        j = i + 1
-        in_column = True
-        while True:
-            if in_column and (j >= last or cx[j] != col or cy[j] > cy[i] + 1):
-                in_column = False
-                j = other
-            if not in_column and (j >= last or cx[j] != col + 1 or cy[j] > cy[i] + 1):
-                break
-            if i < a and (j < a or j >= b):
-                j += 1
-                continue
-            dx = hot[j, X] - xi
-            dy = hot[j, Y] - yi
-            d2 = dx * dx + dy * dy
-            reach = ri + hot[j, RADIUS] + skin
-            near = d2 <= reach * reach
-            if near or d2 <= bond2:
-                found = -1
-                c = i - n_left if own_i else j - n_left
-                g = ihot[j, GID] if own_i else gi
-                for q in range(hptr[c], hptr[c + 1]):
-                    if hpartner[q] == g:
-                        found = q
-                        break
-                if near or (found >= 0 and hbond[found] != 0):
-                    if n < room:
-                        k = begin + n
-                        partner[k] = j
-                        if found >= 0:
-                            fs[k], bond[k], u_made[k] = hfs[found], hbond[found], hextra[found]
-                            if hbond[found] != 0:
-                                longest2 = max(longest2, d2)
-                                if i >= a:
-                                    bonds_here += 1
-                        else:
-                            fs[k], bond[k], u_made[k] = 0.0, 0, 0.0
-                    n += 1
-            j += 1
-    ptr[poff[t] + b - lo[t]] = begin + n
-    return n, bonds_here, longest2
+    n = _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, row, partner)
+    if n > room:
+        return n, 0, 0.0
+    if len(hrows) == 0:
+        fs[begin : begin + n], bond[begin : begin + n], u_made[begin : begin + n] = 0.0, 0, 0.0
+        return n, 0, 0.0
+    _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made)
+    if bond2 < 0.0:
+        return n, 0, 0.0
+    return _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fill_blocks(n_blocks, need, placed, longest2, begin, room, *args):
     for t in range(n_blocks):
         need[t], placed[t], longest2[t] = _fill(t, begin[t], room[t], *args)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def _fill_blocks_threaded(
-    n_blocks, need, placed, longest2, begin, room, hot, ihot, cx, cy, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    hptr, hpartner, hfs, hextra, hbond, ptr, partner, fs, bond, u_made,
+    n_blocks, need, placed, longest2, begin, room,
+    hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     for t in prange(n_blocks):
         need[t], placed[t], longest2[t] = _fill(
-            t, begin[t], room[t], hot, ihot, cx, cy, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-            hptr, hpartner, hfs, hextra, hbond, ptr, partner, fs, bond, u_made,
+            t, begin[t], room[t], hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+            where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
         )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
-def _collect(blocks, n_blocks, n_left, ihot, ptr, partner, fs, bond, u_made, count, at, hpartner, hfs, hextra, hbond):
-    """Histories of the owned particles from the pair slots. With an empty hpartner only counts."""
-    cut, lo, _, poff, _ = blocks
-    only_count = len(hpartner) == 0
-    for t in range(n_blocks):
-        a, b = cut[t], cut[t + 1]
-        p = poff[t] - lo[t]
-        for i in range(lo[t], b):
-            for k in range(ptr[p + i], ptr[p + i + 1]):
-                if fs[k] == 0.0 and bond[k] == 0:
-                    continue
-                j = partner[k]
-                if a <= i < b:
-                    c = i - n_left
-                    if only_count:
-                        count[c] += 1
-                    else:
-                        q = at[c]
-                        at[c] += 1
-                        hpartner[q], hfs[q], hextra[q], hbond[q] = ihot[j, GID], fs[k], u_made[k], bond[k]
-                if a <= j < b:
-                    c = j - n_left
-                    if only_count:
-                        count[c] += 1
-                    else:
-                        q = at[c]
-                        at[c] += 1
-                        hpartner[q], hfs[q], hextra[q], hbond[q] = ihot[i, GID], fs[k], u_made[k], bond[k]
 
 
 class ContactLists:
@@ -213,11 +193,13 @@ class ContactLists:
 
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
 
-    Pair slots: partner (storage row), fs [N], bond (type), u_made [m]; row i of block t has the slots ptr[poff[t] + i -
-    lo[t]] up to the next. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side; block t has wptr[t] : wptr[t+1].
+    Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m]; row i of block t has the
+    slots ptr[poff[t] + i - lo[t]] up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall,
+    slot_fs [N], slot_side, sorted by row, then wall; block t has wptr[t] : wptr[t+1].
     """
 
     ptr: np.ndarray
+    row: np.ndarray
     partner: np.ndarray
     fs: np.ndarray
     bond: np.ndarray
@@ -233,32 +215,14 @@ class ContactLists:
     def __init__(self, n_left: int, n_own: int, blocks: Blocks) -> None:
         self.n_left, self.n_own, self.blocks = n_left, n_own, blocks
         self.n_blocks = len(blocks.lo)
-        self.force = np.zeros((int((blocks.hi - blocks.lo).sum()), 4))
+        self.force = aligned((int((blocks.hi - blocks.lo).sum()), 4))
+        self.force[:] = 0.0
         self.tally = np.zeros((self.n_blocks, WIDTH))
         self.bonds_placed = 0
 
     def histories(self, ihot: np.ndarray) -> Histories:
         """What the contacts of the owned particles remember now."""
-        count = np.zeros(self.n_own, np.int64)
-        args = (self.blocks, self.n_blocks, self.n_left, ihot, self.ptr, self.partner, self.fs, self.bond, self.u_made)
-        none_i, none_f, none_b = np.empty(0, np.int64), np.empty(0), np.empty(0, np.int32)
-        _collect(*args, count, none_i, none_i, none_f, none_f, none_b)
-        alive = (self.slot_fs != 0.0) | (self.slot_side != 0.0)
-        wall_row = self.slot_row[alive] - self.n_left
-        wall_count = np.bincount(wall_row, minlength=self.n_own)
-        ptr = np.concatenate(([0], np.cumsum(count + wall_count, dtype=np.int64)))
-        m = int(ptr[-1])
-        hist = Histories(ptr, np.empty(m, np.int64), np.empty(m), np.empty(m), np.zeros(m, np.int32))
-        if m == 0:
-            return hist
-        at = ptr[:-1].copy()
-        _collect(*args, count, at, hist.partner, hist.fs, hist.extra, hist.bond)
-        if len(wall_row):  # the wall entries of a particle follow its pair entries
-            first = np.concatenate(([0], np.cumsum(wall_count)))[wall_row]
-            q = at[wall_row] + np.arange(len(wall_row)) - first
-            hist.partner[q] = -1 - self.slot_wall[alive]
-            hist.fs[q], hist.extra[q] = self.slot_fs[alive], self.slot_side[alive]
-        return hist
+        return histories.taken_out(self, ihot)
 
     def owned_forces(self) -> np.ndarray:
         """Sum of contact forces and torque on each owned particle, (n_own, 3) f8 copy."""
@@ -281,15 +245,28 @@ class ContactLists:
         return float(self.tally[:, LONGEST2].max())
 
 
-def make_blocks(cx: np.ndarray, n_left: int, n_own: int, n_blocks: int) -> Blocks:
-    """Cut the owned rows into n_blocks runs of equal length, and find the rows each may touch (cx ascending)."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def gauge(hot, n_left, n_own, box):
+    """Largest radius of the owned particles [m], and 1 if a centre is outside box (left, right, bottom, top) [m]."""
+    left, right, bottom, top = box
+    largest = 0.0
+    inside = True
+    for i in range(n_left, n_left + n_own):
+        largest = max(largest, hot[i, RADIUS])
+        x, y = hot[i, X], hot[i, Y]
+        inside &= (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
+    return largest, 0.0 if inside else 1.0
+
+
+def make_blocks(cell: np.ndarray, n_left: int, n_own: int, n_blocks: int) -> Blocks:
+    """Cut the owned rows into n_blocks runs of equal length, and find the rows each may touch (cell ascending)."""
     cut = n_left + (np.arange(n_blocks + 1, dtype=np.int64) * n_own) // n_blocks
     lo, hi = cut[:-1].copy(), cut[:-1].copy()
     for t in range(n_blocks):
         if cut[t + 1] > cut[t]:
-            lo[t] = np.searchsorted(cx, cx[cut[t]] - 1, side="left")
-            hi[t] = np.searchsorted(cx, cx[cut[t + 1] - 1] + 1, side="right")
-    # Left ghosts and earlier rows beyond the previous column cannot reach in, so they are no rows of the list.
+            # All of the columns before and after: rows beyond them cannot reach in, so they are no rows of the list.
+            lo[t] = np.searchsorted(cell, int(column(cell[cut[t]]) - 1) * COLUMN - COLUMN // 2)
+            hi[t] = np.searchsorted(cell, int(column(cell[cut[t + 1] - 1]) + 2) * COLUMN - COLUMN // 2)
     rows = np.maximum(cut[1:] - lo, 0) + 1
     poff = np.concatenate(([0], np.cumsum(rows)[:-1])).astype(np.int64)
     foff = np.concatenate(([0], np.cumsum(hi - lo)[:-1])).astype(np.int64)
@@ -298,66 +275,50 @@ def make_blocks(cx: np.ndarray, n_left: int, n_own: int, n_blocks: int) -> Block
 
 def build(
     hot: np.ndarray,
-    cx: np.ndarray,
-    cy: np.ndarray,
+    cell: np.ndarray,
     n_left: int,
     n_own: int,
     hist: Histories,
+    where: np.ndarray,
     walls: np.ndarray,
+    side: float,
+    largest: float,
     skin: float,
     bond_reach: float,
     n_blocks: int,
 ) -> ContactLists:
     """Make the lists for particles stored in global order.
 
-    hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cx, cy (n,) i8 cells; hist: of the owned particles in
-    storage order; walls (w, 8) f8; skin [m]; bond_reach [m]: bonded pairs are listed up to this distance.
+    hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cell (n,) i8: keys of their cells of this side [m]; hist:
+    of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
+    bond_reach [m]: bonded pairs are listed up to this distance.
     """
     ihot = hot.view(np.int64)
-    lists = ContactLists(n_left, n_own, make_blocks(cx, n_left, n_own, n_blocks))
+    lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks))
     blocks = lists.blocks
     span = np.maximum(blocks.cut[1:] - blocks.lo, 0)
     lists.ptr = np.zeros(int((span + 1).sum()), np.int64)
     need, placed, longest2 = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64), np.zeros(n_blocks)
-    room = 4 * span + 64
-    packed = (hist.ptr, hist.partner, hist.fs, hist.extra, hist.bond)
+    room = SLOTS_PER_ROW * span + 64
+    bond2 = bond_reach**2 if hist.bonded() > 0 else -1.0
     fill = _fill_blocks if n_blocks == 1 else _fill_blocks_threaded
     while True:
         begin = np.concatenate(([0], np.cumsum(room)[:-1])).astype(np.int64)
-        m = int(room.sum())
-        slots = (lists.ptr, np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m))
+        m = int(room.sum()) + 1  # a candidate is written before it is known to be near
+        slots = (
+            lists.ptr, np.empty(m, np.int32), np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m),
+        )  # fmt: skip
         fill(
-            n_blocks, need, placed, longest2, begin, room, hot, ihot, cx, cy, n_left, n_own,
-            blocks.cut, blocks.lo, blocks.hi, blocks.poff, skin, bond_reach**2, *packed, *slots,
+            n_blocks, need, placed, longest2, begin, room, hot, ihot, cell, n_left, n_own,
+            blocks.cut, blocks.lo, blocks.hi, blocks.poff, skin, bond2,
+            where, hist.ptr, hist.rows, hist.rows.view(np.int64), *slots,
         )  # fmt: skip
         if (need <= room).all():
             break
-        room = np.maximum(room, need + need // 8 + 64)
-    _, lists.partner, lists.fs, lists.bond, lists.u_made = slots
+        room = np.maximum(room, need)  # candidates come and go within what the first round found
+    _, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made = slots
     lists.bonds_placed = int(placed.sum())
     lists.tally[:, LONGEST2] = longest2
     lists.n_pairs = int(need.sum())
-    _wall_slots(lists, hot, hist, walls, skin)
+    wall_slots.place(lists, hot, cell, hist, where, walls, side, largest, skin)
     return lists
-
-
-def _wall_slots(lists: ContactLists, hot: np.ndarray, hist: Histories, walls: np.ndarray, skin: float) -> None:
-    """Slots of particles near walls, with their histories."""
-    n = room = lists.n_own // 4 + 64
-    while n >= room:
-        room = n + 64
-        rows, which = np.empty(room, np.int64), np.empty(room, np.int64)
-        n = wall_kernels.near(hot, lists.n_left, lists.n_own, walls, skin, hist.ptr, hist.partner, rows, which)
-    lists.slot_row, lists.slot_wall = rows[:n].copy(), which[:n].copy()
-    lists.slot_fs, lists.slot_side, lists.new_side = np.zeros(n), np.zeros(n), np.zeros(n)
-    old = np.flatnonzero(hist.partner < 0)
-    if len(old):
-        owner = np.repeat(np.arange(lists.n_own), hist.counts())[old]
-        n_walls = len(walls)
-        key = (lists.slot_row - lists.n_left) * n_walls + lists.slot_wall
-        old_key = owner * n_walls + (-1 - hist.partner[old])
-        # A wall that is gone takes its histories with it; the others are all in the list, by construction of `near`.
-        known = -1 - hist.partner[old] < n_walls
-        at = np.searchsorted(key, old_key[known])
-        lists.slot_fs[at], lists.slot_side[at] = hist.fs[old[known]], hist.extra[old[known]]
-    lists.wptr = np.searchsorted(lists.slot_row, lists.blocks.cut).astype(np.int64)

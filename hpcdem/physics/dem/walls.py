@@ -24,7 +24,7 @@ P1X, P1Y, P2X, P2Y, WVX, WVY, ONE_SIDED = range(7)
 NONE, FACE, END1, END2 = 0, 1, 2, 3
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def closest(wall, x, y):
     """Where a point meets a wall: (FACE, END1 or END2; signed distance to the line, left positive; nearest point)."""
     ex, ey = wall[P2X] - wall[P1X], wall[P2Y] - wall[P1Y]
@@ -41,7 +41,7 @@ def closest(wall, x, y):
     return FACE, h, wall[P1X] + along * ex, wall[P1Y] + along * ey
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _geometry(wall, x, y, r, side):
     """Contact of a disc with a wall: (where, side, n_x, n_y, overlap, nearest point). where is NONE without contact.
 
@@ -70,7 +70,7 @@ def _geometry(wall, x, y, r, side):
     return where, 0.0, dx / d, dy / d, r - d, qx, qy  # round the end it may come to the other side
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
     """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that
     passes through this point, or by an end there that comes earlier."""
@@ -85,7 +85,7 @@ def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
     """Geometry and law of wall slot k: (where, side, n_x, n_y, U, Fn, ks, friction)."""
     i = slot_row[k]
@@ -102,7 +102,7 @@ def _contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, l
     return where, side, nx, ny, u, fn, ks, law[MU]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _block(
     t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side, laws_table, n_mat, dt
 ):  # fmt: skip
@@ -140,14 +140,14 @@ def _block(
         k = last
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def forces(n_blocks, *args):
     """All blocks, one after the other."""
     for t in range(n_blocks):
         _block(t, *args)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True, error_model="numpy")
 def forces_threaded(
     n_blocks, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
     laws_table, n_mat, dt,
@@ -160,7 +160,7 @@ def forces_threaded(
         )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table, n_mat, out, iout):
     """Wall contacts as rows: out (m, 8) f8: Fn, Fs, Fx, Fy (on the particle), x, y, overlap, tangent stiffness;
     iout (m, 2) i8: gid, wall row. Returns the number of rows; nothing of the state changes."""
@@ -196,7 +196,7 @@ def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table
     return n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def near(hot, n_left, n_own, walls, skin, hptr, hpartner, slot_row, slot_wall):
     """Owned particles within R + skin of a wall, or with a history there, sorted by row then wall.
 

@@ -1,23 +1,18 @@
-#!/usr/bin/env python3
-"""How fast `hpcdem -s` is: frames of so many particles are made up and gone through on so many ranks.
-
-    python scripts/bench_strain_stress.py --particles 1e4 1e5 1e6 --ranks 1 2 [--frames 8] [--format vtkhdf|dat]
-
-Prints a row of a table per size and number of ranks: frames per second by the clock, processor seconds per frame over
-all ranks, largest memory of a rank. The frames lie in a temporary folder (about 1.2 GB each for a million particles).
-"""
+"""How fast `hpcdem -s` is: frames of so many particles are made up and gone through on so many ranks."""
 
 from __future__ import annotations
 
-import argparse
 import resource
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+
+from bench import launch
+from bench.launch import Layout
+from bench.tables import Lines
 
 SPACES = 10.0
 """Length of the section over its height."""
@@ -47,7 +42,7 @@ def make_frames(folder: Path, n: int, count: int, suffix: str) -> int:
     x0, y0 = np.empty(n), np.empty(n)
     x0[gid] = (2.0 * radius * (np.arange(columns) + 0.5 * (np.arange(rows)[:, None] % 2))).ravel()
     y0[gid] = np.repeat(np.sqrt(3.0) * radius * np.arange(rows), columns)
-    walls = {name: np.zeros(1) for name in ("kn", "ks", "fric")}
+    walls: dict[str, np.ndarray] = {name: np.zeros(1) for name in ("kn", "ks", "fric")}
     walls |= {
         "id": np.array([0]),
         "color": np.array([5], np.int32),
@@ -61,7 +56,9 @@ def make_frames(folder: Path, n: int, count: int, suffix: str) -> int:
     for k in range(count):
         x = x0 + 0.02 * k * y0 * np.sin(x0 / 5000.0) + rng.normal(0.0, 0.02 * radius, n)
         y = y0 + rng.normal(0.0, 0.02 * radius, n)
-        particles = {name: rng.normal(size=n) for name in "vx vy spin angle fx fy torque mass inertia density".split()}
+        particles: dict[str, np.ndarray] = {
+            name: rng.normal(size=n) for name in "vx vy spin angle fx fy torque mass inertia density".split()
+        }
         particles |= {name: rng.normal(size=n) for name in "fric shear poiss kn ks damp".split()}
         particles |= {"gid": np.arange(n), "x": x, "y": y, "radius": np.full(n, radius)}
         particles |= {"hertz": np.ones(n, np.int8), "fix": np.zeros(n, np.uint8), "group": np.zeros(n, np.int32)}
@@ -84,50 +81,42 @@ def make_frames(folder: Path, n: int, count: int, suffix: str) -> int:
     return n
 
 
-def work(folder: Path) -> None:
-    """One rank."""
-    from mpi4py import MPI
-
+def work(job: dict[str, Any]) -> dict[str, Any]:
+    """On the ranks: go through the frames."""
+    from hpcdem import session
     from hpcdem.cli.strain_stress import load_kernels
-    from hpcdem.halo.comm import MpiComm
     from hpcdem.runtime.progress import Log
 
-    comm = MpiComm(MPI.COMM_WORLD)
+    comm = session.current().comm
     load_kernels(comm)
     from hpcdem.post.strain_stress import Options, run
 
     began, used = time.monotonic(), time.process_time()
-    run(comm, Log(1), Options(folder))
+    run(comm, Log(1), Options(Path(job["frames"])))
     seconds = time.monotonic() - began
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     ranks = comm.allgather((time.process_time() - used, peak))
-    if comm.rank == 0:
-        print(seconds, sum(r[0] for r in ranks), max(r[1] for r in ranks))
+    return {"wall_s": seconds, "processor_s": sum(r[0] for r in ranks), "peak_gib": max(r[1] for r in ranks)}
 
 
-def main() -> None:
-    """Make the frames, start the ranks, print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--particles", type=float, nargs="+", default=[1e4, 1e5])
-    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--frames", type=int, default=8)
-    parser.add_argument("--format", choices=("vtkhdf", "dat"), default="vtkhdf")
-    parser.add_argument("--mpiexec", default="mpiexec")
-    parser.add_argument("--worker", type=Path, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.worker:
-        return work(options.worker)
-    print("| particles | ranks | frames/s | processor s per frame | memory of a rank |\n|---|---|---|---|---|")
-    for particles in options.particles:
-        with tempfile.TemporaryDirectory() as folder:
-            n = make_frames(Path(folder), int(particles), options.frames, options.format)
-            for ranks in options.ranks:
-                command = [options.mpiexec, "-n", str(ranks), sys.executable, __file__, "--worker", folder]
-                done = subprocess.run(command, capture_output=True, text=True, check=True)
-                seconds, used, peak = map(float, done.stdout.split())
-                speed, each = options.frames / seconds, used / options.frames
-                print(f"| {n} | {ranks} | {speed:.3g} | {each:.3g} | {peak:.2f} GiB |", flush=True)
+def strain_stress(particles: list[int], ranks: list[int], frames: int, suffix: str, lines: Lines) -> None:
+    """Frames per second by the clock, processor seconds per frame over all ranks, largest memory of a rank. The frames
+    lie in a temporary folder (about 1.2 GB each for a million particles)."""
+    from rich.table import Table
 
+    from bench.tables import console
 
-if __name__ == "__main__":
-    main()
+    table = Table(title=f"hpcdem -s, frames as .{suffix}", title_justify="left")
+    for name in ("particles", "ranks", "frames/s", "processor s per frame", "memory of a rank"):
+        table.add_column(name)
+    for count in particles:
+        with tempfile.TemporaryDirectory(prefix="hpcdem-bench-") as folder:
+            n = make_frames(Path(folder), count, frames, suffix)
+            for r in ranks:
+                found = launch.ours("strain-stress", Layout(r, 1), frames=folder)
+                found.pop("output")
+                head = {"code": "hpcdem", "workload": "strain-stress", "particles": n, "ranks": r, "threads": 1}
+                row = lines.add(head | {"frames": frames, "format": suffix} | found)
+                speed, each = frames / row["wall_s"], row["processor_s"] / frames
+                table.add_row(str(n), str(r), f"{speed:.3g}", f"{each:.3g}", f"{row['peak_gib']:.2f} GiB")
+    console().print(table)

@@ -1,0 +1,214 @@
+"""What runs on our ranks: `mpiexec -n R python -m bench.worker job.json`. Rank 0 leaves result.json.
+
+The solver is driven through `hpcdem.Simulation`; only clocks and counters are taken from its inside.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import resource
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hpcdem
+from bench import bed as beds
+from bench import strain_stress
+from bench.scaling import measure as scaling
+from bench.workloads import MATERIAL, Bed
+from hpcdem import session
+
+
+def main() -> None:
+    """Carry out the job; every rank calls the task, rank 0 writes what it returns."""
+    job = json.loads(Path(sys.argv[1]).read_text())
+    shared = session.current(job["threads"])
+    # A program that ends writes its last state and draws it: not what is measured here.
+    shared.figure = shared.ends_with_frame = False
+    found = TASKS[job["task"]](job)
+    if shared.comm.rank == 0:
+        path = Path(job["folder"]) / "result.json"
+        path.with_suffix(".tmp").write_text(json.dumps(found))
+        path.with_suffix(".tmp").replace(path)
+
+
+def restored(job: dict[str, Any], file: str | None = None) -> hpcdem.Simulation:
+    """The bed of the job, ready to step."""
+    sim = hpcdem.Simulation(job["folder"])
+    sim.restore(file or job["file"])
+    return sim
+
+
+def no_first_frame(sim: hpcdem.Simulation) -> None:
+    """CYC begins with a frame; for a bed of a million it takes longer than the measurement."""
+    sim.engine.last_frame = (sim.steps, True)
+
+
+def run(job: dict[str, Any]) -> dict[str, Any]:
+    """Step a bed: `warm` steps, then `steps` steps by the clock."""
+    sim = restored(job)
+    if job["pushed"]:
+        sim.wall(beds.LEFT, xv=MATERIAL.speed)
+    window = measured(sim, job["warm"], job["steps"])
+    return window | {"contacts_per_particle": contacts(sim) / sim.count, "digest": digest(sim)} | versions()
+
+
+def measured(sim: hpcdem.Simulation, warm: int, steps: int) -> dict[str, Any]:
+    """One CYC, of which the last `steps` steps are measured; collective, the same on all ranks.
+
+    A CYC of its own for the measurement would begin with checks of the whole model. The clock is therefore read by a
+    function called in mid-run, after all ranks have met.
+    """
+    engine = sim.engine
+    marks: list[tuple[float, float, dict[str, int], int]] = []
+    first = sim.steps
+
+    def mark() -> None:
+        engine.comm.allgather(0)
+        stages = {name: watch.ns for name, watch in engine.timers.watches.items()}
+        marks.append((time.perf_counter(), time.process_time(), stages, engine.rebuilds))
+
+    def look(_: hpcdem.Simulation) -> None:
+        if not marks and sim.steps == first + max(warm, 1):
+            mark()
+
+    no_first_frame(sim)
+    caller = sim.every(first + max(warm, 1), look)  # called once: the next multiple lies behind the end of the run
+    # The last mark cannot be taken by `look`, as it would miss what is due at the last step.
+    sim.cycle(max(warm, 1) + steps)
+    mark()
+    caller.cancel()
+    (t0, c0, before, r0), (t1, c1, after, r1) = marks
+    own = {name: (ns - before.get(name, 0)) * 1e-9 for name, ns in after.items()}
+    ranks = engine.comm.allgather((t1 - t0, c1 - c0, own))
+    names = dict.fromkeys(name for *_, stages in ranks for name in stages)
+    stages = {}
+    for name in names:
+        seconds = [s.get(name, 0.0) for *_, s in ranks]
+        if max(seconds) > 0.0:
+            stages[name] = {"mean": sum(seconds) / len(seconds), "largest": max(seconds)}
+    wall = max(w for w, *_ in ranks)
+    n = sim.count
+    return {
+        "particles": n, "steps": steps, "wall_s": wall, "particle_steps_per_s": n * steps / wall, "stages": stages,
+        "rebuilds": r1 - r0, "cpu_use": sum(c for _, c, _ in ranks) / (wall * len(ranks) * engine.threads),
+    }  # fmt: skip
+
+
+def contacts(sim: hpcdem.Simulation) -> int:
+    """Touching pairs of the whole model."""
+    from hpcdem import output
+
+    return int(output.HISTORIES["contacts"][1](sim.engine))
+
+
+def digest(sim: hpcdem.Simulation) -> str:
+    """The same if the positions are, to the last bit, whatever the layout."""
+    return hashlib.sha256(b"".join(c.tobytes() for c in sim.gather("x", "y"))).hexdigest()[:16]
+
+
+def versions() -> dict[str, str]:
+    """What it was computed with."""
+    import numba
+    import numpy
+
+    from hpcdem.runtime import launch
+
+    cpu = platform.processor() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        cpu = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), cpu)
+    except OSError:
+        pass
+    try:
+        mpi = launch.mpi_library()
+    except ImportError:
+        mpi = "none"
+    return {
+        "hpcdem": launch.version(), "python": platform.python_version(), "numpy": numpy.__version__,
+        "numba": numba.__version__, "mpi": mpi, "cpu": cpu,
+    }  # fmt: skip
+
+
+def memory(job: dict[str, Any]) -> dict[str, Any]:
+    """Bring in a bed (or none), step it, and look at the memory of the ranks."""
+    shared = session.current()
+    sim = hpcdem.Simulation(job["folder"])
+    if job["file"]:
+        sim.restore(job["file"])
+        no_first_frame(sim)
+        sim.cycle(1)
+    elif job["copies"]:
+        beds.lay_copies(sim, Bed(job["unit"], job["copies"]), job["parent"])
+        no_first_frame(sim)
+        sim.cycle(1)
+    loaded = peak()
+    forget_peak()
+    began = time.perf_counter()
+    if job["steps"]:
+        no_first_frame(sim)
+        sim.cycle(job["steps"])
+    seconds = time.perf_counter() - began
+    if job["save"]:
+        sim.save(job["save"])
+    ranks = shared.comm.allgather((loaded, peak(), solver_arrays(sim)))
+    each = {name: list(values) for name, values in zip(("loading", "stepping", "arrays"), zip(*ranks), strict=True)}
+    return each | {"particles": sim.count, "seconds": seconds}
+
+
+def solver_arrays(sim: hpcdem.Simulation) -> int:
+    """Bytes of all numpy arrays that the engine holds, those inside its parts too; views are counted once."""
+    import numpy as np
+
+    seen: set[int] = set()
+
+    def weigh(thing: Any) -> int:
+        if id(thing) in seen:
+            return 0
+        seen.add(id(thing))
+        if isinstance(thing, np.ndarray):
+            return weigh(thing.base) if isinstance(thing.base, np.ndarray) else thing.nbytes
+        if isinstance(thing, dict):
+            return sum(weigh(v) for v in thing.values())
+        if isinstance(thing, list | tuple):
+            return sum(weigh(v) for v in thing)
+        if type(thing).__module__.startswith("hpcdem"):
+            slots = [getattr(thing, name, None) for kind in type(thing).__mro__ for name in _slots(kind)]
+            return sum(weigh(v) for v in [*getattr(thing, "__dict__", {}).values(), *slots] if v is not None)
+        return 0
+
+    return weigh(sim.engine)
+
+
+def _slots(kind: type) -> tuple[str, ...]:
+    slots = kind.__dict__.get("__slots__", ())
+    return (slots,) if isinstance(slots, str) else tuple(slots)
+
+
+def peak() -> int:
+    """Most memory of this process since `forget_peak` [B]."""
+    try:
+        lines = Path("/proc/self/status").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1024
+    except (OSError, StopIteration):
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def forget_peak() -> None:
+    """From here on `peak` counts anew, where the kernel allows it."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        pass
+
+
+TASKS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
+    "run": run, "bed": beds.make, "memory": memory, "strain-stress": strain_stress.work, "scaling": scaling.work,
+}  # fmt: skip
+
+if __name__ == "__main__":
+    main()
