@@ -112,7 +112,7 @@ def _take(order, ptr, rows, new_ptr, new_rows):
 
 
 def taken_out(lists: Any, ihot: np.ndarray) -> Histories:
-    """What the contacts of the owned particles remember. lists: neighbours.ContactLists of the particles ihot (n, 8)."""
+    """What the contacts of the owned particles remember. lists: neighbours.ContactLists; ihot (n, 8): their storage."""
     b, n_blocks, threaded = lists.blocks, lists.n_blocks, lists.n_blocks > 1
     totals, found = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64)
     alive, count = np.empty(len(lists.partner), np.int32), np.empty(lists.n_own, np.int64)
