@@ -304,9 +304,10 @@ class Simulation:
             self.origin = p.positions()
             self.walls.travel[:] = 0.0
             self._wall_table = self.walls.table()
+            bond_reach = min(lattice.side, lattice.bond_reach + lattice.skin) if self.bonds else 0.0
             self._lists = neighbours.build(
                 storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, lattice.side, self.largest_radius,
-                lattice.skin, min(lattice.side, lattice.bond_reach + lattice.skin), self.threads,
+                lattice.skin, bond_reach, self.threads,
             )  # fmt: skip
             self._count_bonds(hist)
             self._hist = None

@@ -291,7 +291,7 @@ def build(
 
     hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cell (n,) i8: keys of their cells of this side [m]; hist:
     of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
-    bond_reach [m]: bonded pairs are listed up to this distance.
+    bond_reach [m]: bonded pairs are listed up to this distance, 0 if there are none.
     """
     ihot = hot.view(np.int64)
     lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks))
@@ -300,7 +300,7 @@ def build(
     lists.ptr = np.zeros(int((span + 1).sum()), np.int64)
     need, placed, longest2 = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64), np.zeros(n_blocks)
     room = SLOTS_PER_ROW * span + 64
-    bond2 = bond_reach**2 if hist.bonded() > 0 else -1.0
+    bond2 = bond_reach**2 if bond_reach > 0.0 else -1.0
     fill = _fill_blocks if n_blocks == 1 else _fill_blocks_threaded
     while True:
         begin = np.concatenate(([0], np.cumsum(room)[:-1])).astype(np.int64)

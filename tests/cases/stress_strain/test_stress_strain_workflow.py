@@ -121,16 +121,18 @@ def test_job2_writes_the_same_bytes_on_four_ranks(manual: Chapter, tmp_path: Pat
 
 
 def test_strain_of_the_short_push_is_a_thrust_near_the_wall(manual: Chapter) -> None:
-    """One band through the whole bed, near the wall; its sign is that of a thrust of its dip. The foreland is only
-    compressed."""
+    """A band, or a conjugate pair, through the whole bed near the wall; the sign is that of a thrust of this dip. The
+    foreland is only compressed. (Which of the two dips wins is chance: a bed that differs by rounding may choose the
+    other.)"""
     first, last = section(manual.push / "datass", PICKED[0]), section(manual.push / "datass", PICKED[-1])
     assert np.nanmax(np.abs(first.fields["distortional"])) == 0.0  # strain is since this one
     strain = np.abs(last.fields["distortional"])
     assert np.nanmax(strain) > 0.5
-    (angle, clockwise, nodes), *others = bands(last, 0.3, 20)
-    assert not others
-    assert 25.0 < abs(angle) < 75.0 and clockwise == (angle > 0.0)
-    assert np.ptp(nodes[:, 1]) > 1500.0
+    found = bands(last, 0.25, 20)
+    assert [clockwise for _, clockwise, _ in found] in ([True], [False], [True, False], [False, True])
+    assert all(25.0 < abs(angle) < 75.0 and clockwise == (angle > 0.0) for angle, clockwise, _ in found)
+    nodes = np.concatenate([nodes for *_, nodes in found])
+    assert np.ptp(nodes[:, 1]) > 2000.0
     assert nodes[:, 0].max() < 5000.0
     assert np.nanmedian(strain[:, last.x > 7000.0]) < 0.1 * np.nanmax(strain)
 
