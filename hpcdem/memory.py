@@ -19,15 +19,6 @@ def aligned(shape: tuple[int, ...]) -> np.ndarray:
     return block[start : start + 8 * count].view(np.float64).reshape(shape)
 
 
-def aligned_rows(rows: np.ndarray) -> np.ndarray:
-    """The table itself if its rows lie well, else a copy whose rows do."""
-    if rows.ctypes.data % LINE == 0 and rows.flags.c_contiguous:
-        return rows
-    out = aligned(rows.shape)
-    out[:] = rows
-    return out
-
-
 def take_rows(rows: np.ndarray, order: np.ndarray, out: np.ndarray, threads: int = 1) -> np.ndarray:
     """out[k] = rows[order[k]] for tables (n, w) f8; returns out."""
     if threads == 1:

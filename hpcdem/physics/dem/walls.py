@@ -196,46 +196,6 @@ def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def near(hot, n_left, n_own, walls, skin, hptr, hpartner, slot_row, slot_wall):
-    """Owned particles within R + skin of a wall, or with a history there, sorted by row then wall.
-
-    hpartner: partner gids of the histories (walls are -1 - index). Returns the number of slots needed; slots past the
-    end of the arrays are counted only.
-    """
-    n = 0
-    room = len(slot_row)
-    for c in range(n_own):
-        i = n_left + c
-        x, y, r = hot[i, X], hot[i, Y], hot[i, RADIUS]
-        reach = r + skin
-        remembers = False
-        for q in range(hptr[c], hptr[c + 1]):
-            if hpartner[q] < 0:
-                remembers = True
-        for w in range(len(walls)):
-            wall = walls[w]
-            close = False
-            if (
-                x + reach >= min(wall[P1X], wall[P2X])
-                and x - reach <= max(wall[P1X], wall[P2X])
-                and y + reach >= min(wall[P1Y], wall[P2Y])
-                and y - reach <= max(wall[P1Y], wall[P2Y])
-            ):
-                _, _, qx, qy = closest(wall, x, y)
-                close = (x - qx) ** 2 + (y - qy) ** 2 <= reach * reach
-            if remembers and not close:
-                for q in range(hptr[c], hptr[c + 1]):
-                    if hpartner[q] == -1 - w:
-                        close = True
-            if close:
-                if n < room:
-                    slot_row[n] = i
-                    slot_wall[n] = w
-                n += 1
-    return n
-
-
 def wall_table(materials: np.ndarray, kn: np.ndarray, ks: np.ndarray, fric: np.ndarray) -> np.ndarray:
     """Wall laws: (n_walls * n_materials, 4) f8 [MODEL, A, B, MU].
 
