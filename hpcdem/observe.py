@@ -6,14 +6,15 @@ Sums that are written to files are exact (order-free), so that files do not depe
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.physics.dem import contacts, mass
+from hpcdem.physics.dem import contacts, mass, totals
 from hpcdem.physics.dem import walls as wall_kernels
-from hpcdem.physics.exact_sum import exact_sum
+from hpcdem.physics.exact_sum import BINS_SHAPE, rounded_sums
 from hpcdem.simulation import Simulation
 
 FN, FS, FORCE_X, FORCE_Y, AT_X, AT_Y, OVERLAP, STIFFNESS = range(8)
@@ -53,58 +54,87 @@ def wall_forces(sim: Simulation) -> np.ndarray:
 
 
 def _sum_by_wall(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> np.ndarray:
-    """The opposite of the forces in wall rows of all ranks, exactly summed per wall (n_walls, 2) [N]. Collective."""
-    total = np.zeros((len(sim.walls), 2))
-    parts = sim.comm.allgather((iout[:, 1].copy(), out[:, FORCE_X : FORCE_Y + 1].copy()))
-    wall = np.concatenate([w for w, _ in parts])
-    force = np.concatenate([f for _, f in parts])
-    for w in np.unique(wall):
-        mine = force[wall == w]
-        total[w] = -_fsum(mine[:, 0]), -_fsum(mine[:, 1])
+    """The opposite of the forces in wall rows of all ranks, exactly summed per wall (n_walls, 2) [N]; NaN where one is
+    not finite. Collective."""
+    n_walls = len(sim.walls)
+    contacts_of = sim.comm.sum_into(np.bincount(iout[:, 1], minlength=n_walls))
+    used = np.flatnonzero(contacts_of)
+    place = np.zeros(n_walls, np.int64)
+    place[used] = np.arange(len(used))
+    bins = np.zeros((2 * len(used), *BINS_SHAPE), np.int64)
+    fx, fy = (out[:, column].copy().view(np.int64) for column in (FORCE_X, FORCE_Y))
+    totals.by_wall(len(out), iout, fx, fy, place, bins)
+    total = np.zeros((n_walls, 2))
+    total[used] = -rounded_sums(bins, sim.comm).reshape(-1, 2)
     return total
-
-
-def _fsum(values: np.ndarray) -> float:
-    """Exact sum; NaN where a value is not finite (fsum would raise, and a broken state must still be written)."""
-    return math.fsum(values) if np.isfinite(values).all() else math.nan
 
 
 def kinetic_energy(sim: Simulation) -> float:
     """Sum of (m v^2 + I w^2) / 2 over all particles [J], exactly summed. Collective."""
-    p, body = sim.particles, sim.body
-    v2 = p["vx"] * p["vx"] + p["vy"] * p["vy"]
-    return exact_sum(0.5 * (body[:, 0] * v2 + body[:, 1] * p["spin"] * p["spin"]), sim.comm)
+    bins = np.zeros((1, *BINS_SHAPE), np.int64)
+    totals.kinetic(sim.particles.hot, sim.particles.n_left, sim.body, bins[0])
+    return float(rounded_sums(bins, sim.comm)[0])
+
+
+@dataclass(frozen=True)
+class Totals:
+    """The whole model in a few numbers.
+
+    kinetic [J]; unbalanced: largest unbalanced force of a free particle over the mean normal contact force, 0 without
+    contacts; contacts: pairs that touch or are bonded; critical_dt: 0.8 min sqrt(m / sum k) over the particles that are
+    free to move [s], inf without contacts, k being the tangent normal stiffness of each touching contact of the
+    particle (PFC's estimate).
+    """
+
+    kinetic: float
+    unbalanced: float
+    particles: int
+    contacts: int
+    critical_dt: float
+
+
+def survey(sim: Simulation) -> Totals:
+    """One look at all particles and contacts. Sums are exact. Collective."""
+    p, lists, comm, s = sim.particles, sim.lists, sim.comm, sim.settings
+    bins = np.zeros((2, *BINS_SHAPE), np.int64)
+    stiffness = np.zeros(len(p))
+    counts = np.array([len(p), 0], np.int64)
+    for t in range(lists.n_blocks):
+        counts[1] += totals.pairs(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            sim.bond_laws, len(sim.materials), mass.SPHERES[s.disk], p.n_left, bins[0], stiffness,
+        )  # fmt: skip
+    out, iout = wall_rows(sim)
+    totals.add_wall_stiffness(
+        len(out), iout, out[:, STIFFNESS].copy(), p.ihot, lists.slot_row, lists.slot_wall, p.n_left, stiffness
+    )
+    totals.kinetic(p.hot, p.n_left, sim.body, bins[1])
+    largest, shortest = totals.extremes(p.icold, sim.body, lists.owned_forces(), s.gx, s.gy, stiffness)
+    broken = math.isnan(largest)
+    largest, shortest, broken = comm.max_into(np.array([0.0 if broken else largest, -shortest, broken])).tolist()
+    comm.sum_into(counts)
+    normal, kinetic = rounded_sums(bins, comm).tolist()
+    particles, touching = counts.tolist()
+    ratio = 0.0
+    if normal > 0.0:
+        ratio = math.nan if broken else largest / (normal / max(touching, 1))
+    return Totals(kinetic, ratio, particles, touching, 0.8 * math.sqrt(-shortest))
 
 
 def critical_dt(sim: Simulation) -> float:
-    """0.8 min sqrt(m / sum k) over the particles that are free to move [s]; inf without contacts. Collective.
-
-    k: tangent normal stiffness of each touching contact of the particle (PFC's estimate).
-    """
-    p, lists = sim.particles, sim.lists
-    stiffness = np.zeros(len(p))
-    for t in range(lists.n_blocks):
-        contacts.stiffness(
-            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, sim.pair_laws, len(sim.materials), p.n_left,
-            stiffness,
-        )  # fmt: skip
-    wout, wiout = wall_rows(sim)
-    order = np.argsort(p["gid"])
-    np.add.at(stiffness, order[np.searchsorted(p["gid"], wiout[:, 0], sorter=order)], wout[:, STIFFNESS])
-    counts = (stiffness > 0.0) & ((p["fix"] & 3) != 3)
-    best = float(np.sqrt(sim.body[counts, 0] / stiffness[counts]).min()) if counts.any() else math.inf
-    return 0.8 * -float(sim.comm.max_into(np.array([-best]))[0])
+    """The largest time step that is thought stable [s], see `Totals`; inf without contacts. Collective."""
+    return survey(sim).critical_dt
 
 
 def frame(sim: Simulation) -> Frame:
     """Everything that is written at an output time. The model must be closed. Collective."""
     p, s, comm = sim.particles, sim.settings, sim.comm
     columns: dict[str, np.ndarray] = {
-        name: p[name].copy() for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "angle", "birth")
+        name: p[name] for name in ("gid", "x", "y", "radius", "vx", "vy", "spin", "angle", "birth")
     }
     force = sim.lists.owned_forces()
-    columns["fx"], columns["fy"], columns["torque"] = force[:, 0].copy(), force[:, 1].copy(), force[:, 2].copy()
-    columns["mass"], columns["inertia"] = sim.body[:, 0].copy(), sim.body[:, 1].copy()
+    columns["fx"], columns["fy"], columns["torque"] = force[:, 0], force[:, 1], force[:, 2]
+    columns["mass"], columns["inertia"] = sim.body[:, 0], sim.body[:, 1]
     rows = sim.materials.rows
     for name in ("density", "fric", "shear", "poiss", "kn", "ks", "damp"):
         columns[name] = rows[name][p["material"]]
@@ -117,12 +147,11 @@ def frame(sim: Simulation) -> Frame:
         "id1": iout[:, 0], "id2": iout[:, 1], "fn": out[:, FN], "fs": out[:, FS], "fx": out[:, FORCE_X],
         "fy": out[:, FORCE_Y], "x": out[:, AT_X], "y": out[:, AT_Y], "overlap": out[:, OVERLAP],
     }  # fmt: skip
-    touching, bonded = out[:, OVERLAP] >= 0.0, iout[:, 2] > 0
-    bonds = {name: values[bonded] for name, values in pair_columns.items()}
-    types = sim.bond_types.rows[iout[bonded, 2]]
-    bonds["kind"] = types["kind"].astype(np.int8)
+    touching, bonded = np.flatnonzero(out[:, OVERLAP] >= 0.0), np.flatnonzero(iout[:, 2] > 0)
+    types = sim.bond_types.rows[iout[:, 2]]
+    bond_columns = pair_columns | {"kind": types["kind"].astype(np.int8)}
     for name in ("ebmod", "gbmod", "tstrength", "sstrength"):
-        bonds[name] = types[name].copy()
+        bond_columns[name] = types[name]
 
     output_order = sim.walls.in_output_order()
     place = np.empty(len(output_order), np.int32)
@@ -134,8 +163,8 @@ def frame(sim: Simulation) -> Frame:
     }  # fmt: skip
     tables: dict[str, Table] = {
         "particles": to_slabs(comm, ("gid",), columns),
-        "contacts": to_slabs(comm, ("id1", "id2"), {k: v[touching] for k, v in pair_columns.items()}),
-        "bonds": to_slabs(comm, ("id1", "id2"), bonds),
+        "contacts": to_slabs(comm, ("id1", "id2"), pair_columns, touching),
+        "bonds": to_slabs(comm, ("id1", "id2"), bond_columns, bonded),
         "wall_contacts": to_slabs(comm, ("id1", "wall"), wall_contacts),
     }
     w = sim.walls

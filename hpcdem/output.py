@@ -2,11 +2,17 @@
 
 All functions are collective and need a closed model. The folder is made when the first file is written, so a script
 that fails before leaves nothing behind.
+
+While a CYC or IMPLE runs, frames are written behind its back (io/behind.py): the model is copied, all ranks make their
+part of the files, and a thread of rank 0 brings them to the disk while the ranks step on. One moment at most is under
+way: the next frame, a checkpoint, a function of a Python program and the end of the command wait for it. Errors of the
+disk stop all ranks at the next report or at one of these.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +20,7 @@ import numpy as np
 
 from hpcdem import observe, saving
 from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io.behind import Deliveries
 from hpcdem.io.columns import append_rows
 from hpcdem.io.dat import write_dat
 from hpcdem.io.files import make_folder, write_sections
@@ -22,29 +29,43 @@ from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
-from hpcdem.physics.exact_sum import exact_sum
 from hpcdem.runtime.progress import StepStatus
 from hpcdem.simulation import Simulation
 
 WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
 
 
-class Snapshot:
-    """The model at one moment, gathered once for all files that are due."""
+_under_way = Deliveries()
 
-    def __init__(self, sim: Simulation, initial: bool = False) -> None:
+
+class Snapshot:
+    """The model at one moment, gathered once for all files that are due.
+
+    waits: files have their names when a method returns; otherwise when `settle` does.
+    """
+
+    def __init__(self, sim: Simulation, initial: bool = False, waits: bool = True) -> None:
         self.sim, self.initial = sim, initial
+        self._later = None if waits else _under_way
         self._frame: Frame | None = None
 
     @property
     def frame(self) -> Frame:
-        """The frame, made when first asked for."""
+        """The frame, made when first asked for; what was under way is settled then."""
         if self._frame is None:
+            settle(self.sim)
             self._frame = observe.frame(self.sim)
         return self._frame
 
     def _path(self, suffix: str, stem: str = "all") -> str:
         return str(folder(self.sim) / frame_name(self.sim.clock.step, suffix, self.initial, stem))
+
+    def _write(self, write: Callable[..., None], suffix: str) -> None:
+        path, frame, comm = self._path(suffix), self.frame, self.sim.comm
+        if self._later is not None and comm.size == 1:
+            self._later.entrust(lambda: write(path, frame, comm))
+        else:
+            write(path, frame, comm, self._later)
 
     def write_print(self) -> None:
         """`all_<step>[_ini].vtkhdf` and `.dat`."""
@@ -52,19 +73,22 @@ class Snapshot:
         if self.sim.last_frame == key:
             return
         with self.sim.timers("output"):
-            write_vtkhdf(self._path(".vtkhdf"), self.frame, self.sim.comm)
-            write_dat(self._path(".dat"), self.frame, self.sim.comm)
+            self._write(write_vtkhdf, ".vtkhdf")
+            self._write(write_dat, ".dat")
+            _under_way.go()
         self.sim.last_frame = key
 
     def write_vtk(self) -> None:
         """`all_<step>.vtk` and `wall_<step>.vtk`."""
         with self.sim.timers("output"):
-            write_vtk(self._path(".vtk"), self.frame, self.sim.comm)
+            self._write(write_vtk, ".vtk")
+            _under_way.go()
 
     def write_ps(self) -> None:
         """`all_<step>.ps`."""
         with self.sim.timers("output"):
-            write_ps(self._path(".ps"), self.frame, self.sim.comm)
+            self._write(write_ps, ".ps")
+            _under_way.go()
 
     def write_drawing(self, what: tuple[str, ...]) -> None:
         """`draw_<step>.jpg`, by rank 0: the words of DRAW."""
@@ -81,6 +105,16 @@ class Snapshot:
             self.sim.comm.agree(error)
 
 
+def settle(sim: Simulation) -> None:
+    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    _under_way.settle(sim.comm)
+
+
+def wait_for_disk() -> None:
+    """Wait for the disk on this rank alone, whatever it says: the way out after an error. Not collective."""
+    _under_way.wait()
+
+
 def folder(sim: Simulation) -> Path:
     """The output folder, made on the first call."""
     path = Path(sim.outdir)
@@ -91,7 +125,9 @@ def folder(sim: Simulation) -> Path:
 
 
 def write_checkpoint(sim: Simulation, _: Snapshot | None = None) -> Path:
-    """`<step>.sav`; returns its path."""
+    """`<step>.sav`, once everything else is written; returns its path."""
+    with sim.timers("output"):
+        settle(sim)
     path = folder(sim) / f"{sim.clock.step:010d}.sav"
     saving.save(sim, path)
     return path
@@ -110,15 +146,7 @@ def write_last_words(sim: Simulation) -> None:
 def unbalanced(sim: Simulation) -> float:
     """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
     Collective."""
-    p, s = sim.particles, sim.settings
-    force = sim.lists.owned_forces()
-    free = p["fix"] & 3
-    fx = np.where(free & 1, 0.0, force[:, 0] + sim.body[:, 0] * s.gx)
-    fy = np.where(free & 2, 0.0, force[:, 1] + sim.body[:, 0] * s.gy)
-    largest = float(sim.comm.max_into(np.array([np.hypot(fx, fy).max() if len(p) else 0.0]))[0])
-    out, _ = observe.contact_rows(sim)
-    total = exact_sum(np.abs(out[:, observe.FN]), sim.comm)
-    return largest / (total / max(sim.count(len(out)), 1)) if total > 0.0 else 0.0
+    return observe.survey(sim).unbalanced
 
 
 HISTORIES = {
@@ -126,7 +154,7 @@ HISTORIES = {
     "step": ("1", lambda sim: float(sim.clock.step)),
     "time": ("s", lambda sim: sim.clock.time),
     "unbalanced": ("1", unbalanced),
-    "contacts": ("1", lambda sim: float(sim.count(len(observe.contact_rows(sim)[1])))),
+    "contacts": ("1", lambda sim: float(observe.survey(sim).contacts)),
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
 }
 """What HIST can follow: unit and function of the simulation."""
@@ -146,6 +174,7 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
 def report(sim: Simulation, _: Snapshot | None = None) -> None:
     """A row per wall in `walls.csv`, and the progress line where one is due."""
     with sim.timers("output"):
+        _under_way.look(sim.comm)
         force = observe.wall_forces(sim)
         w, clock = sim.walls, sim.clock
         rows = []
@@ -163,14 +192,13 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
 
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
     """What a progress line tells. Collective."""
-    clock = sim.clock
-    critical = observe.critical_dt(sim)
+    clock, seen = sim.clock, observe.survey(sim)
     tension, shear = sim.broken()
     return StepStatus(
-        step=clock.step, time=clock.time, dt=clock.dt, dt_critical=critical if math.isfinite(critical) else 0.0,
-        kinetic=observe.kinetic_energy(sim), unbalanced_ratio=unbalanced(sim), particles=sim.count(len(sim.particles)),
-        contacts=sim.count(len(observe.contact_rows(sim)[1])), bonds=sim.bonds_left(), broken_tension=tension,
-        broken_shear=shear, walls=walls,
+        step=clock.step, time=clock.time, dt=clock.dt,
+        dt_critical=seen.critical_dt if math.isfinite(seen.critical_dt) else 0.0,
+        kinetic=seen.kinetic, unbalanced_ratio=seen.unbalanced, particles=seen.particles, contacts=seen.contacts,
+        bonds=sim.bonds_left(), broken_tension=tension, broken_shear=shear, walls=walls,
     )  # fmt: skip
 
 

@@ -171,7 +171,7 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
         "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
     }  # fmt: skip
     _warn_about_the_time_step(sim)
-    output.Snapshot(sim, initial=True).write_print()
+    output.Snapshot(sim, initial=True, waits=False).write_print()
     _run(sim)
 
 
@@ -252,7 +252,7 @@ def _run(sim: Simulation) -> None:
             if _call_watchers(sim):
                 last = progress["last"] = clock.step
                 tasks = _tasks(sim)
-            moment = output.Snapshot(sim)
+            moment = output.Snapshot(sim, waits=False)
             for task in tasks:
                 if task.next_after(clock.step - 1) == clock.step:
                     task.run(moment)
@@ -263,11 +263,13 @@ def _run(sim: Simulation) -> None:
         output.write_last_words(sim)
         raise
     finally:
+        output.wait_for_disk()
         sim.progress = None
         if sim.log is not None:
             sim.log.command_finished()
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
+    output.settle(sim)
     _warn_about_late_lists(sim, progress)
 
 
@@ -284,6 +286,8 @@ def _call_watchers(sim: Simulation) -> bool:
     """
     step, enough = sim.clock.step, False
     due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
+    if due:
+        output.settle(sim)  # they may look at files
     for task in due:
         with sim.timers.around("callback"):
             enough |= bool(task.run())

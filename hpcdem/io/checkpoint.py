@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import atomic_path
 from hpcdem.io.frame import Table
-from hpcdem.io.h5 import Writer, reading
+from hpcdem.io.h5 import reading, writing_to
 
 FORMAT = "hpcdem checkpoint"
 VERSION = 2
@@ -39,30 +38,23 @@ def _crc(state: str, sums: str) -> int:
 def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str, Table], comm: Any) -> None:
     """Collective. Writes to a temporary name, reads it back, then renames. HpcdemError on all ranks if anything
     fails."""
-    with atomic_path(path, comm) as temporary:
-        sums = {}
-        writer = Writer(os.fspath(path), temporary, comm)
+
+    def read_back(temporary: str) -> None:
         try:
-            for table_name, table in tables.items():
-                writer.group(table_name)
-                for name, values in table.columns.items():
-                    full = f"{table_name}/{name}"
-                    part = np.array([word_sum(values)], dtype=np.uint64)
-                    sums[full] = int(sum(comm.allgather(int(part[0]))) % (1 << 64))
-                    writer.slabs(full, values, table.offset, table.total)
-            texts = {"state": json.dumps(state), "sums": json.dumps(sums)}
-            writer.group("/", {"format": FORMAT, "version": VERSION, **texts, "crc": _crc(**texts)})
-        except BaseException:
-            writer.abandon()
-            raise
-        writer.close()
-        error = None
-        if comm.rank == 0:
-            try:
-                read(temporary)
-            except HpcdemError as failure:
-                error = f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}"
-        comm.agree(error)
+            read(temporary)
+        except HpcdemError as failure:
+            raise HpcdemError(f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}") from None
+
+    columns = {f"{name}/{c}": values for name, table in tables.items() for c, values in table.columns.items()}
+    parts = np.array([word_sum(values) for values in columns.values()], dtype=np.uint64)
+    sums = dict(zip(columns, comm.sum_into(parts).tolist()))  # integers without sign go round, as they should
+    with writing_to(path, comm, read_back) as writer:
+        for table_name, table in tables.items():
+            writer.group(table_name)
+            for name, values in table.columns.items():
+                writer.slabs(f"{table_name}/{name}", values, table.offset, table.total)
+        texts = {"state": json.dumps(state), "sums": json.dumps(sums)}
+        writer.group("/", {"format": FORMAT, "version": VERSION, **texts, "crc": _crc(**texts)})
 
 
 def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]]]:

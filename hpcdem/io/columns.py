@@ -6,7 +6,7 @@ import os
 import re
 from typing import Any
 
-from hpcdem.io.files import explain
+from hpcdem.io.disk import explain
 
 
 def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: int | None, comm: Any) -> None:

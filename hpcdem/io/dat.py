@@ -25,9 +25,12 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import Section, explain, write_sections
+from hpcdem.io.behind import Deliveries
+from hpcdem.io.disk import explain
+from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.textnum import INT, WORD, Column, TextTable, format_floats, sci
+from hpcdem.io.transport import Section
 
 WALL_HEAD = "     index         id      P1[0]"
 WALL_FORCE_HEAD = "     index         id         xF"
@@ -41,12 +44,12 @@ _TABLES = ("particles", "contacts", "bonds", "wall_contacts")
 # --- writing ---------------------------------------------------------------------------------------------------
 
 
-def write_dat(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+def write_dat(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path`, the same bytes for any number of ranks.
 
     Columns a table does not have are written as nan (numbers) or 0 (flags, colours). Raises HpcdemError on all ranks.
     """
-    write_sections(path, comm, lambda: _sections(frame, comm))
+    write_sections(path, comm, lambda: _sections(frame, comm), later)
 
 
 def _sections(frame: Frame, comm: Any) -> list[Section]:

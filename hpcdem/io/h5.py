@@ -6,7 +6,9 @@ through rank 0, one rank after the other, in bounded pieces. Layout and content 
 
 from __future__ import annotations
 
+import math
 import os
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -18,7 +20,11 @@ import h5py
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import arrays_to_root, atomic_path, explain
+from hpcdem.io.behind import Deliveries
+from hpcdem.io.disk import explain
+from hpcdem.io.files import atomic_path
+from hpcdem.io.rootfile import Description, RootFile, root_file
+from hpcdem.io.transport import Places, rows_in_blocks, to_root, used
 
 _FAILURES = (OSError, RuntimeError, ValueError)
 
@@ -29,47 +35,40 @@ def has_mpi(comm: Any) -> bool:
     return comm.mpi is not None and comm.size > 1 and not comm.crowded and bool(h5py.get_config().mpi)
 
 
-class _Patient:
-    """A binary file that keeps its first error to itself and pretends all is well.
+class _Sketch:
+    """A binary file for HDF5 that remembers what is written, by place, and touches no disk.
 
-    HDF5 cannot be trusted with a full disk: it keeps the data it could not write, tries again when objects are freed,
-    and ends the process. So it is told nothing, and what was written is thrown away afterwards.
+    HDF5 writes only the description of its datasets here; their rows take the short way into the file. It would not be
+    trusted with the disk anyway: when that is full it keeps what it could not write, tries again when objects are
+    freed, and ends the process.
     """
 
-    def __init__(self, path: str) -> None:
-        self.error: OSError | None = None
-        self._at = self._size = 0
-        self._file = open(path, "w+b", buffering=0)
-
-    def _do(self, action: Callable[[], Any]) -> Any:
-        if self.error is None:
-            try:
-                return action()
-            except OSError as failure:
-                self.error = failure
-        return None
+    def __init__(self) -> None:
+        self.pieces: list[tuple[int, bytes]] = []
+        self.size = self._at = 0
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.size}[whence]
         return self._at
 
     def tell(self) -> int:
         return self._at
 
     def write(self, data: Any) -> int:
-        left, at, size = memoryview(data).cast("B"), self._at, len(data)
-        while left and self.error is None:
-            left = left[self._do(lambda: os.pwrite(self._file.fileno(), left, at)) or 0 :]  # noqa: B023
-            at = self._at + size - len(left)
-        self._at += size
-        self._size = max(self._size, self._at)
-        return size
+        self.pieces.append((self._at, bytes(data)))
+        self._at += len(data)
+        self.size = max(self.size, self._at)
+        return len(data)
 
     def readinto(self, buffer: Any) -> int:
         view = memoryview(buffer).cast("B")
+        first, last = self._at, self._at + len(view)
         view[:] = bytes(len(view))
-        self._do(lambda: os.preadv(self._file.fileno(), [view], self._at))
-        self._at += len(view)
+        for at, data in self.pieces:
+            a, b = max(first, at), min(last, at + len(data))
+            if a < b:
+                view[a - first : b - first] = data[a - at : b - at]
+        self._at = last
         return len(view)
 
     def read(self, size: int) -> bytes:
@@ -78,77 +77,93 @@ class _Patient:
         return bytes(data)
 
     def truncate(self, size: int | None = None) -> int:
-        self._size = self._at if size is None else size
-        self._do(lambda: os.ftruncate(self._file.fileno(), self._size))
-        return self._size
+        self.size = self._at if size is None else size
+        return self.size
 
     def flush(self) -> None:
         """Nothing is held back."""
 
-    def claim(self) -> None:
-        """Get disk space for the whole file, holes included."""
-        if self._size:
-            self._do(lambda: os.posix_fallocate(self._file.fileno(), 0, self._size))
+    def extents(self) -> list[tuple[int, bytearray]]:
+        """What was written, the last word on each byte, as pieces (place, bytes) that do not touch."""
+        ends: list[list[int]] = []
+        for first, last in sorted((at, at + len(data)) for at, data in self.pieces):
+            if ends and first <= ends[-1][1]:
+                ends[-1][1] = max(ends[-1][1], last)
+            else:
+                ends.append([first, last])
+        starts = [first for first, _ in ends]
+        made = [(first, bytearray(last - first)) for first, last in ends]
+        for at, data in self.pieces:
+            first, target = made[bisect_right(starts, at) - 1]
+            target[at - first : at - first + len(data)] = data
+        return made
 
-    def close(self) -> None:
-        self._do(self._file.close)
+
+class _Description:
+    """Groups, attributes and empty datasets of a file. Datasets are made by hand, as h5py takes ten times longer."""
+
+    def __init__(self) -> None:
+        self._sketch = _Sketch()
+        self._starts: dict[str, int] = {}
+        self._kinds: dict[np.dtype, Any] = {}
+        self._file = h5py.File(self._sketch, "w")
+        self._groups: dict[str, Any] = {"": self._file}
+        self._how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        self._how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        self._how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        self._how.set_obj_track_times(False)
+
+    def group(self, name: str, attributes: Mapping[str, Any]) -> None:
+        if name not in self._groups:
+            self._groups[name] = self._file.create_group(name)
+        for word, value in attributes.items():
+            self._groups[name].attrs[word] = value
+
+    def dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype) -> None:
+        parent, _, last = name.rpartition("/")
+        if dtype not in self._kinds:
+            self._kinds[dtype] = h5py.h5t.py_create(dtype, logical=1)
+        space = h5py.h5s.create_simple(shape)
+        made = h5py.h5d.create(self._groups[parent].id, last.encode(), self._kinds[dtype], space, self._how)
+        self._starts[name] = made.get_offset() or 0
+
+    def finish(self) -> Description:
+        """Where the rows of each dataset belong, the description as pieces of the file, and the file's size."""
+        self._file.close()
+        return self._starts, self._sketch.extents(), self._sketch.size
 
 
 class Writer:
     """An HDF5 file being written by all ranks of `comm`. Every method is collective and takes the same names, types
-    and totals on all ranks. Errors are kept back until `close`, so that no rank waits for another.
+    and totals on all ranks. Errors are kept back, in `file` or until `close`, so that no rank waits for another.
 
-    Rank 0 makes groups, attributes and the empty datasets alone; `close` fills them, so `rows` handed in must not
-    change until then. With MPI in h5py rank 0 first claims the disk space, and all ranks open the file and write
-    together: a full disk or quota is noticed before many ranks are inside HDF5, where a failed write ends in a
-    crash or a hang.
+    Rank 0 describes groups, attributes and datasets alone; `close` writes that and the rows, so `rows` handed in must
+    not change until then, nor later if the file is one that is written behind the back of the run. With MPI in h5py
+    rank 0 first claims the disk space, and all ranks open the file and write together: a full disk or quota is noticed
+    before many ranks are inside HDF5, where a failed write ends in a crash or a hang.
+
+    file: rank 0's, None on other ranks; with MPI in h5py it must be one that is written at once.
     """
 
-    def __init__(self, path: str, temporary: str, comm: Any) -> None:
-        self._path, self._temporary, self.comm = path, temporary, comm
-        self._parallel = has_mpi(comm)
+    def __init__(self, path: str | os.PathLike, temporary: str, comm: Any, file: RootFile | None) -> None:
+        self.comm, self._file = comm, file
+        self._path, self._temporary = os.fspath(path), temporary
+        self._steps: list[Callable[[_Description], None]] = []
         self._waiting: list[tuple[str, np.ndarray, int]] = []
-        self._error: str | None = None
-        self._file: Any = None
-        self._below: _Patient | None = None
-        if comm.rank == 0:
-            self._try(self._open)
-
-    def _open(self) -> None:
-        self._below = _Patient(self._temporary)
-        self._file = h5py.File(self._below, "w")
-
-    def _try(self, action: Callable[[], Any]) -> None:
-        if self._error is None and (self._below is None or self._below.error is None):
-            try:
-                action()
-            except _FAILURES as failure:
-                self._error = explain(self._path, failure)
 
     def group(self, name: str, attributes: Mapping[str, Any] | None = None) -> None:
         """Make a group and give it attributes."""
-
-        def make() -> None:
-            made = self._file.require_group(name)
-            for key, value in (attributes or {}).items():
-                made.attrs[key] = value
-
-        if self.comm.rank == 0:
-            self._try(make)
+        self._steps.append(lambda made: made.group(name.strip("/"), attributes or {}))
 
     def _dataset(self, name: str, shape: tuple[int, ...], dtype: np.dtype) -> None:
-        how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-        how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
-        how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
-        self._file.create_dataset(name, shape=shape, dtype=dtype, dcpl=how)
+        self._steps.append(lambda made: made.dataset(name, shape, dtype))
 
     def whole(self, name: str, values: Any) -> None:
         """A small dataset that is the same on all ranks; rank 0 writes it."""
-        values = np.asarray(values)
-        if self.comm.rank == 0:
-            self._try(lambda: self._dataset(name, values.shape, values.dtype))
-            if values.size:
-                self._try(lambda: self._file[name].__setitem__(..., values))
+        values = np.array(values, order="C", ndmin=1)
+        self._dataset(name, values.shape, values.dtype)
+        if self._file is not None and values.size:
+            self._file.write(0, values, part=name)
 
     def slabs(self, name: str, rows: np.ndarray, offset: int, total: int) -> None:
         """A dataset of `total` rows, of which this rank holds ``rows`` from `offset` on."""
@@ -157,41 +172,54 @@ class Writer:
     def parts(self, name: str, parts: list[tuple[np.ndarray, int]], total: int) -> None:
         """A dataset put together of several distributed arrays: this rank's rows of each, and where they start."""
         first = parts[0][0]
-        if self.comm.rank == 0:
-            self._try(lambda: self._dataset(name, (total, *first.shape[1:]), first.dtype))
-        self._waiting += [(name, rows, offset) for rows, offset in parts]
+        self._dataset(name, (total, *first.shape[1:]), first.dtype)
+        self._waiting += [(name, np.ascontiguousarray(rows), offset) for rows, offset in parts]
 
     def close(self) -> None:
-        """Write what is still to be written and close the file. Raises HpcdemError where that failed."""
-        if not self._parallel:
+        """Write it all. Raises HpcdemError where the file is known to have failed."""
+        file, together = self._file, has_mpi(self.comm)
+        if file is not None:
+            file.describe(self._describe)
+        if not together:
             self._write_through_root()
-        self.abandon(claim=self._parallel)
-        if self._parallel and not self.comm.any(self._error is not None):
-            self._write_together()
-        if self._error is not None:
-            raise HpcdemError(self._error)
+        elif file is not None:
+            file.claim()
+        if file is not None:
+            file.close()
+        error = file.error if file is not None else None
+        if together and not self.comm.any(error is not None):
+            error = self._write_together()
+        if error is not None:
+            raise HpcdemError(error)
 
-    def abandon(self, claim: bool = False) -> None:
-        """Close rank 0's file as it is; not collective. claim: first get disk space for all of it."""
+    def _describe(self) -> Description:
+        made = _Description()
+        for step in self._steps:
+            step(made)
+        return made.finish()
+
+    def abandon(self) -> None:
+        """Let go of what is half made; not collective."""
         if self._file is not None:
-            try:
-                self._file.close()
-            except _FAILURES as failure:
-                self._error = self._error or explain(self._path, failure)
-            self._file = None
-        if self._below is not None:
-            if claim:
-                self._below.claim()
-            self._below.close()
-            if self._below.error is not None:
-                self._error = explain(self._path, self._below.error)
-            self._below = None
+            self._file.abandon()
 
     def _write_through_root(self) -> None:
-        for k, at, piece in arrays_to_root(self.comm, [(rows, offset) for _, rows, offset in self._waiting]):
-            self._try(lambda: _write_rows(self._file[self._waiting[k][0]], piece, at))  # noqa: B023
+        """Each rank's rows, one array after the other; rank 0 knows where they belong."""
+        table = self.comm.gather([(offset, len(rows)) for _, rows, offset in self._waiting])
+        if self._file is not None:
+            for name, rows, offset in self._waiting:
+                if len(rows):
+                    self._file.write(offset * _row_size(rows), rows, part=name)
+        places = [] if table is None else [Places(self._runs(of_rank)) for of_rank in table]
+        for rank, piece in to_root(self.comm, rows_in_blocks([rows for _, rows, _ in self._waiting])):
+            assert self._file is not None
+            places[rank].write(self._file, piece, lambda piece=piece: used(piece))  # type: ignore[misc]
 
-    def _write_together(self) -> None:
+    def _runs(self, slabs: list[tuple[int, int]]) -> Iterator[tuple[str, int, int]]:
+        for (name, rows, _), (offset, n) in zip(self._waiting, slabs):
+            yield name, offset * _row_size(rows), n * _row_size(rows)
+
+    def _write_together(self) -> str | None:
         how = h5py.h5p.create(h5py.h5p.DATASET_XFER)
         how.set_dxpl_mpio(h5py.h5fd.MPIO_COLLECTIVE)
         try:
@@ -200,7 +228,13 @@ class Writer:
                     if file[name].size:
                         _write_rows(file[name], rows, offset, how)
         except _FAILURES as failure:
-            self._error = explain(self._path, failure)
+            return explain(self._path, failure)
+        return None
+
+
+def _row_size(rows: np.ndarray) -> int:
+    """Bytes per row."""
+    return rows.itemsize * math.prod(rows.shape[1:])
 
 
 def _write_rows(made: Any, rows: np.ndarray, offset: int, how: Any = None) -> None:
@@ -220,16 +254,42 @@ def _write_rows(made: Any, rows: np.ndarray, offset: int, how: Any = None) -> No
 
 
 @contextmanager
-def writing(path: str | os.PathLike, comm: Any) -> Iterator[Writer]:
-    """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks."""
+def writing(path: str | os.PathLike, comm: Any, later: Deliveries | None = None) -> Iterator[Writer]:
+    """Collective: a Writer whose file appears whole under `path`, or not at all. Raises HpcdemError on all ranks; with
+    `later` the file may be on its way afterwards, and whoever settles the deliveries hears of the disk."""
+    if has_mpi(comm):
+        with writing_to(path, comm) as writer:
+            yield writer
+        return
+    error = None
+    with root_file(path, comm, later) as file:
+        writer = Writer(path, "", comm, file)
+        try:
+            yield writer
+        except BaseException:
+            writer.abandon()
+            raise
+        try:
+            writer.close()
+        except HpcdemError as failure:
+            error = str(failure)
+        comm.agree(error)
+
+
+@contextmanager
+def writing_to(path: str | os.PathLike, comm: Any, check: Callable[[str], None] | None = None) -> Iterator[Writer]:
+    """The same, at once. check: called on rank 0 with the finished file's temporary name; its HpcdemError keeps the
+    file from getting its name."""
     with atomic_path(path, comm) as temporary:
-        writer = Writer(os.fspath(path), temporary, comm)
+        writer = Writer(path, temporary, comm, RootFile(path, temporary=temporary) if comm.rank == 0 else None)
         try:
             yield writer
         except BaseException:
             writer.abandon()
             raise
         writer.close()
+        if check is not None and comm.rank == 0:
+            check(temporary)
 
 
 @contextmanager

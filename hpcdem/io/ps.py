@@ -15,9 +15,11 @@ import numpy as np
 
 from hpcdem.io import colours
 from hpcdem.io.axes import View, particle_extent, view
-from hpcdem.io.files import Section, write_sections
+from hpcdem.io.behind import Deliveries
+from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame
 from hpcdem.io.textnum import FIXED, INT, WORD, Column, TextTable
+from hpcdem.io.transport import Section
 
 _POINTS_PER_CM = 72.0 / 2.54
 PAGE_WIDTH = 17.0 * _POINTS_PER_CM
@@ -42,9 +44,9 @@ gsave {left:.3f} {bottom:.3f} {width:.3f} {height:.3f} rectclip
 """
 
 
-def write_ps(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+def write_ps(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: the picture of the frame, the same bytes for any number of ranks. Raises HpcdemError on all ranks."""
-    write_sections(path, comm, lambda: _sections(frame, comm))
+    write_sections(path, comm, lambda: _sections(frame, comm), later)
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ rank holding one contiguous slab. No rank ever holds more than its own rows and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from hpcdem.io.frame import Table
 
@@ -17,70 +18,125 @@ _BINS_PER_RANK = 64
 _SMALL_GID = 1 << 31
 
 
-def to_slabs(comm: Any, key_columns: Sequence[str], columns: dict[str, np.ndarray]) -> Table:
+def to_slabs(
+    comm: Any, key_columns: Sequence[str], columns: dict[str, np.ndarray], chosen: np.ndarray | None = None
+) -> Table:
     """Collective: this rank's slab of the table whose rows are all ranks' rows in ascending order of the keys.
 
     key_columns: one or two int64 columns, e.g. ("gid",) or ("id1", "id2"); every key must occur once among all
     ranks. columns: name -> 1-d array, same names and dtypes on all ranks, any order of rows, any number of them.
-    Slabs are of nearly equal size (cut where the first key changes), and put one after the other they are the same
-    for any number of ranks. Raises HpcdemError on all ranks if a key occurs twice.
+    chosen: take only these rows (indices). Slabs are of nearly equal size (cut where the first key changes), and put
+    one after the other they are the same for any number of ranks; they are copies. Raises HpcdemError on all ranks if a
+    key occurs twice.
     """
-    rows = _packed(columns)
-    keys = np.asarray(columns[key_columns[0]], dtype=np.int64)
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    n = len(next(iter(arrays.values())))
+    for name, values in arrays.items():
+        if values.shape != (n,):
+            raise ValueError(f"column {name} has the shape {values.shape}, not ({n},)")
     if comm.size > 1:
-        rows = _redistributed(comm, keys, rows)
-    table = {name: np.ascontiguousarray(rows[name]) for name in columns}
-    order = np.lexsort([table[k] for k in reversed(key_columns)])
-    if not _is_identity(order):
-        table = {name: values[order] for name, values in table.items()}
+        arrays, chosen = _redistributed(comm, key_columns[0], arrays, chosen), None
+    keys = [arrays[k].astype(np.int64) if chosen is None else arrays[k][chosen] for k in key_columns]
+    order = order_of(keys)
+    keys = [k[order] for k in keys]
+    if chosen is not None:
+        order = chosen[order]
+    table = {name: _taken(values, order) for name, values in arrays.items()}
 
-    same = np.ones(max(0, len(rows) - 1), dtype=bool)
-    for k in key_columns:
-        same &= table[k][1:] == table[k][:-1]
+    same = np.ones(max(0, len(order) - 1), dtype=bool)
+    for key in keys:
+        same &= key[1:] == key[:-1]
     error = None
     if same.any():
         at = int(np.flatnonzero(same)[0])
         error = f"the key {', '.join(f'{k} = {table[k][at]}' for k in key_columns)} occurs twice in a table"
     comm.agree(error)
-    n = len(rows)
+    n = len(order)
     total = np.array([n], dtype=np.int64)
     return Table(table, offset=comm.exscan(n), total=int(comm.sum_into(total)[0]))
 
 
-def _is_identity(order: np.ndarray) -> bool:
-    return bool((order == np.arange(len(order))).all())
+def _taken(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """values[rows]; a column of a wide table is made compact first, if that is worth it: jumps are then shorter."""
+    return (np.ascontiguousarray(values) if 2 * len(rows) > len(values) else values)[rows]
 
 
-def _packed(columns: dict[str, np.ndarray]) -> np.ndarray:
-    """The columns as one array of records, so that one exchange carries whole rows."""
-    arrays = {name: np.asarray(values) for name, values in columns.items()}
-    n = len(next(iter(arrays.values())))
-    rows = np.empty(n, dtype=[(name, values.dtype) for name, values in arrays.items()])
-    for name, values in arrays.items():
-        if values.shape != (n,):
-            raise ValueError(f"column {name} has the shape {values.shape}, not ({n},)")
-        rows[name] = values
-    return rows
+_DIGIT = 11  # bits: their counters fit the first-level cache
 
 
-def _redistributed(comm: Any, keys: np.ndarray, rows: np.ndarray) -> np.ndarray:
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sort_by_digit(keys, low, shift, order, out):
+    """One pass of a radix sort: `order` by one digit of keys - low, rows of equal digits as they were, into `out`."""
+    mask = np.uint64((1 << _DIGIT) - 1)
+    places = np.zeros((1 << _DIGIT) + 1, np.int64)
+    for key in keys:
+        places[(np.uint64(key - low) >> np.uint64(shift) & mask) + np.uint64(1)] += 1
+    for d in range(1 << _DIGIT):
+        places[d + 1] += places[d]
+    for row in order:
+        d = np.uint64(keys[row] - low) >> np.uint64(shift) & mask
+        out[places[d]] = row
+        places[d] += 1
+
+
+def order_of(keys: Sequence[np.ndarray]) -> np.ndarray:
+    """The rows (n,) i8 in ascending order of int64 keys, the first one leading; equal ones keep their order."""
+    n = len(keys[0])
+    order, other = np.arange(n), np.empty(n, np.int64)
+    for key in reversed(keys):
+        if n:
+            key = np.ascontiguousarray(key, dtype=np.int64)
+            low, high = int(key.min()), int(key.max())
+            for shift in range(0, (high - low).bit_length(), _DIGIT):
+                _sort_by_digit(key, low, shift, order, other)
+                order, other = other, order
+    return order
+
+
+def _redistributed(
+    comm: Any, key: str, arrays: dict[str, np.ndarray], chosen: np.ndarray | None
+) -> dict[str, np.ndarray]:
     """The rows of all ranks whose key lies in this rank's key range."""
+    keys = np.asarray(arrays[key] if chosen is None else arrays[key][chosen], dtype=np.int64)
     target = _targets(comm, keys)
-    order = np.argsort(target, kind="stable")
+    order = order_of([target])
     cuts = np.searchsorted(target[order], np.arange(1, comm.size))
-    # As plain bytes: MPI need not know what a record is.
-    flat = rows[order].view(np.uint8).reshape(len(rows), rows.dtype.itemsize)
-    received = np.concatenate(comm.alltoallv(np.split(flat, cuts)))
-    return np.ascontiguousarray(received).reshape(-1).view(rows.dtype)
+    if chosen is not None:
+        order = chosen[order]
+    widest_first = sorted(arrays, key=lambda name: -arrays[name].itemsize)  # each column then begins where it may
+    width = sum(values.itemsize for values in arrays.values())
+    parcels = []
+    for rows in np.split(order, cuts):
+        parcel = np.empty((len(rows), width), dtype=np.uint8)
+        for name, room in _columns_of(parcel, widest_first, arrays):
+            room[:] = _taken(arrays[name], rows)
+        parcels.append(parcel)
+    received: dict[str, list[np.ndarray]] = {name: [] for name in arrays}
+    for parcel in comm.alltoallv(parcels):
+        for name, values in _columns_of(np.array(parcel), widest_first, arrays):
+            received[name].append(values)
+    return {name: np.concatenate(parts) for name, parts in received.items()}
+
+
+def _columns_of(
+    parcel: np.ndarray, names: Sequence[str], like: dict[str, np.ndarray]
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Views of the columns that lie one after the other in a parcel (rows, bytes per row): one exchange of plain bytes
+    then carries whole rows."""
+    flat, at = parcel.reshape(-1), 0
+    for name in names:
+        size = len(parcel) * like[name].itemsize
+        yield name, flat[at : at + size].view(like[name].dtype)
+        at += size
 
 
 def _targets(comm: Any, keys: np.ndarray) -> np.ndarray:
     """The rank that gets each key: ranges of keys, chosen from a histogram over all ranks so that they hold about
     equally many rows."""
     info = np.iinfo(np.int64)
-    low = np.array([keys.min() if len(keys) else info.max], dtype=np.int64)
-    high = np.array([keys.max() if len(keys) else info.min], dtype=np.int64)
-    a, b = int(comm.min_into(low)[0]), int(comm.max_into(high)[0])
+    ends = np.array([~keys.min(), keys.max()] if len(keys) else [info.min, info.min], dtype=np.int64)
+    comm.max_into(ends)  # ~k = -k - 1: the least key, without an overflow
+    a, b = ~int(ends[0]), int(ends[1])
     if a > b:
         return np.zeros(0, dtype=np.int64)
     bins = min(_BINS_PER_RANK * comm.size, b - a + 1)
@@ -115,7 +171,7 @@ def find_rows(comm: Any, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray
     if len(ranks) == 0:
         return np.full(len(asked), -1, dtype=np.int64)
     target = ranks[np.maximum(np.searchsorted(starts[ranks], asked, side="right") - 1, 0)]
-    order = np.argsort(target, kind="stable")
+    order = order_of([target])
     cuts = np.searchsorted(target[order], np.arange(1, comm.size))
     questions = comm.alltoallv(np.split(asked[order], cuts))
     answers = comm.alltoallv([_local_rows(mine, q, offset) for q in questions])
@@ -133,7 +189,13 @@ def _combined(keys: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _local_rows(mine: np.ndarray, asked: np.ndarray, offset: int) -> np.ndarray:
-    if len(mine) == 0:
+    n = len(mine)
+    if n == 0:
         return np.full(len(asked), -1, dtype=np.int64)
+    first, span = int(mine[0]), int(mine[-1]) - int(mine[0]) + 1
+    if span <= 4 * n + 1024:  # as good as all numbers from the first on: a table of them is quicker than a search
+        rows = np.full(span + 2, -1, dtype=np.int64)
+        rows[mine - (first - 1)] = np.arange(offset, offset + n)
+        return rows[np.clip(asked, first - 1, first + span) - (first - 1)]
     at = np.minimum(np.searchsorted(mine, asked), len(mine) - 1)
     return np.where(mine[at] == asked, at + offset, -1)

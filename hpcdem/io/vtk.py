@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.io.files import Section, write_sections
+from hpcdem.io.behind import Deliveries
+from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame
 from hpcdem.io.textnum import INT, Column, TextTable, sci
+from hpcdem.io.transport import Section
 
 _WHOLE = 21  # characters that hold any int64 and a blank
 
 
-def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: the particles in `path`, usually ``all_<step>.vtk``, and the walls in ``wall_<step>.vtk`` beside it.
 
     Particles are points and vertices with scalars radius, id, color, group (number) and vectors velocity. The same
@@ -38,12 +40,12 @@ def write_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
             result += [_scalars(name, kind), TextTable([(Column(name, INT, _WHOLE), columns[column])])]
         return [*result, b"VECTORS velocity double\n", _vectors(columns["vx"], columns["vy"])]
 
-    write_sections(path, comm, sections)
+    write_sections(path, comm, sections, later)
     name = Path(path).name
-    write_wall_vtk(Path(path).with_name("wall_" + name.removeprefix("all_")), frame, comm)
+    write_wall_vtk(Path(path).with_name("wall_" + name.removeprefix("all_")), frame, comm, later)
 
 
-def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: the walls as lines, with cell scalars id, color and vectors velocity, force.
 
     Raises HpcdemError on all ranks.
@@ -68,7 +70,7 @@ def write_wall_vtk(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
             result += [f"VECTORS {name} double\n".encode(), _vectors(values[:, 0], values[:, 1])]
         return result
 
-    write_sections(path, comm, sections)
+    write_sections(path, comm, sections, later)
 
 
 def _head(what: str, frame: Frame, points: int) -> bytes:

@@ -18,6 +18,7 @@ import numpy as np
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io import h5
+from hpcdem.io.behind import Deliveries
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import find_rows
 
@@ -29,12 +30,12 @@ _LINK_NAMES = {"x": "contact_x", "y": "contact_y"}
 _FILL_INT = {"id1": -1, "id2": -1}
 
 
-def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
+def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path` (usually ``*.vtkhdf``).
 
     Needs the tables particles (with gid, x, y), contacts and bonds (with id1, id2) as slabs in order, wall_contacts
     in any order of slabs; all further columns are written as they are. The content does not depend on the number
-    of ranks. Raises HpcdemError on all ranks.
+    of ranks. Raises HpcdemError on all ranks; `later`: see `h5.writing`.
     """
     particles, contacts, bonds = (frame.tables[t] for t in ("particles", "contacts", "bonds"))
     gid = particles.columns["gid"]
@@ -49,7 +50,7 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any) -> None:
     bonded = find_rows(comm, [bonds.columns[k] for k in pairs], [contacts.columns[k] for k in pairs]) >= 0
 
     n, n_contacts, n_bonds = particles.total, contacts.total, bonds.total
-    with h5.writing(path, comm) as out:
+    with h5.writing(path, comm, later) as out:
         out.group("VTKHDF", {"Version": np.array([2, 0], dtype=np.int64), "Type": np.bytes_("PolyData")})
         out.whole("VTKHDF/NumberOfPoints", np.array([n], dtype=np.int64))
         out.slabs("VTKHDF/Points", _vector(particles.columns["x"], particles.columns["y"]), particles.offset, n)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.exact_sum import exact_sum, partial_bins, rounded
+from hpcdem.physics.exact_sum import exact_sum, partial_bins, rounded, rounded_sums
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 quick = settings(max_examples=150, deadline=None, derandomize=True)
@@ -91,3 +91,10 @@ def test_many_values():
     values = random.normal(size=1_000_000) * 10.0 ** random.uniform(-12, 12, 1_000_000)
     assert total(values) == math.fsum(values)
     assert total(values.reshape(1000, 1000).T) == math.fsum(values), "any shape"
+
+
+def test_several_sums_at_once():
+    """Each is what it would be alone, whatever exponents the others need; one that is not finite spoils no other."""
+    parts = [[1e300, 1.0, -1e300], [], [5e-324, -1.0], [math.nan], [0.1] * 10]
+    sums = rounded_sums(np.array([partial_bins(np.array(p, dtype=float)) for p in parts]), SerialComm())
+    assert sums.tolist()[:3] == [1.0, 0.0, -1.0] and math.isnan(sums[3]) and sums[4] == 1.0

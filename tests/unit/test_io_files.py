@@ -99,6 +99,7 @@ if sys.argv[2] == "mpi":
     comm = MpiComm(MPI.COMM_WORLD)
 frame = make_frame(2000, comm)
 hpcdem.io.dat.write_dat("warm.dat", frame, comm)
+hpcdem.io.vtkhdf.write_vtkhdf("warm.vtkhdf", frame, comm)
 resource.setrlimit(resource.RLIMIT_FSIZE, (30000, resource.RLIM_INFINITY))
 for name, write in (
     ("all_1.vtkhdf", hpcdem.io.vtkhdf.write_vtkhdf),

@@ -11,7 +11,7 @@ import pytest
 
 from hpcdem.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
-from hpcdem.io.slabs import find_rows, to_slabs
+from hpcdem.io.slabs import find_rows, order_of, to_slabs
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,6 +34,29 @@ def test_rows_are_sorted_by_two_keys() -> None:
     columns = {"id1": np.array([2, 1, 2, 1]), "id2": np.array([3, 9, 2, 4]), "fn": np.array([23.0, 19.0, 22.0, 14.0])}
     table = to_slabs(SerialComm(), ("id1", "id2"), columns)
     np.testing.assert_array_equal(table.columns["fn"], [14.0, 19.0, 22.0, 23.0])
+
+
+def test_chosen_rows_are_sorted() -> None:
+    columns = {"gid": np.array([5, -2, 9, 3, 2**62]), "x": np.array([0.5, -0.2, 0.9, 0.3, 0.0])}
+    table = to_slabs(SerialComm(), ("gid",), columns, np.array([4, 2, 3]))
+    assert (table.offset, table.total) == (0, 3)
+    np.testing.assert_array_equal(table.columns["gid"], [3, 9, 2**62])
+    np.testing.assert_array_equal(table.columns["x"], [0.3, 0.9, 0.0])
+
+
+def test_tables_are_copies() -> None:
+    columns = {"gid": np.arange(3), "x": np.arange(3.0)}
+    table = to_slabs(SerialComm(), ("gid",), columns)
+    columns["x"][:] = 7.0
+    np.testing.assert_array_equal(table.columns["x"], [0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize("spread", [1, 1000, 2**40, 2**63 - 1])
+def test_order_is_that_of_lexsort(spread: int) -> None:
+    rng = np.random.default_rng(5)
+    keys = [rng.integers(-spread, spread, 3000, endpoint=True) for _ in range(2)]
+    np.testing.assert_array_equal(order_of(keys), np.lexsort(keys[::-1]))
+    np.testing.assert_array_equal(order_of(keys[:1]), np.argsort(keys[0], kind="stable"))
 
 
 def test_no_rows() -> None:

@@ -81,7 +81,7 @@ def test_fixed_decimals_are_right_to_half_a_unit(value: float, decimals: int) ->
     text = format_table([(Column("x", FIXED, 20, decimals), np.array([value]))]).decode()
     assert len(text) == 21
     assert len(text.strip().partition(".")[2]) == decimals
-    assert abs(float(text) - value) <= 0.5 * 10.0**-decimals * (1 + 1e-9)
+    assert abs(float(text) - value) <= 0.5 * 10.0**-decimals * (1 + 1e-9) + np.spacing(abs(value))
 
 
 def test_fixed_decimals_beyond_their_range_stay_numbers() -> None:

@@ -213,6 +213,6 @@ def test_the_key_knows_every_module_with_kernels_and_its_callers():
         "observe.py",
         "commands/bonds.py",
         "commands/particles.py",
-        "io/dat.py",
+        "io/textnum.py",
     } <= found
     assert not {"api.py", "commands/walls.py"} & found

@@ -1,0 +1,135 @@
+"""Files that are written while the run goes on.
+
+A writer that is handed a `Deliveries` gives rank 0's part of the work to a thread: bytes that are ready to be written,
+the flush to the disk and the new name. All that needs other ranks is done by then, so the thread never touches MPI, and
+of Python it needs little: its time goes by inside the operating system, with the interpreter free for the step loop.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from hpcdem.errors import HpcdemError
+
+ROOM = 256 << 20
+"""Most bytes that wait to be written; who has more waits."""
+
+
+class Delivered(Protocol):
+    """A file: what went wrong with it, if anything."""
+
+    error: str | None
+
+
+class _Job:
+    error: str | None = None
+
+
+class Deliveries:
+    """Files under way: a line of tasks on rank 0, done one after the other, from `go` on.
+
+    Which files are under way is known on all ranks (`expect`); errors reach all ranks by `look` and `settle`.
+    """
+
+    def __init__(self, room: int = ROOM) -> None:
+        self._room, self._waiting = room, 0
+        self._held: list[tuple[Callable[[], None], int]] = []
+        self._tasks: deque[tuple[Callable[[], None], int]] = deque()
+        self._change = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._files: list[Delivered] = []
+        self._expected = False
+        self._failure: BaseException | None = None
+
+    # -- the line --------------------------------------------------------------------------------------------
+
+    def put(self, task: Callable[[], None], size: int = 0) -> None:
+        """A task that holds `size` bytes until it is done; waits while more than the room would be held."""
+        with self._change:
+            while self._waiting and self._waiting + size > self._room:
+                self._go()
+                self._change.wait()
+            self._held.append((task, size))
+            self._waiting += size
+
+    def go(self) -> None:
+        """Begin with the tasks put so far. Held back until now, so that two threads do not fight for the interpreter
+        while there is more to hand over."""
+        with self._change:
+            self._go()
+
+    def _go(self) -> None:
+        if self._held:
+            self._tasks.extend(self._held)
+            self._held.clear()
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._work, name="deliveries", daemon=True)
+                self._thread.start()
+            self._change.notify_all()
+
+    def wait(self) -> None:
+        """Until all tasks are done. Not collective."""
+        with self._change:
+            self._go()
+            while self._tasks:
+                self._change.wait()
+
+    def _work(self) -> None:
+        while True:
+            with self._change:
+                while not self._tasks:
+                    self._change.wait()
+                task, size = self._tasks[0]
+            try:
+                task()
+            except BaseException as failure:  # a mistake of ours: tasks keep errors of the disk to themselves
+                self._failure = failure
+            del task  # and the data with it
+            with self._change:
+                self._tasks.popleft()
+                self._waiting -= size
+                self._change.notify_all()
+
+    def entrust(self, write: Callable[[], None]) -> None:
+        """All work on a file that needs no other rank: `write` is called behind the back of the run."""
+        job = _Job()
+
+        def work() -> None:
+            try:
+                write()
+            except HpcdemError as failure:
+                job.error = str(failure)
+
+        self.put(work)
+        self.expect(job)
+
+    # -- files, as all ranks see them ------------------------------------------------------------------------
+
+    def expect(self, file: Delivered | None) -> None:
+        """A file is under way; None on the ranks that do not write it. Collective."""
+        self._expected = True
+        if file is not None:
+            self._files.append(file)
+
+    def look(self, comm: Any) -> None:
+        """Raise HpcdemError on all ranks if a file is known to have failed. Collective, waits for no disk."""
+        if self._expected:
+            comm.agree(self._first_error())
+
+    def settle(self, comm: Any) -> None:
+        """Wait until all files have their names. Raises HpcdemError on all ranks if one has failed. Collective."""
+        if not self._expected:
+            return
+        self.wait()
+        error, failure = self._first_error(), self._failure
+        self._files.clear()
+        self._expected, self._failure = False, None
+        if failure is not None:
+            raise failure
+        comm.agree(error)
+
+    def _first_error(self) -> str | None:
+        return next((file.error for file in self._files if file.error is not None), None)

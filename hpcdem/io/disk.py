@@ -1,0 +1,66 @@
+"""What is asked of the disk, and what is said when it refuses."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from contextlib import suppress
+
+_CAUSES = {
+    errno.ENOSPC: "no space left on the disk",
+    errno.EDQUOT: "the disk quota is used up",
+    errno.EROFS: "the file system is read-only",
+    errno.EACCES: "permission denied",
+    errno.EPERM: "permission denied",
+    errno.ENOENT: "the folder does not exist",
+    errno.ENOTDIR: "a part of the path is not a folder",
+    errno.EISDIR: "a folder has this name",
+    errno.EFBIG: "the file would be larger than is allowed here",
+    errno.EIO: "the disk reports an input/output error",
+}
+
+
+def explain(path: str | os.PathLike, error: BaseException, doing: str = "write") -> str:
+    """One sentence: what could not be done to which file, and why. Reads the errno inside HDF5's long messages too."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number is None and (found := re.search(r"errno = (\d+)", str(error))):
+        number = int(found[1])
+    if number in _CAUSES:
+        cause = _CAUSES[number]
+    elif number is not None and 0 < number < 200:
+        cause = os.strerror(number)
+    else:
+        cause = str(error).strip() or type(error).__name__
+    return f"cannot {doing} {os.fspath(path)}: {cause}"
+
+
+def publish(temporary: str, path: str) -> None:
+    """Give a finished file its name, once it is safe on the disk."""
+    _to_disk(temporary)
+    os.replace(temporary, path)
+    _folder_to_disk(path)
+
+
+def _to_disk(path: str) -> None:
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _folder_to_disk(path: str) -> None:
+    """Make the new name itself durable; not every file system can, and the file is good without."""
+    with suppress(OSError):
+        handle = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def remove(path: str) -> None:
+    """Delete a file, if it is there."""
+    with suppress(OSError):
+        os.remove(path)
