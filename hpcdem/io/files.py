@@ -25,7 +25,10 @@ _T = TypeVar("_T")
 class Alone:
     """The little that is asked of a communicator here, for one process that writes a file of its own."""
 
-    rank, size = 0, 1
+    rank, size, mpi = 0, 1, None
+
+    def gather(self, value: _T) -> list[_T]:
+        return [value]
 
     def agree(self, error: str | None) -> None:
         if error is not None:

@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from hpcdem.io import h5
-from hpcdem.io.files import write_sections
+from hpcdem.io.files import Alone, write_sections
 from hpcdem.io.textnum import INT, Column, TextTable, sci
 from hpcdem.post.section import Section
 
@@ -16,18 +16,6 @@ _TEXT = {
     "pxx": "pxx[Pa]", "pxy": "pxy[Pa]", "pyy": "pyy[Pa]",
     "fxx": "Fxx", "fxy": "Fxy", "fyx": "Fyx", "fyy": "Fyy", "volumetric": "ev[%]", "distortional": "ed",
 }  # fmt: skip
-
-
-class _Alone:
-    """A rank that writes a file of its own."""
-
-    rank, size, mpi = 0, 1, None
-
-    def agree(self, error: str | None) -> None:
-        if error is not None:
-            from hpcdem.errors import HpcdemError
-
-            raise HpcdemError(error)
 
 
 def write_out(path: str | os.PathLike, section: Section, since: str) -> None:
@@ -43,14 +31,14 @@ def write_out(path: str | os.PathLike, section: Section, since: str) -> None:
         f"# frame {section.name} step {section.step} time {section.time:.12g} s grid {section.size:.12g} m, "
         f"strain since {since}\n#{words[1:]}\n"
     )
-    write_sections(path, _Alone(), lambda: [head.encode(), TextTable(columns)])
+    write_sections(path, Alone(), lambda: [head.encode(), TextTable(columns)])
 
 
 def write_grid(path: str | os.PathLike, section: Section) -> None:
     """The fields as VTKHDF ImageData 2.0 (https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html): one
     point per node, z = 0."""
     nx, ny = len(section.x), len(section.y)
-    with h5.writing(path, _Alone()) as out:
+    with h5.writing(path, Alone()) as out:
         out.group(
             "VTKHDF",
             {
