@@ -154,6 +154,10 @@ def test_lammps_input(case):
     assert "move v_way NULL NULL" in text and f"{MATERIAL.speed:g}*step*dt" in text
     case.pushed = False
     assert "xplane 0.0" in lammps.input_text(case, options, 10, 100, 2)
+    case.bed = Bed(case.bed.unit, case.bed.copies, "linear")
+    text = lammps.input_text(case, options, 10, 100, 2)
+    assert f"pair_style gran/hooke/history {0.5 * MATERIAL.kn:.8g} {0.5 * MATERIAL.ks:.8g}" in text
+    assert text.count("hooke/history") == 3 and "hertz" not in text, "pairs, floor and sides"
     data = lammps.data_text(case).splitlines()
     assert "4 atoms" in data and data[-4] == "1 1 100.0 2500.0 50.0 49.0 0.0"
 

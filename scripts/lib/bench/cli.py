@@ -53,7 +53,7 @@ ABOUT = f"""Measure hpcdem: granular beds of 12 500 to a million particles on on
 Workloads:
 {WORKLOADS_TEXT}
 
-Without a command: hpcdem on all of these, or with --peers on the first four beside other codes, in turn.
+Without a command: hpcdem on all of these, or with --peers on the first five beside other codes, in turn.
 """
 
 

@@ -74,7 +74,7 @@ def beside(
             case = Case.load(workload.bed, npz, workload.pushed, cores)
             here = [layout for layout in layouts if layout.cores == cores]
             for name in names:
-                if name in absent:
+                if name in absent or workload.bed.law not in PEERS[name].laws:
                     continue
                 try:
                     _in_turn(workload, sav, case, here, name, repeats, seconds, lines)

@@ -69,6 +69,12 @@ class Material:
         root = math.sqrt(reff * 0.06 * self.radius)
         return 2.0 * self.damping_ratio * math.sqrt(1.5 * self.kn_hertz / (root * meff))
 
+    @property
+    def gamma_linear(self) -> float:
+        """gamma_n [1/s] of LAMMPS' linear damping meff gamma_n vn with this damping ratio, for two mean particles."""
+        meff = 2.0 / 3.0 * math.pi * self.radius**3 * self.density
+        return 2.0 * self.damping_ratio * math.sqrt(0.5 * self.kn / meff)
+
 
 MATERIAL = Material()
 
@@ -144,8 +150,8 @@ def workloads(unit: int = 12500) -> dict[str, Workload]:
     return {w.name: w for w in rows}
 
 
-PEER_WORKLOADS = ("bed-12k", "push-12k", "bed-100k", "push-100k")
-"""Those that the other codes compute as well."""
+PEER_WORKLOADS = ("bed-12k", "push-12k", "bed-100k", "push-100k", "linear-100k")
+"""Those that other codes compute as well, each those of the laws it has here."""
 
 
 def cache_folder() -> Path:

