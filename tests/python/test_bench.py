@@ -189,6 +189,12 @@ def test_tuning_keeps_the_fastest(case, monkeypatch):
     class Fake(Peer):
         name, rate = "fake", 1e6
 
+        def missing(self) -> str:
+            return ""
+
+        def version(self, options: Options) -> str:
+            return "Fake 1"
+
         def choices(self, case: Case) -> list[list[Options]]:
             return [[{"kind": kind, "skin": 1} for kind in "abc"], [{"skin": 1}, {"skin": 2}]]
 

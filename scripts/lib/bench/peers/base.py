@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -52,7 +53,7 @@ class Found:
         return self.particles * self.steps / self.seconds
 
 
-class Peer:
+class Peer(ABC):
     """One other code. Subclasses say where it is, what can be tuned, and how one run is made."""
 
     name: ClassVar[str]
@@ -65,13 +66,13 @@ class Peer:
     same_steps: ClassVar[bool] = True
     """Whether it does the same steps as hpcdem; the slow ones do fewer, as many as `rate` allows."""
 
+    @abstractmethod
     def missing(self) -> str:
         """Empty if it can be run, else what is missing."""
-        raise NotImplementedError
 
+    @abstractmethod
     def version(self, options: Options) -> str:
         """Name and version of what is run with these options."""
-        raise NotImplementedError
 
     def choices(self, case: Case) -> list[list[Options]]:
         """Rounds of tuning: in each, the fastest of these changes to the options so far is kept."""
@@ -81,9 +82,9 @@ class Peer:
         """The options in a few words."""
         return ", ".join(f"{name} {value}" for name, value in options.items())
 
+    @abstractmethod
     def once(self, case: Case, options: Options, warm: int, steps: int, folder: Path) -> Found:
         """One run in an empty folder."""
-        raise NotImplementedError
 
     def run(self, case: Case, options: Options, steps: int) -> Found:
         """One run of so many steps after a warm-up."""
