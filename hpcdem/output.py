@@ -11,28 +11,34 @@ disk stop all ranks at the next report or at one of these.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from hpcdem import observe, saving
+from hpcdem import budget, guards, observe, saving
 from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io.agreed import on_first
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.columns import append_rows
 from hpcdem.io.dat import write_dat
-from hpcdem.io.files import make_folder, write_sections
+from hpcdem.io.disk import to_disk
+from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame, whole
 from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.progress import StepStatus
 from hpcdem.simulation import Simulation
 
 WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
+ENERGY_COLUMNS = ",".join(["step", "time", *budget.NAMES])
 
 
 _under_way = Deliveries()
@@ -116,20 +122,27 @@ def wait_for_disk() -> None:
 
 
 def folder(sim: Simulation) -> Path:
-    """The output folder, made on the first call."""
+    """The output folder, made and locked on the first call."""
     path = Path(sim.outdir)
     if not sim.folder_made:
-        make_folder(path, sim.comm)
+        locked = run_folder.enter(path, sim.comm, sim.job or run_folder.Job(), launch.version(), sim.resumed)
         sim.folder_made = True
+        if not locked and sim.log is not None:
+            sim.log.warn_once(
+                "lock", f"the file system of {path} has no locks: nobody will notice if two runs write there at once"
+            )
     return path
 
 
-def write_checkpoint(sim: Simulation, _: Snapshot | None = None) -> Path:
-    """`<step>.sav`, once everything else is written; returns its path."""
+def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool = False) -> Path:
+    """`<step>.sav`, once everything else is written; returns its path. automatic: `auto_<step>.sav`, of which the last
+    two are kept. Checkpoints that are too many are removed when the new one is safe."""
     with sim.timers("output"):
         settle(sim)
-    path = folder(sim) / f"{sim.clock.step:010d}.sav"
+        path = folder(sim) / run_folder.checkpoint_name(sim.clock.step, automatic)
+        on_first(sim.comm, lambda: _to_disk([path.with_name(name) for name in sorted(sim.series_open)]))
     saving.save(sim, path)
+    run_folder.retire(path.parent, sim.comm, sim.clock.step, sim.keep)
     return path
 
 
@@ -156,6 +169,7 @@ HISTORIES = {
     "unbalanced": ("1", unbalanced),
     "contacts": ("1", lambda sim: float(observe.survey(sim).contacts)),
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
+    "energy": ("J", budget.stored_energy),
 }
 """What HIST can follow: unit and function of the simulation."""
 
@@ -190,10 +204,79 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
             sim.log.step(status(sim, walls))
 
 
+DEEP = 0.5
+"""Overlap over the smaller radius from which contacts are named."""
+
+
+def warn_of_overlaps(sim: Simulation) -> None:
+    """Name the worst contacts with an overlap beyond half the smaller radius, once per command. Collective."""
+    key = f"overlaps since step {sim.progress['first'] if sim.progress is not None else sim.clock.step}"
+    if sim.comm.bcast(sim.log.has_warned(key)):
+        return
+    worst, number = observe.overlaps_beyond(sim, DEEP, guards.NAMED)
+    lines = []
+    for o in worst:
+        who = f"particle {o.id1} and wall {o.id2}" if o.wall else f"particles {o.id1} and {o.id2}"
+        made_of = " | ".join(sim.materials.describe(m) for m in dict.fromkeys(o.materials))
+        lines.append(f"  {who} at ({o.x:g}, {o.y:g}): overlap {o.u:g} m, {o.ratio:.2f} of the radius; {made_of}")
+    sim.log.warn_once(
+        key,
+        f"step {sim.clock.step}: {number} contacts overlap by more than half the smaller radius; the stiffness is too "
+        "small for the load, or particles were made inside each other\n" + "\n".join(lines),
+    )
+
+
+def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
+    """A row of `energy.csv`: the budget now."""
+    with sim.timers("output"):
+        seen = sim.energy.look(sim)
+        numbers = (repr(v) for v in (sim.clock.time, *dataclasses.astuple(seen)))
+        _append(sim, "energy.csv", ENERGY_COLUMNS, [",".join([str(sim.clock.step), *numbers])])
+
+
+def tell_energy(sim: Simulation) -> None:
+    """The budget as a table in the log, at the end of a run; nothing without SET energy. Collective."""
+    if sim.energy is None or sim.energy.start is None:
+        return
+    seen = sim.energy.look(sim)
+    if sim.log is None:
+        return
+    rows = [(words, f"{getattr(seen, name):.6g}") for name, words in ENERGY_WORDS.items()]
+    sim.log.table("energy budget", ("energy", "J"), rows)
+    sim.log.info(
+        f"energy: closing error {seen.closing:.4g} J, {seen.relative:.2g} of the largest flow "
+        "(docs/physics.md says which terms close to rounding and which with the time step)"
+    )
+
+
+ENERGY_WORDS = {
+    "kinetic_translation": "stored: motion",
+    "kinetic_rotation": "stored: rotation",
+    "elastic_normal": "stored: contacts, normal",
+    "elastic_shear": "stored: contacts, shear",
+    "elastic_bonds": "stored: open bonds",
+    "work_gravity": "work of gravity",
+    "work_walls": "work of moving walls",
+    "work_driven": "work on fixed particles",
+    "loss_friction": "lost by friction",
+    "loss_local_damping": "lost by local damping",
+    "loss_lattice_damping": "lost by lattice-solid damping",
+    "loss_bonds": "lost when bonds broke",
+    "loss_opened": "lost when contacts opened",
+    "loss_stiffness": "lost by change of shear stiffness",
+    "commands": "brought by commands",
+    "box": "brought by leaving the BOX",
+    "closing": "closing error",
+}
+"""What the table at the end calls the columns of energy.csv."""
+
+
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
     """What a progress line tells. Collective."""
     clock, seen = sim.clock, observe.survey(sim)
     tension, shear = sim.broken()
+    if seen.deepest > DEEP and sim.log is not None:
+        warn_of_overlaps(sim)
     return StepStatus(
         step=clock.step, time=clock.time, dt=clock.dt,
         dt_critical=seen.critical_dt if math.isfinite(seen.critical_dt) else 0.0,
@@ -209,6 +292,13 @@ def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
     since = None if name in sim.series_open else sim.restart_step
     append_rows(path, header, rows, since, sim.comm)
     sim.series_open.add(name)
+
+
+def _to_disk(series: list[Path]) -> None:
+    """A restart takes rows up to its step for granted, so they must be as safe as the checkpoint."""
+    for path in series:
+        with suppress(FileNotFoundError):
+            to_disk(str(path))
 
 
 def finish(sim: Simulation) -> None:

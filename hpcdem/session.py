@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hpcdem.errors import UsageError
-from hpcdem.runtime import ending, launch, speed
+from hpcdem.errors import StoppedWithCheckpoint, UsageError
+from hpcdem.runtime import doctor, ending, launch, run_folder, speed
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
+    from hpcdem.runtime.reproducing import Reproduction
     from hpcdem.runtime.stopping import StopRequests
     from hpcdem.simulation import Simulation
 
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 class Session:
     """comm: all ranks; threads: per rank; outdir: where results go if the script does not say; directory: that of the
     script, where its relative file names begin; figure: draw the last state of each simulation; draws: DRAW makes
-    pictures; text: of the script; ends_with_frame: write the last state of each simulation, too, if no command has.
+    pictures; text: of the script; job: the same in a few words, for run.json; keep: numbered checkpoints that are kept,
+    0: all; ends_with_frame: write the last state of each simulation, too, if no command has; reproduction: of
+    --check-reproducible.
     """
 
     comm: SerialComm
@@ -40,7 +43,10 @@ class Session:
     balance: bool = True
     draws: bool = False
     text: str = ""
+    job: run_folder.Job = field(default_factory=run_folder.Job)
+    keep: int = 0
     ends_with_frame: bool = False
+    reproduction: Reproduction | None = None
     kernels_ready: bool = False
     unfinished: list[Simulation] = field(default_factory=list)
 
@@ -51,12 +57,15 @@ class Session:
 
             prepare_kernels(self.comm, self.log, lambda: rehearse(self.threads))
             self.kernels_ready = True
-            self.stop.install()
+            self.stop.install(self.comm.rank)
         from hpcdem.simulation import Simulation  # brings the kernels with it
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
-        sim.script, sim.draws = self.text, self.draws
+        sim.script, sim.draws, sim.job, sim.keep = self.text, self.draws, self.job, self.keep
+        run_folder.claim(Path(outdir), self.comm, self.job)
+        if self.reproduction is not None:
+            watch_states(sim, self.reproduction)
         self.unfinished.append(sim)
         return sim
 
@@ -69,6 +78,8 @@ class Session:
 
             sim.close()
             output.Snapshot(sim).write_print()
+        if sim.timers.steps:
+            report_end(sim)
         if sim.log is not None and sim.timers.steps:
             summary = sim.log.stages(sim.timers, self.comm)
             if self.comm.rank == 0:
@@ -76,17 +87,27 @@ class Session:
                 speed.remember_run(summary.particle_steps, summary.wall, self.comm.size * self.threads, law)
         if self.figure and sim.log is not None:
             draw_last_state(sim, sim.log)
+        self._note(sim, "done")
         sim.release()
 
-    def close(self, failed: bool = False) -> None:
-        """The end of the program: simulations that were not finished are."""
+    def close(self, failure: BaseException | None = None) -> None:
+        """The end of the program: simulations that were not finished are, unless it is the end by a failure."""
         for sim in list(self.unfinished):
-            if failed:
-                sim.release()
-            else:
+            if failure is None:
                 self.finish(sim)
+            else:
+                self._note(sim, "stopped" if isinstance(failure, StoppedWithCheckpoint) else "failed")
+                sim.release()
         self.unfinished.clear()
         self.stop.uninstall()
+        if self.reproduction is not None and failure is None:
+            self.reproduction.close()
+        run_folder.release_all()
+
+    def _note(self, sim: Simulation, state: str) -> None:
+        """Write into run.json how it ended."""
+        if sim.folder_made:
+            run_folder.leave(Path(sim.outdir), self.comm, state, sim.clock.step)
 
 
 def rehearse(*threads: int) -> None:
@@ -97,6 +118,28 @@ def rehearse(*threads: int) -> None:
     for n in threads:
         rehearsal.rehearse(n)
     textnum.warm_up()
+
+
+def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
+    """Let the log tell of the states of this simulation. It only looks."""
+    from hpcdem import observe
+    from hpcdem.simulation import Watcher
+
+    model = reproduction.new_model()
+
+    def look() -> None:
+        reproduction.see(model, sim.clock.step, observe.fingerprint(sim))
+
+    sim.watchers.append(Watcher(reproduction.every, look))
+
+
+def report_end(sim: Simulation) -> None:
+    """Collective: what became of the energy, and of particles that got lost."""
+    from hpcdem import output
+
+    output.tell_energy(sim)
+    if sim.log is not None and sim.lost:
+        sim.log.info(f"{sim.lost} particles left the BOX and were deleted in all; the lines above name them")
 
 
 def draw_last_state(sim: Simulation, log: Log) -> None:
@@ -123,11 +166,15 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
         log.info(f"figure: {plots.plot_frame(frame, path)}")
 
 
-def greet(comm: SerialComm, log: Log, cores_before: int, threads: int, warnings: list[str]) -> None:
-    """Collective: the first line of the log, and what is wrong with the launch."""
+def greet(
+    comm: SerialComm, log: Log, cores_before: int, threads: int, warnings: list[str], outdir: Path | None = None
+) -> None:
+    """Collective: the first line of the log, and what is wrong with the launch and with where results will go."""
     places = comm.allgather(launch.place(cores_before, threads))
-    log.info(launch.start_report(places, launch.mpi_library() if comm.mpi is not None else None))
-    for warning in warnings + launch.start_warnings(places):
+    library = launch.mpi_library() if comm.mpi is not None else None
+    log.info(launch.start_report(places, library))
+    scene = doctor.Scene(places, comm.rank, launch.launcher(), library, directory=outdir or Path())
+    for warning in warnings + doctor.start_warnings(scene, comm):
         log.warn(warning)
 
 
@@ -162,14 +209,15 @@ def _open(threads: int | None) -> Session:
         count, warnings = launch.prepare_environment(threads or launch.threads_by_default())
         comm = launch.start_mpi()
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.stopping import StopRequests, slurm_end_time
+    from hpcdem.runtime.stopping import AUTOSAVE, StopRequests, slurm_end_time
 
     log = Log(comm.rank)
     greet(comm, log, cores_before, count, warnings)
-    stop = StopRequests(None, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
+    stop = StopRequests(None, comm.bcast(slurm_end_time() if comm.rank == 0 else None), AUTOSAVE)
     program = getattr(sys.modules["__main__"], "__file__", None)
     directory = Path(program).parent if program else Path()
     session = Session(comm, log, stop, count, directory, ends_with_frame=True)
+    session.job = run_folder.Job(program or "", "python", tuple(sys.argv[1:]), count)
     _watch_the_end(session)
     return session
 
@@ -190,7 +238,7 @@ def _watch_the_end(session: Session) -> None:
         if hasattr(sys, "ps1"):  # a conversation goes on after an error
             usual(kind, error, trace)
             return
-        session.close(failed=True)
+        session.close(error)
         sys.exit(end(ending.describe(error)))
 
     def at_exit() -> None:

@@ -13,6 +13,7 @@ from typing import NoReturn
 import click
 
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
+from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run
 from hpcdem.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
@@ -21,7 +22,7 @@ from hpcdem.session import Session, greet, rehearse
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
 
-PROGRAMS = ("movie", "measure")
+PROGRAMS = ("movie", "measure", "info")
 """`hpcdem NAME ...`: modules of this package."""
 STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 """`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
@@ -38,12 +39,17 @@ def main() -> NoReturn:
     words, cores_before = sys.argv[1:], launch.cores()
     if words[:1] and words[0] in PROGRAMS:
         start(words[0], words[1:])
+    if words[:1] == ["doctor"]:
+        importlib.import_module("hpcdem.cli.doctor").start(words[1:], cores_before)
     if any(word.split("=")[0] in STRESS_AND_STRAIN for word in words):
         start("strain_stress", words)
     with messages_only(), launch.one_voice():
         if words[:1] == ["warmup"]:
             run_warmup(words[1:])
-        options = Options(**read_command_line(hpcdem, "hpcdem", words))
+        if words[:1] == ["resume"]:
+            options = resumed_options(read_command_line(resume, "hpcdem resume", words[1:]))
+        else:
+            options = Options(**read_command_line(hpcdem, "hpcdem", words))
         threads, warnings = launch.prepare_environment(options.threads or launch.threads_by_default())
         comm = launch.start_mpi()
 
@@ -53,11 +59,12 @@ def main() -> NoReturn:
 
         log = Log(comm.rank)
         if not options.check:
-            greet(comm, log, cores_before, threads, warnings)
-        stop = StopRequests(options.time_limit, comm.bcast(slurm_end_time() if comm.rank == 0 else None))
+            greet(comm, log, cores_before, threads, warnings, options.outdir or options.script.parent / "data")
+        end = comm.bcast(slurm_end_time() if comm.rank == 0 else None)
+        stop = StopRequests(options.time_limit, end, options.autosave)
         session = Session(
             comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance,
-            options.draw,
+            options.draw, keep=options.keep,
         )  # fmt: skip
         run(session, options)
 
@@ -89,5 +96,10 @@ def start_zdemss() -> NoReturn:
 def start(name: str, words: list[str]) -> NoReturn:
     """A program that looks at finished runs: its module holds a command of the same name, and a function `work`."""
     module = importlib.import_module(f"hpcdem.cli.{name}")
-    shown = {"strain_stress": "hpcdem", "movie": "hpcdem movie", "measure": "hpcdem measure"}.get(name, name)
+    shown = {
+        "strain_stress": "hpcdem",
+        "movie": "hpcdem movie",
+        "measure": "hpcdem measure",
+        "info": "hpcdem info",
+    }.get(name, name)
     run_program(getattr(module, name), shown, words, module.work)

@@ -42,7 +42,7 @@ def movie(**options: Any) -> None:
 
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: make the film. Raises HpcdemError on all ranks."""
-    from hpcdem.io.files import on_first
+    from hpcdem.io.agreed import on_first
     from hpcdem.post import movie as films
 
     def begin() -> tuple[list[tuple[str, Path]], list[Path]]:
@@ -96,7 +96,7 @@ def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
 def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> list[Path]:
     """Collective: the pictures of all frames, at one view."""
     from hpcdem.errors import HpcdemError
-    from hpcdem.io.files import on_first
+    from hpcdem.io.agreed import on_first
     from hpcdem.io.frames import list_frames
     from hpcdem.post.series import Job, draw_all
 

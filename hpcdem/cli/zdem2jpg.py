@@ -33,7 +33,7 @@ def zdem2jpg(**options: Any) -> None:
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw all frames of the folder. Raises HpcdemError on all ranks."""
     from hpcdem.errors import HpcdemError
-    from hpcdem.io.files import on_first
+    from hpcdem.io.agreed import on_first
     from hpcdem.io.frames import list_frames
     from hpcdem.post.series import Job, draw_all
 

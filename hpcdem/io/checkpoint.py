@@ -1,9 +1,16 @@
 """`.sav` files: HDF5, in the order of ids, free of ranks and threads.
 
 Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
-one dataset per column. The root attribute `sums` (JSON) holds the 64-bit words of each dataset added up modulo 2^64,
-and `crc` the CRC-32 of `state` and `sums`; they are compared after writing, before the file gets its name, and again on
-reading.
+one dataset per column. The root attribute `sums` (JSON) holds a checksum of each dataset, and `crc` the CRC-32 of
+`state` and `sums`; they are compared after writing, before the file gets its name, and again on reading.
+
+A file of an earlier version of this layout is read by all later programs; one of a later version is refused.
+
+| version | since then |
+|---|---|
+| 1 | checksums of datasets: sum of their 64-bit words |
+| 2 | `crc` |
+| 3 | each word is mixed with its place before it is added up, so that rows that changed places are noticed too |
 """
 
 from __future__ import annotations
@@ -11,7 +18,8 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -21,14 +29,44 @@ from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to
 
 FORMAT = "hpcdem checkpoint"
-VERSION = 2
+VERSION = 3
+
+
+_PART = 1 << 18
+"""Words that are mixed at a time."""
 
 
 def word_sum(values: np.ndarray) -> int:
-    """Sum of the 64-bit words of an array modulo 2^64: does not depend on the order of rows."""
+    """Sum of the 64-bit words of an array modulo 2^64, whatever their order: the checksum of versions 1 and 2."""
+    return int(np.add.reduce(_words(values), dtype=np.uint64))
+
+
+def placed_sum(values: np.ndarray, first: int = 0) -> int:
+    """Sum modulo 2^64 of the 64-bit words of an array, each mixed with its place: the sums of slabs add up to that of
+    the dataset, in any order.
+
+    first: row of the dataset at which `values` begin. The mixing is a multiplication by an odd number between two
+    shifts, as in the finalisers of MurmurHash3 and SplitMix64 (Appleby 2011; Steele et al. 2014).
+    """
+    words = _words(values)
+    start = first * (words.size // max(len(values), 1))
+    total = 0
+    with np.errstate(over="ignore"):
+        for at in range(0, words.size, _PART):
+            part = words[at : at + _PART]
+            place = np.arange(start + at + 1, start + at + 1 + len(part), dtype=np.uint64)
+            mixed = part ^ (place * np.uint64(0x9E3779B97F4A7C15))
+            mixed ^= mixed >> np.uint64(32)
+            mixed *= np.uint64(0xD6E8FEB86659FD93)
+            mixed ^= mixed >> np.uint64(32)
+            total += int(np.add.reduce(mixed, dtype=np.uint64))
+    return total & 0xFFFFFFFFFFFFFFFF
+
+
+def _words(values: np.ndarray) -> np.ndarray:
     wide = np.ascontiguousarray(values)
-    wide = wide.view(np.uint64) if wide.dtype.itemsize == 8 else wide.astype(np.int64).view(np.uint64)
-    return int(np.add.reduce(wide.ravel(), dtype=np.uint64)) if wide.size else 0
+    wide = wide if wide.dtype.itemsize == 8 else wide.astype(np.int64)
+    return wide.reshape(-1).view(np.uint64)
 
 
 def _crc(state: str, sums: str) -> int:
@@ -45,8 +83,12 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
         except HpcdemError as failure:
             raise HpcdemError(f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}") from None
 
-    columns = {f"{name}/{c}": values for name, table in tables.items() for c, values in table.columns.items()}
-    parts = np.array([word_sum(values) for values in columns.values()], dtype=np.uint64)
+    columns = {
+        f"{name}/{c}": placed_sum(values, table.offset)
+        for name, table in tables.items()
+        for c, values in table.columns.items()
+    }
+    parts = np.array(list(columns.values()), dtype=np.uint64)
     sums = dict(zip(columns, comm.sum_into(parts).tolist()))  # integers without sign go round, as they should
     with writing_to(path, comm, read_back) as writer:
         for table_name, table in tables.items():
@@ -59,6 +101,35 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
 
 def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]]]:
     """State and tables of a checkpoint, on this process alone. HpcdemError says what is wrong with the file."""
+    tables: dict[str, dict[str, np.ndarray]] = {}
+    with _opened(path) as (file, state, sums, check):
+        whole = os.path.getsize(path)
+        for full, expected in sums.items():
+            table, name = full.split("/")
+            if file[full].nbytes > whole:  # a size that is wrong must not be asked of the memory
+                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} would be larger than the file")
+            values = file[full][...]
+            if check(values) != expected:
+                raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
+            tables.setdefault(table, {})[name] = values
+    return state, tables
+
+
+def read_state(path: str | os.PathLike) -> dict[str, Any]:
+    """State alone: quick, whatever the size of the tables, which are not looked at. HpcdemError as for `read`."""
+    with _opened(path) as (_, state, _, _):
+        return state
+
+
+def version_of(path: str | os.PathLike) -> int:
+    """Version of the layout. HpcdemError if it is no checkpoint."""
+    with _opened(path) as (file, *_):
+        return int(file.attrs["version"])
+
+
+@contextmanager
+def _opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any], dict[str, int], Callable]]:
+    """The open file, its state, the checksums of its datasets, and the function that makes them."""
     with reading(path) as file:
         try:
             if file.attrs.get("format") != FORMAT:
@@ -72,13 +143,6 @@ def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, n
             if version > 1 and int(file.attrs["crc"]) != _crc(**texts):
                 raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of its state is wrong")
             state, sums = json.loads(texts["state"]), json.loads(texts["sums"])
-            tables: dict[str, dict[str, np.ndarray]] = {}
-            for full, expected in sums.items():
-                table, name = full.split("/")
-                values = file[full][...]
-                if word_sum(values) != expected:
-                    raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
-                tables.setdefault(table, {})[name] = values
+            yield file, state, sums, word_sum if version < 3 else placed_sum
         except (AttributeError, KeyError, OSError, TypeError, ValueError, RuntimeError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is damaged: {problem}") from None
-    return state, tables

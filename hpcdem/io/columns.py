@@ -6,7 +6,7 @@ import os
 import re
 from typing import Any
 
-from hpcdem.io.disk import explain
+from hpcdem.io.disk import explain, publish, remove
 
 
 def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: int | None, comm: Any) -> None:
@@ -28,14 +28,20 @@ def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: in
 
 
 def _cut(path: str | os.PathLike, header: str, since: int) -> None:
+    """Keep the rows up to a step. The last row may be a piece, as a full disk leaves it, and a piece of a number is a
+    smaller number."""
     kept = [header]
     if since > 0 and os.path.exists(path):
-        with open(path, encoding="utf-8") as file:
-            for line in file.read().splitlines()[1:]:
-                step = re.match(r"\d+", line)
-                if step is not None and int(step[0]) <= since:
-                    kept.append(line)
+        with open(path, encoding="utf-8", errors="replace") as file:
+            for line in file.read().splitlines(keepends=True)[1:]:
+                step = re.match(r"(\d+)[ ,]", line)
+                if step is not None and int(step[1]) <= since and line.endswith("\n"):
+                    kept.append(line.rstrip("\n"))
     temporary = f"{os.fspath(path)}.tmp"
-    with open(temporary, "w", encoding="utf-8") as file:
-        file.write("\n".join(kept) + "\n")
-    os.replace(temporary, path)
+    try:
+        with open(temporary, "w", encoding="utf-8") as file:
+            file.write("\n".join(kept) + "\n")
+        publish(temporary, os.fspath(path))
+    except OSError:
+        remove(temporary)
+        raise

@@ -37,12 +37,13 @@ def explain(path: str | os.PathLike, error: BaseException, doing: str = "write")
 
 def publish(temporary: str, path: str) -> None:
     """Give a finished file its name, once it is safe on the disk."""
-    _to_disk(temporary)
+    to_disk(temporary)
     os.replace(temporary, path)
     _folder_to_disk(path)
 
 
-def _to_disk(path: str) -> None:
+def to_disk(path: str) -> None:
+    """What was written to a file survives a loss of power from now on."""
     handle = os.open(path, os.O_RDWR)
     try:
         os.fsync(handle)

@@ -20,9 +20,9 @@ import h5py
 import numpy as np
 
 from hpcdem.errors import HpcdemError
+from hpcdem.io.agreed import atomic_path
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain
-from hpcdem.io.files import atomic_path
 from hpcdem.io.rootfile import Description, RootFile, root_file
 from hpcdem.io.transport import Places, rows_in_blocks, to_root, used
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import atomic_path
+from hpcdem.io.agreed import atomic_path
 
 FASTEST_GIF = 50.0
 """Frames per second of a GIF: viewers slow down what is faster."""

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import Ticks, View, particle_extent, view
-from hpcdem.io.files import atomic_path
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
 from hpcdem.post.layers import USUAL, Look

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import atomic_path
+from hpcdem.io.agreed import atomic_path
 
 UNITS = {
     "volumetric": "%",

@@ -7,7 +7,8 @@ import os
 import numpy as np
 
 from hpcdem.io import h5
-from hpcdem.io.files import Alone, write_sections
+from hpcdem.io.agreed import Alone
+from hpcdem.io.files import write_sections
 from hpcdem.io.textnum import INT, Column, TextTable, sci
 from hpcdem.post.section import Section
 

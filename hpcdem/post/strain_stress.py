@@ -20,7 +20,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io.files import Alone, explain, on_first
+from hpcdem.io.agreed import Alone, on_first
+from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
 from hpcdem.post import grid as grids
 from hpcdem.post import section_files, strain, stress

@@ -19,6 +19,9 @@ from typing import Any, NoReturn
 
 from hpcdem.errors import EXIT_ERROR, EXIT_OK, HpcdemError
 
+EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
+"""Ended by a second Ctrl-C or SIGTERM: 128 and the number of the signal, as shells have it."""
+
 GRACE = 1.0
 """Seconds a failing rank waits for the others to fail as well."""
 LAST_RESORT = 30
@@ -50,7 +53,9 @@ def describe(error: BaseException) -> Failure:
         code = error.code if isinstance(error.code, int) else EXIT_OK if error.code is None else EXIT_ERROR
         return Failure(code, error.code if isinstance(error.code, str) else "")
     if isinstance(error, KeyboardInterrupt):
-        return Failure(130, "hpcdem: interrupted; nothing was saved")
+        if error.args == ("SIGTERM",):
+            return Failure(EXIT_TERMINATED, "hpcdem: ended by a second SIGTERM; nothing was saved")
+        return Failure(EXIT_INTERRUPTED, "hpcdem: interrupted; nothing was saved")
     return Failure(EXIT_ERROR, "".join(traceback.format_exception(error)).rstrip())
 
 

@@ -4,11 +4,15 @@
 |---|---|
 | SIGUSR1, SIGTERM, first SIGINT (Ctrl-C) | save a checkpoint and stop, exit code 85 |
 | SIGUSR2 | save a checkpoint and go on |
-| second SIGINT | stop at once, nothing is saved |
+| so much time since the last checkpoint (autosave) | the same |
+| second SIGINT, or second SIGTERM | stop at once, nothing is saved, exit code 130 or 143 |
 | time limit or end of the Slurm job | save and stop, early enough for the save to finish |
 
 srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1 with either MPI, SIGTERM and
 SIGINT with MPICH only, SIGUSR2 with Open MPI only (as tried with MPICH 5.0 and Open MPI 5.0).
+
+A rank that hangs inside MPI cannot look at flags: `insisting.LastResort` ends it after a second SIGTERM or SIGINT, and
+after one SIGTERM that is not answered for a minute.
 
 A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
 seen it. The step loop puts `local_request()` into a maximum that it takes over the ranks anyway, and hands the
@@ -17,6 +21,7 @@ result to `decide()`.
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -26,21 +31,26 @@ from datetime import datetime
 from types import FrameType
 from typing import Any, Literal
 
-import numpy as np
-
 from hpcdem.errors import UsageError
+from hpcdem.runtime.insisting import SAME_SIGNAL, LastResort
 
-NONE, SAVE, STOP = 0, 1, 2
-"""Codes of a request; the larger one wins."""
+NONE, AUTO, SAVE, STOP = 0, 1, 2, 3
+"""Codes of a request; the largest one wins. AUTO: the last checkpoint was long ago."""
 
-Decision = Literal["none", "save", "stop"]
+Decision = Literal["none", "auto", "save", "stop"]
 
 HANDLED = ("SIGUSR2", "SIGUSR1", "SIGTERM", "SIGINT")
 SAME_REQUEST = 2.0
 """A SIGUSR2 this soon [s] after a save was sent to all ranks at once and is answered already."""
 
 
-def parse_limit(text: str) -> float:
+AUTOSAVE = 1800.0
+"""Seconds between checkpoints that nobody asked for."""
+LEAST_SHARE = 20.0
+"""They are at least so many times as far apart as the last one took."""
+
+
+def parse_limit(text: str, option: str = "--time-limit") -> float:
     """Seconds in ``HH:MM:SS``, ``MM:SS``, ``D-HH:MM:SS`` (as Slurm writes it) or a plain number of seconds.
 
     UsageError for anything else.
@@ -53,8 +63,8 @@ def parse_limit(text: str) -> float:
         seconds += 86400.0 * int(days if dash else 0)
     except ValueError:
         seconds = -1.0
-    if not 0.0 < seconds < np.inf:
-        raise UsageError(f"--time-limit {text}: expected a time as HH:MM:SS, for example 11:30:00")
+    if not 0.0 < seconds < math.inf:
+        raise UsageError(f"{option} {text}: expected a time as HH:MM:SS, for example 11:30:00")
     return seconds
 
 
@@ -63,11 +73,15 @@ class StopRequests:
 
     time_limit: seconds from now (wall clock) after which the run must have ended; None: no limit of its own.
     end_time: the same as a time of day [s since 1970], as Slurm gives it.
+    autosave: seconds after which a checkpoint is written if there was none; None: never.
     """
 
-    def __init__(self, time_limit: float | None = None, end_time: float | None = None) -> None:
+    def __init__(
+        self, time_limit: float | None = None, end_time: float | None = None, autosave: float | None = None
+    ) -> None:
         self.reason = ""
-        self._began = time.monotonic()
+        self._began = self._last_file = time.monotonic()
+        self._autosave = autosave
         self._limits: list[tuple[float, float, str]] = []  # latest end (monotonic), first margin, name
         if time_limit is not None:
             self._limits.append((self._began + time_limit, min(60.0, 0.05 * time_limit), "the time limit"))
@@ -77,18 +91,22 @@ class StopRequests:
         self._save = False
         self._stop = ""
         self._interrupts = 0
+        self._terminated: float | None = None
+        self._last_resort = LastResort()
         self._last_save_took: float | None = None
-        self._last_saved = -np.inf
+        self._last_saved = -math.inf
         self._before: dict[int, Any] = {}
 
     # -- signals ---------------------------------------------------------------------------------------------
 
-    def install(self) -> StopRequests:
-        """Take over the signals; call it after MPI has begun, which may set its own handlers."""
+    def install(self, rank: int = 0) -> StopRequests:
+        """Take over the signals; call it after MPI has begun, which may set its own handlers. rank: for messages."""
         for name in HANDLED:
             number = getattr(signal, name, None)
             if number is not None:
                 self._before[number] = signal.signal(number, self._on_signal)
+        self._last_resort = LastResort(rank)
+        self._last_resort.listen()
         return self
 
     def uninstall(self) -> None:
@@ -96,6 +114,7 @@ class StopRequests:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         self._before.clear()
+        self._last_resort.close()
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         """Only sets a flag: the state may be in the middle of a step."""
@@ -107,32 +126,48 @@ class StopRequests:
             self._interrupts += 1
             if self._interrupts > 1:
                 raise KeyboardInterrupt
+        if name == "SIGTERM":
+            self._terminated = self._terminated or time.monotonic()
+            if time.monotonic() - self._terminated > SAME_SIGNAL:
+                raise KeyboardInterrupt("SIGTERM")
         self._stop = self._stop or ("Ctrl-C" if name == "SIGINT" else name)
 
     # -- the questions of the step loop ----------------------------------------------------------------------
 
     def local_request(self) -> int:
-        """What this rank knows of: 0 nothing, 1 save, 2 save and stop."""
+        """What this rank knows of: one of the codes above."""
         if not self._stop:
             now = time.monotonic()
             for end, _, name in self._limits:
                 if now >= end - self.margin():
                     self._stop = name
-        return STOP if self._stop else SAVE if self._save else NONE
+        if self._stop or self._save:
+            return STOP if self._stop else SAVE
+        return AUTO if self._autosave is not None and time.monotonic() - self._last_file > self._pause() else NONE
+
+    def _pause(self) -> float:
+        """Seconds between checkpoints that nobody asked for."""
+        return max(self._autosave or 0.0, LEAST_SHARE * (self._last_save_took or 0.0))
 
     def decide(self, code: int) -> Decision:
         """The decision that belongs to the largest code of all ranks; a save request is answered by it."""
         if code >= STOP:
             self.reason = self._stop or "a request to another rank"
+            self._last_resort.answered()
             return "stop"
         if code == SAVE:
             self._save = False
             self._last_saved = time.monotonic()
             return "save"
+        if code == AUTO:
+            self._last_file = time.monotonic()
+            return "auto"
         return "none"
 
     def poll(self, comm: Any) -> Decision:
         """Collective: the decision of all ranks, where no other reduction can carry the code."""
+        import numpy as np
+
         return self.decide(int(comm.max_into(np.array([self.local_request()], dtype=np.int64))[0]))
 
     # -- margin ----------------------------------------------------------------------------------------------
@@ -140,7 +175,7 @@ class StopRequests:
     def saved(self, seconds: float) -> None:
         """A checkpoint took so long: the next margin follows it."""
         self._last_save_took = seconds
-        self._last_saved = time.monotonic()
+        self._last_saved = self._last_file = time.monotonic()
 
     def margin(self) -> float:
         """Seconds before the nearest limit at which the last checkpoint is begun.

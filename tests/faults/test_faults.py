@@ -174,6 +174,25 @@ def test_sigusr2_saves_and_goes_on(launch, script, undisturbed, wait_until, rank
     assert (data / LAST_FRAME).read_bytes() == undisturbed
 
 
+@pytest.mark.mpi
+def test_a_second_sigterm_ends_ranks_that_hang(launch, script, undisturbed, wait_until, rank_process):
+    """Rank 1 has stopped for good; rank 0 waits for it inside MPI, where no handler of Python runs."""
+    data = script.parent / "data"
+    job = launch.start(2, script, "--no-figure", cwd=script.parent)
+    wait_until(lambda: checkpoints(data), 120, "the first checkpoint")
+    waiting = rank_process(script.parent, 0)
+    os.kill(rank_process(script.parent, 1), signal.SIGSTOP)
+    time.sleep(0.5)
+    os.kill(waiting, signal.SIGTERM)
+    time.sleep(2.5)
+    assert job.poll() is None
+    os.kill(waiting, signal.SIGTERM)
+    code, _, err = end_of(job)
+    assert code not in (0, 85)
+    assert "SIGTERM" in err and "nothing was saved" in err and "Traceback" not in err
+    finish(launch, 2, script, undisturbed)
+
+
 @pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])
 def test_a_chain_of_jobs_with_a_time_limit(launch, script, undisturbed, n):
     """As a queue would run it: always the same command line, until it says that it is done."""
@@ -233,3 +252,115 @@ def test_resume_finds_the_folder_that_the_script_names(launch, script, undisturb
     assert done.returncode == 0 and "going on from" in done.stdout
     assert (script.parent / "results" / LAST_FRAME).read_bytes() == undisturbed
     assert not (script.parent / "data").exists()
+
+
+# -- hpcdem resume ---------------------------------------------------------------------------------------------------
+
+
+def taken_up(launch, n, folder, undisturbed, *arguments, cwd):
+    done = launch(n, "resume", *arguments, "--no-figure", cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (folder / LAST_FRAME).read_bytes() == undisturbed
+    return done
+
+
+@pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.mpi)])
+def test_resume_needs_no_script(launch, script, undisturbed, n, tmp_path_factory):
+    """Called from elsewhere, with the folder alone; done, it says so."""
+    done = launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent)
+    assert done.returncode == 85
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    data = script.parent / "data"
+    assert "going on from" in taken_up(launch, n, data, undisturbed, data, cwd=elsewhere).stdout
+    again = launch(1, "resume", data, cwd=elsewhere)
+    assert again.returncode == 0 and "the run is done" in again.stdout
+
+
+def test_resume_takes_the_script_out_of_the_checkpoint(launch, script, undisturbed):
+    assert launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent).returncode == 85
+    script.unlink()
+    taken_up(launch, 1, script.parent / "data", undisturbed, cwd=script.parent)
+
+
+def test_a_script_out_of_a_checkpoint_writes_nowhere_else(launch, script, tmp_path):
+    victim = tmp_path.parent / "victim.dat"
+    script.write_text(PILE.replace("STOP", f"EXP {victim}\nSTOP"))
+    assert launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent).returncode == 85
+    script.unlink()
+    done = launch(1, "resume", cwd=script.parent)
+    assert done.returncode == 2 and "outside of" in done.stderr and "victim.dat" in done.stderr
+    assert not victim.exists()
+
+
+def test_a_moved_folder_goes_on(launch, script, undisturbed, tmp_path_factory):
+    assert launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent).returncode == 85
+    elsewhere = tmp_path_factory.mktemp("moved")
+    shutil.move(script.parent / "data", elsewhere / "data")
+    shutil.move(script, elsewhere / script.name)
+    taken_up(launch, 1, elsewhere / "data", undisturbed, cwd=elsewhere)
+
+
+def test_nothing_to_resume(launch, tmp_path):
+    done = launch(1, "resume", cwd=tmp_path)
+    assert done.returncode == 2 and "no run to go on with" in done.stderr
+    done = launch(1, "resume", tmp_path / "nowhere", cwd=tmp_path)
+    assert done.returncode == 2 and "no such folder" in done.stderr
+
+
+def test_two_runs_in_one_folder(launch, script, undisturbed, wait_until):
+    """The second is refused and touches nothing; the first does not notice."""
+    data = script.parent / "data"
+    job = launch.start(1, script, "--no-figure", cwd=script.parent)
+    wait_until(lambda: checkpoints(data), 120, "the first checkpoint")
+    second = launch(1, script, "--no-figure", cwd=script.parent)
+    assert second.returncode == 2
+    assert second.stderr.count("another run is writing into") == 1 and "pile.py" in second.stderr
+    out, err = job.communicate(timeout=120)
+    assert job.returncode == 0, err
+    assert (data / LAST_FRAME).read_bytes() == undisturbed
+    assert not (data / ".lock").exists()
+
+
+def test_an_old_run_in_the_folder_is_not_gone_on_with(launch, script, undisturbed, stopped):
+    """A changed script is begun anew in the folder of an earlier run, which had come farther, and is killed."""
+    early = PILE.replace("save 1000", "save 500")
+    script.write_text(early)
+    job = launch.start(1, script, "--no-figure", cwd=script.parent)
+    deadline = time.monotonic() + 60
+    while not (stopped / "0000000500.sav").exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    job.kill()
+    job.wait()
+    done = launch(1, "resume", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0, done.stderr
+    assert (stopped / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_checkpoints_are_rotated(launch, script, undisturbed):
+    done = launch(1, script, "--keep", "2", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0, done.stderr
+    data = script.parent / "data"
+    assert len(checkpoints(data)) == 2 and checkpoints(data)[-1] == "0000015000.sav"
+    assert (data / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_a_checkpoint_that_nobody_asked_for(launch, script, undisturbed):
+    script.write_text(PILE.replace(" save 1000", "").replace(" save 20.0", ""))
+    done = launch(1, script, "--autosave", "0.2", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0, done.stderr
+    data = script.parent / "data"
+    assert done.stdout.count("as the last one was long ago") >= 2
+    assert len(checkpoints(data)) == 2 and all(name.startswith("auto_") for name in checkpoints(data))
+    assert (data / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_info_tells_what_is_there(launch, script, stopped):
+    newest = max(stopped.glob("*.sav"))
+    done = launch(1, "info", newest, cwd=script.parent)
+    assert done.returncode == 0 and "checkpoint, whole" in done.stdout and "CYC" in done.stdout
+    done = launch(1, "info", stopped, cwd=script.parent)
+    assert done.returncode == 0 and "state        stopped" in done.stdout and "hpcdem resume" in done.stdout
+    whole = newest.read_bytes()
+    newest.write_bytes(whole[: len(whole) // 2])
+    done = launch(1, "info", newest, stopped, cwd=script.parent)
+    assert done.returncode == 1 and done.stdout.count("NOT WHOLE") == 2

@@ -14,7 +14,9 @@ import pytest
 
 from hpcdem.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
-from hpcdem.io.files import atomic_path, explain, make_folder, write_sections
+from hpcdem.io.agreed import atomic_path, make_folder
+from hpcdem.io.disk import explain
+from hpcdem.io.files import write_sections
 from hpcdem.io.textnum import TextTable, sci
 
 ROOT = Path(__file__).resolve().parents[2]

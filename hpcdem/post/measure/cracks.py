@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.errors import HpcdemError
-from hpcdem.io.files import explain
+from hpcdem.io.disk import explain
 from hpcdem.post.measure.grains import Grains
 
 LEVELS = 0.1, 0.5

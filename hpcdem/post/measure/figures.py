@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem.io import colours
+from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View, view
-from hpcdem.io.files import atomic_path
 from hpcdem.post import plots
 from hpcdem.post.layers import Look
 from hpcdem.post.measure import cracks

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io.files import atomic_path, explain, on_first
+from hpcdem.io.agreed import atomic_path, on_first
+from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile
 from hpcdem.post.measure import cracks, figures, kinds
 from hpcdem.post.measure import walls as curves

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.io.files import atomic_path, explain, make_folder
+from hpcdem.io.agreed import atomic_path, make_folder
+from hpcdem.io.disk import explain
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
 from hpcdem.post.section import Section, read_section
 from hpcdem.post.sections import panels, survey

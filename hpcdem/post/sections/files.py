@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.io.files import atomic_path
+from hpcdem.io.agreed import atomic_path
 from hpcdem.post.section import UNITS, Section
 
 GRIDS = ("volumetric", "distortional", "mean", "shear")

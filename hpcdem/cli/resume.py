@@ -1,0 +1,70 @@
+"""`hpcdem resume [DIR]`: go on with the run that wrote into a folder, whatever ended it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.run import Options, time_limit
+from hpcdem.errors import EXIT_OK, HpcdemError, UsageError
+from hpcdem.runtime import run_folder
+
+
+@click.command(
+    context_settings=HELP,
+    epilog="Any number of ranks and threads: mpiexec -n 4 hpcdem resume DIR. The script is that of the run, wherever "
+    "it is called from; if its file is gone, the text in the newest checkpoint is taken. Exit codes as for hpcdem "
+    "SCRIPT; 0 also if the run is done.",
+)
+@click.argument("folder", type=PATH, metavar="[DIR]", required=False)
+@click.option(
+    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
+)
+@click.option(
+    "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
+)
+@click.option("--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all].")
+@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
+              "the last one, or off [30:00].")  # fmt: skip
+@click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
+@click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
+@click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
+def resume(**options: Any) -> None:
+    """Go on with the run that wrote into DIR [data, or this folder], from its newest checkpoint that is whole."""
+
+
+def resumed_options(given: dict[str, Any]) -> Options:
+    """The command line of the run that wrote into the folder, with --resume. UsageError if there is nothing to go on
+    with; leaves with exit code 0 if the run is done."""
+    folder = _folder(given.pop("folder"))
+    try:
+        record = run_folder.read(folder)
+    except HpcdemError as damaged:
+        click.echo(f"warning: {damaged}; the script in the newest checkpoint is taken", err=True)
+        record = None
+    if record is not None and record.state == "done":
+        click.echo(f"{folder}: the run is done, step {record.step}; there is nothing to go on with")
+        raise SystemExit(EXIT_OK)
+    if record is not None and record.language == "python":
+        words = " ".join(["hpcdem", record.script, *record.arguments])
+        raise UsageError(f"{folder} was written by a Python program, which goes on by Simulation.resume(): {words}")
+    recorded = Path(record.script) if record is not None and record.script else None
+    for script in [recorded, folder.parent / recorded.name] if recorded is not None else []:
+        if script is not None and script.is_file():
+            return Options(script=script, resume=True, outdir=folder, **given)
+    name = recorded.name if recorded is not None else "script"
+    return Options(script=folder.parent / name, resume=True, outdir=folder, saved_in=folder, **given)
+
+
+def _folder(named: Path | None) -> Path:
+    """The folder meant: DIR itself, or the folder data in it."""
+    start = Path() if named is None else named
+    for folder in (start, start / "data"):
+        if (folder / run_folder.RECORD).is_file() or any(folder.glob("*.sav")):
+            return folder.resolve()
+    if not start.is_dir():
+        raise UsageError(f"{start}: there is no such folder")
+    raise UsageError(f"{start.resolve()}: no run to go on with, neither {run_folder.RECORD} nor a .sav file")

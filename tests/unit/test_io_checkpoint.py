@@ -1,0 +1,115 @@
+"""Checkpoint files: checksums that know places, versions, and what is said of damaged files."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from hpcdem.errors import HpcdemError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+
+STATE = {"clock": {"step": 12, "time": 0.1}, "script": "START\n", "position": 3}
+
+
+def tables(n: int = 1000) -> dict[str, Table]:
+    rng = np.random.default_rng(1)
+    columns = {"gid": np.arange(n), "x": rng.normal(size=n), "fix": rng.integers(0, 7, n).astype(np.int32)}
+    return {"particles": Table(columns, 0, n), "pairs": Table({"gid": np.empty(0, np.int64)}, 0, 0)}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "0000000012.sav"
+    checkpoint.write(path, STATE, tables(), SerialComm())
+    return path
+
+
+def test_it_comes_back(file):
+    state, found = checkpoint.read(file)
+    assert state == STATE == checkpoint.read_state(file)
+    for name, values in tables()["particles"].columns.items():
+        assert np.array_equal(found["particles"][name], values)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.int64, np.int32])
+def test_checksums_of_slabs_add_up(dtype):
+    values = np.random.default_rng(2).integers(-(2**31), 2**31 - 1, (1001, 3)).astype(dtype)
+    whole = checkpoint.placed_sum(values)
+    cuts = [0, 1, 400, 400, 1001]
+    parts = [checkpoint.placed_sum(values[a:b], a) for a, b in pairwise(cuts)]
+    assert sum(parts) % 2**64 == whole
+
+
+def test_long_arrays_are_summed_in_parts(monkeypatch):
+    values = np.random.default_rng(3).normal(size=1000)
+    whole = checkpoint.placed_sum(values)
+    monkeypatch.setattr(checkpoint, "_PART", 7)
+    assert checkpoint.placed_sum(values) == whole
+
+
+def test_rows_that_changed_places_are_noticed(file):
+    """The sum of words, as earlier versions had it, does not see them."""
+    with h5py.File(file, "r+") as opened:
+        x = opened["particles/x"][...]
+        before = checkpoint.word_sum(x)
+        x[[3, 4]] = x[[4, 3]]
+        opened["particles/x"][...] = x
+    assert checkpoint.word_sum(x) == before
+    with pytest.raises(HpcdemError, match="checksum of particles/x is wrong"):
+        checkpoint.read(file)
+
+
+@pytest.mark.parametrize("bit", range(0, 64, 7))
+def test_one_bit_is_noticed(file, bit):
+    with h5py.File(file, "r+") as opened:
+        gid = opened["particles/gid"][...]
+        gid.view(np.uint64)[500] ^= np.uint64(1 << bit)
+        opened["particles/gid"][...] = gid
+    with pytest.raises(HpcdemError, match="checksum of particles/gid is wrong"):
+        checkpoint.read(file)
+
+
+def test_a_changed_state_is_noticed(file):
+    with h5py.File(file, "r+") as opened:
+        opened.attrs["state"] = json.dumps(STATE | {"position": 4})
+    for look in (checkpoint.read, checkpoint.read_state):
+        with pytest.raises(HpcdemError, match="checksum of its state is wrong"):
+            look(file)
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_earlier_versions_are_read(file, version):
+    """As programs of that time wrote them: sums of words, and before version 2 no crc."""
+    with h5py.File(file, "r+") as opened:
+        sums = json.loads(opened.attrs["sums"])
+        text = json.dumps({name: checkpoint.word_sum(opened[name][...]) for name in sums})
+        opened.attrs["sums"], opened.attrs["version"] = text, version
+        opened.attrs["crc"] = checkpoint._crc(opened.attrs["state"], text)
+        if version == 1:
+            del opened.attrs["crc"]
+    assert checkpoint.read(file)[0] == STATE and checkpoint.version_of(file) == version
+    with h5py.File(file, "r+") as opened:
+        opened["particles/x"][0] = 7.0
+    with pytest.raises(HpcdemError, match="checksum of particles/x is wrong"):
+        checkpoint.read(file)
+
+
+def test_a_later_version_is_refused(file):
+    with h5py.File(file, "r+") as opened:
+        opened.attrs["version"] = checkpoint.VERSION + 1
+    with pytest.raises(HpcdemError, match=f"version {checkpoint.VERSION + 1}, this program reads up to"):
+        checkpoint.read_state(file)
+
+
+@pytest.mark.parametrize("length", [0, 1, 8, 100, 1000, 5000])
+def test_a_cut_file_is_damaged(file, length):
+    file.write_bytes(file.read_bytes()[:length])
+    with pytest.raises(HpcdemError):
+        checkpoint.read(file)

@@ -1,0 +1,182 @@
+"""A process that hangs in a call that no signal ends, and is told to end all the same."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from hpcdem.runtime import insisting
+from hpcdem.runtime.ending import EXIT_INTERRUPTED, EXIT_TERMINATED, describe
+from hpcdem.runtime.insisting import LastResort
+from hpcdem.runtime.stopping import StopRequests
+from tests.conftest import ROOT
+
+HANGS = """\
+import ctypes, sys
+from hpcdem.runtime import insisting
+from hpcdem.runtime.stopping import StopRequests
+insisting.SAME_SIGNAL = {same}
+stop = StopRequests().install(3)
+stop._last_resort._insist = {insist}
+stop._last_resort._patience = {patience}
+libc, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(128)
+libc.pthread_mutex_lock(mutex)
+print("now", flush=True)
+libc.pthread_mutex_lock(mutex)  # for ever; no signal ends it, as it does not end a wait inside MPI
+"""
+
+
+@pytest.fixture
+def hanging() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """`hanging(insist=0.3, patience=60)`: a process that waits for ever, inside C."""
+    started = []
+
+    def start(insist: float, patience: float, same: float = 0.2) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [sys.executable, "-c", HANGS.format(insist=insist, patience=patience, same=same)],
+            cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        started.append(process)
+        assert process.stdout is not None and process.stdout.readline() == "now\n"
+        time.sleep(0.1)
+        return process
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
+def test_the_second_signal_ends_a_process_that_hangs(hanging, name, code):
+    process = hanging(insist=0.3, patience=60.0)
+    process.send_signal(getattr(signal, name))
+    with pytest.raises(subprocess.TimeoutExpired):  # the first one alone does not
+        process.wait(1.0)
+    process.send_signal(getattr(signal, name))
+    _, err = process.communicate(timeout=10)
+    assert process.returncode == code
+    assert err.count("\n") == 1 and "rank 3" in err and "came twice" in err and "<string>:11" in err
+
+
+def test_signals_that_come_by_several_ways_are_one(hanging):
+    process = hanging(insist=0.1, patience=60.0, same=10.0)
+    for _ in range(3):
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.02)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(1.0)
+
+
+def test_a_sigterm_that_is_not_answered_ends_it_too(hanging):
+    process = hanging(insist=5.0, patience=0.5)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=10)
+    assert process.returncode == 143 and "not answered for 0.5 s" in err
+
+
+def test_the_other_requests_have_time(hanging):
+    """SIGUSR1 comes minutes before the end of a job: there is no hurry."""
+    process = hanging(insist=0.2, patience=0.2)
+    for _ in range(2):
+        process.send_signal(signal.SIGUSR1)
+        time.sleep(0.3)
+    assert process.poll() is None
+
+
+@pytest.fixture
+def ended(monkeypatch) -> Iterator[tuple[StopRequests, list[int]]]:
+    """Requests of this process, and the exit codes with which it would have been ended."""
+    monkeypatch.setattr(insisting, "SAME_SIGNAL", 0.1)
+    monkeypatch.setattr("hpcdem.runtime.stopping.SAME_SIGNAL", 0.1)
+    codes: list[int] = []
+    stop = StopRequests().install()
+    stop._last_resort._leave = codes.append
+    stop._last_resort._patience = 0.4
+    stop._last_resort._insist = 0.3
+    yield stop, codes
+    stop.uninstall()
+
+
+def busy(seconds: float) -> None:
+    """Work that goes from one function to the next."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        sum(range(1000))
+        (lambda: time.sleep(0.01))()
+
+
+def one_call(seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        time.sleep(0.001)
+
+
+def test_a_process_at_work_is_left_alone(ended):
+    """It is not for want of looking that the request has not been answered."""
+    stop, codes = ended
+    os.kill(os.getpid(), signal.SIGTERM)
+    for _ in range(10):
+        busy(0.1)
+    assert not codes
+
+
+def test_a_process_within_one_call_is_not(ended):
+    stop, codes = ended
+    os.kill(os.getpid(), signal.SIGTERM)
+    one_call(1.5)
+    assert codes and set(codes) == {EXIT_TERMINATED}
+
+
+def test_the_last_checkpoint_takes_as_long_as_it_needs(ended):
+    stop, codes = ended
+    os.kill(os.getpid(), signal.SIGTERM)
+    assert stop.decide(stop.local_request()) == "stop"
+    one_call(1.5)
+    assert not codes
+
+
+def test_the_second_sigterm_interrupts_at_once_where_it_can(ended):
+    _, codes = ended
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(0.2)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1.0)
+    failure = describe(caught.value)
+    assert failure.code == EXIT_TERMINATED and "second SIGTERM" in failure.text
+    assert describe(KeyboardInterrupt()).code == EXIT_INTERRUPTED
+
+
+def test_an_event_loop_that_listens_is_not_disturbed():
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    before = signal.set_wakeup_fd(writing)
+    try:
+        stop = StopRequests().install()
+        stop.uninstall()
+        assert signal.set_wakeup_fd(writing) == writing
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(reading)
+        os.close(writing)
+
+
+def test_nothing_is_left_behind():
+    threads = threading.active_count()
+    for _ in range(5):
+        resort = LastResort()
+        resort.listen()
+        resort.close()
+    end = time.monotonic() + 5.0
+    while threading.active_count() > threads and time.monotonic() < end:
+        time.sleep(0.01)
+    assert threading.active_count() == threads
+    assert signal.set_wakeup_fd(-1) == -1
