@@ -12,10 +12,10 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hpcdem.errors import HpcdemError, UsageError
 
@@ -202,22 +202,41 @@ def mpi_library() -> str:
     """Name and version of the MPI library that mpi4py runs on."""
     from mpi4py import MPI
 
-    first = MPI.Get_library_version().strip("\0\n ").splitlines()[0]
-    return " ".join(first.replace("\t", " ").split())
+    return first_line(MPI.Get_library_version())
+
+
+def first_line(text: str) -> str:
+    """The first line with anything on it, with single blanks; empty if there is none."""
+    return next((" ".join(line.split()) for line in text.replace("\0", "").splitlines() if line.strip()), "")
+
+
+def last_line(text: str) -> str:
+    """The last line with anything on it, with single blanks; empty if there is none."""
+    return first_line("\n".join(reversed(text.splitlines())))
 
 
 def copies_of_rank_0(who: Launcher, library: str) -> str:
     """The refusal when MPI and the launcher do not know each other, and the way out of it."""
     many = f"{who.size} processes" if who.size else "several processes"
-    if "Open MPI" in library:
-        pmi, own = "pmix", "Open MPI's own mpiexec"
-    else:
-        pmi, own = "pmi2", "the mpiexec of this library (a wheel has it in the bin folder of the venv)"
-    cure = f"srun --mpi={pmi} (srun --mpi=list shows what there is)" if "SLURM_JOB_ID" in os.environ else own
     return (
         f"{who.name} started {many}, but in MPI each of them is rank 0 of 1: the launcher does not belong to the MPI "
-        f"library that mpi4py uses, which is {library}. They would overwrite each other's files. Start with {cure}"
+        f"library that mpi4py uses, which is {library}. They would overwrite each other's files. Start with "
+        f"{launcher_of(library)}"
     )
+
+
+def launcher_of(library: str, environ: Mapping[str, str] = os.environ) -> str:
+    """What starts ranks that this MPI library knows of."""
+    if "SLURM_JOB_ID" in environ:
+        return f"srun --mpi={slurm_mpi_type(library)} (srun --mpi=list shows what there is)"
+    if "Open MPI" in library:
+        return "Open MPI's own mpiexec"
+    return "the mpiexec of this library (a wheel has it in the bin folder of the venv)"
+
+
+def slurm_mpi_type(library: str) -> str:
+    """How srun has to tell the ranks about each other."""
+    return "pmix" if "Open MPI" in library else "pmi2"
 
 
 def patient_barrier(comm: SerialComm) -> None:
@@ -262,54 +281,3 @@ def start_report(places: list[Place], library: str | None) -> str:
         f"{each} core{'s' * (masks[-1] > 1)} open to each rank" if ranks > 1 else f"{each} core{'s' * (masks[-1] > 1)}",
     ]
     return " | ".join(parts + [library] if library else parts)
-
-
-def start_warnings(places: list[Place], environ: Any = os.environ) -> list[str]:
-    """What is wrong with the launch: threads and ranks that share cores, masks that shrank, idle cores of a job."""
-    found = []
-    tight = [p for p in places if p.threads > len(p.mask)]
-    if tight:
-        p = tight[0]
-        found.append(
-            f"{p.threads} threads per rank, but {len(tight)} of {len(places)} ranks may use only {len(p.mask)} "
-            f"core{'s' * (len(p.mask) > 1)}: the threads will take turns. Give each rank its cores "
-            f"(srun -c {p.threads}; mpiexec --map-by slot:PE={p.threads} or --bind-to none) or use -j 1"
-        )
-    for host in dict.fromkeys(p.host for p in places):
-        here = [p for p in places if p.host == host]
-        free, wanted = len(frozenset.union(*(p.mask for p in here))), sum(p.threads for p in here)
-        if wanted > free and not tight:
-            found.append(
-                f"{len(here)} ranks x {here[0].threads} threads share {free} core{'s' * (free > 1)} on {host}: "
-                "expect less speed than with as many as there are cores"
-            )
-            break
-    shrunk = [p for p in places if len(p.mask) < p.cores_before]
-    if shrunk:
-        p = shrunk[0]
-        found.append(
-            f"starting MPI narrowed the cores of {len(shrunk)} ranks from {p.cores_before} to {len(p.mask)} each"
-        )
-    found += slurm_core_warnings(places, environ)
-    return found
-
-
-def slurm_core_warnings(places: list[Place], environ: Any) -> list[str]:
-    """The two ways to ask sbatch for -c 12 and then run on one core."""
-    asked = environ.get("SLURM_CPUS_PER_TASK", "")
-    if "SLURM_STEP_ID" not in environ or not asked.isdigit() or int(asked) < 2:
-        return []
-    cores_here = len(places[0].mask)
-    if cores_here < int(asked) and "SRUN_CPUS_PER_TASK" not in environ:
-        return [
-            f"the job asked for {asked} cores per task, this srun got {cores_here}: some versions of srun do not take "
-            "--cpus-per-task from sbatch. Start with: srun -c $SLURM_CPUS_PER_TASK"
-        ]
-    here = [p for p in places if p.host == places[0].host]
-    used = sum(p.threads for p in here)
-    if used < cores_here:
-        return [
-            f"{used} of the {cores_here} cores of this job are used: ask for ranks instead "
-            f"(#SBATCH -n {asked} -c 1 and srun -n {asked}), or for threads (-j {asked})"
-        ]
-    return []

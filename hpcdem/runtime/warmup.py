@@ -17,7 +17,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,21 +104,21 @@ def give_up_cache() -> None:
 # -- the folder ------------------------------------------------------------------------------------------------
 
 
-def cache_folder() -> tuple[Path, bool]:
+def cache_folder(environ: Mapping[str, str] = os.environ) -> tuple[Path, bool]:
     """The folder for this version, machine type and user; False with it if it had to go to the temporary folder."""
     key = cache_key()
-    base = cache_base()
+    base = cache_base(environ)
     if can_write(base):
         return base / key, True
     return temporary_base() / key, False
 
 
-def cache_base() -> Path:
+def cache_base(environ: Mapping[str, str] = os.environ) -> Path:
     """NUMBA_CACHE_DIR if set, else the user's cache folder."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
+    given = environ.get("NUMBA_CACHE_DIR")
     if given:
         return Path(given).absolute()
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hpcdem"
+    return Path(environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hpcdem"
 
 
 def can_write(base: Path) -> bool:

@@ -18,8 +18,8 @@ find_python() {
         "name another one with PYTHON=/path/to/python3"
 }
 
-# What an environment depends on: place, Python's version (not its path, which shims change), the project's
-# requirements and this recipe.
+# fingerprint PYTHON TEXT...: what an environment depends on: place, Python's version (not its path, which shims change),
+# the project's requirements, this recipe, and whatever else is given.
 fingerprint() {
     { printf '%s\n' "$PWD" "${@:2}"; "$1" -VV; cat pyproject.toml scripts/lib/setup.sh; } | sha256sum | cut -d' ' -f1
 }
@@ -56,12 +56,23 @@ once() {
 wheels_venv() {
     local python
     python=$(find_python)
-    once "$1" "wheels-$2" "$(fingerprint "$python" "$2")" fill_from_wheels "$1" "$python" "$2"
+    once "$1" "wheels-$2" "$(fingerprint "$python" "$2" "$(<requirements.lock)")" fill_from_wheels "$1" "$python" "$2"
 }
 
 fill_from_wheels() {
     say "Setting up $1 from wheels with $("$2" --version) (once; some 20 s where the network is quick) ..."
-    make_venv "$1" "$2" && install "$1" --editable ".[$3]"
+    make_venv "$1" "$2" && install_locked "$1" && install "$1" --editable ".[$3]"
+}
+
+# install_locked DIR: the versions of requirements.lock, each checked by its hash. Where they do not fit, as with a Python
+# or processor that has no such wheels, it says so and leaves the choice to the ranges of pyproject.toml.
+install_locked() {
+    local said
+    if said=$("$1/bin/pip" install -q --disable-pip-version-check --require-hashes --only-binary :all: \
+        --requirement requirements.lock 2>&1); then return; fi
+    say "The versions of requirements.lock cannot be had for $("$1/bin/python" --version 2>&1) on $(uname -sm):"
+    say "  $(grep -i error <<<"$said" | tail -n 1)"
+    say "Going on with the newest versions that pyproject.toml allows."
 }
 
 # debian_venv DIR EXTRAS: Debian's MPI, parallel HDF5, PETSc and Slurm; pip adds the rest around Debian's numpy.

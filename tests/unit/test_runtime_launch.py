@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import resource
 import sys
+from pathlib import Path
 
 import pytest
 
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
+from hpcdem.runtime import doctor
 from hpcdem.runtime import launch as launching
 from hpcdem.runtime.launch import Launcher, Place
 
@@ -161,23 +164,31 @@ def test_the_report_is_one_line():
     assert "1 to 4 cores" in launching.start_report(places(1) + places(1, cores=1), "MPICH 4.2")
 
 
+def start_warnings(places: list[Place], environ: dict[str, str]) -> list[str]:
+    """What the log says on a machine where nothing else is wrong (for that see test_doctor)."""
+    nowhere = Path("/nowhere")
+    scene = doctor.Scene(places, environ={"NUMBA_CACHE_DIR": "/nowhere", **environ}, root=nowhere)
+    scene.limits = lambda number: (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+    return doctor.start_warnings(scene, SerialComm())
+
+
 def test_a_good_launch_has_no_warnings():
-    assert launching.start_warnings(places(4), {}) == []
-    assert launching.start_warnings(places(4, host="a") + places(4, host="b"), {}) == []
+    assert start_warnings(places(4), {}) == []
+    assert start_warnings(places(4, host="a") + places(4, host="b"), {}) == []
 
 
 def test_threads_on_one_core():
-    (text,) = launching.start_warnings(places(2, cores=1, threads=4), {})
+    (text,) = start_warnings(places(2, cores=1, threads=4), {})
     assert "4 threads per rank" in text and "srun -c 4" in text
 
 
 def test_more_ranks_than_cores():
-    (text,) = launching.start_warnings(places(4, cores=2), {})
+    (text,) = start_warnings(places(4, cores=2), {})
     assert "4 ranks" in text and "2 cores" in text
 
 
 def test_a_mask_narrowed_by_mpi():
-    (text,) = launching.start_warnings(places(1, cores=1, before=8), {})
+    (text,) = start_warnings(places(1, cores=1, before=8), {})
     assert "from 8 to 1" in text
 
 
@@ -185,18 +196,18 @@ SRUN = {"SLURM_STEP_ID": "0", "SLURM_CPUS_PER_TASK": "12"}
 
 
 def test_srun_that_forgets_the_cores_per_task():
-    (text,) = launching.start_warnings(places(1, cores=1), SRUN)
+    (text,) = start_warnings(places(1, cores=1), SRUN)
     assert "srun -c $SLURM_CPUS_PER_TASK" in text
 
 
 def test_a_job_of_twelve_cores_that_uses_one():
-    (text,) = launching.start_warnings(places(1, cores=12), SRUN)
+    (text,) = start_warnings(places(1, cores=12), SRUN)
     assert "1 of the 12 cores" in text and "-j 12" in text
-    assert launching.start_warnings(places(1, cores=12, threads=12), SRUN) == []
+    assert start_warnings(places(1, cores=12, threads=12), SRUN) == []
 
 
 def test_a_batch_script_without_srun_is_left_alone():
-    assert launching.start_warnings(places(1, cores=4), {"SLURM_CPUS_PER_TASK": "12"}) == []
+    assert start_warnings(places(1, cores=4), {"SLURM_CPUS_PER_TASK": "12"}) == []
 
 
 @pytest.mark.mpi

@@ -1,0 +1,109 @@
+"""`hpcdem doctor`: what is wrong with this place, before a run finds out."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
+
+import click
+
+from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
+from hpcdem.errors import EXIT_ERROR, EXIT_OK, HpcdemError
+from hpcdem.runtime import ending, launch
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.doctor import Finding, Scene
+
+STYLES = {"OK": "green", "WARNING": "yellow", "PROBLEM": "bold red"}
+
+
+@click.command(context_settings=HELP)
+@click.option("--dir", "directory", type=PATH, default=Path(), metavar="DIR", help="Where results will go [.].")
+@click.option(
+    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
+)
+def doctor(**options: Any) -> None:
+    """Look for what would keep a run from working, make it slow or put it at risk: packages, MPI and its launcher,
+    cores and memory, file systems, the kernel cache, Slurm, limits of the shell. Says what to type against it.
+
+    Also under mpiexec or srun, as the run would be started: then it looks at all ranks and hosts. Exit codes: 0 no
+    problem, 1 a problem (warnings are none).
+    """
+
+
+def start(words: list[str], cores_before: int) -> NoReturn:
+    """Collective: look, print, leave. A launch that a run would refuse is a finding like others."""
+    with messages_only(), launch.one_voice():
+        options = read_command_line(doctor, "hpcdem doctor", words)
+        threads, _ = launch.prepare_environment(options["threads"] or launch.threads_by_default())
+        comm, refusal = communicator()
+
+    def work() -> None:
+        code = report(examine(comm, scene(comm, options["directory"], cores_before, threads, refusal)), sys.stdout)
+        if comm.bcast(code) != EXIT_OK:
+            sys.exit(code)
+
+    ending.leave(ending.run_together(comm, work))
+
+
+def communicator() -> tuple[SerialComm, str]:
+    """All ranks, or this process alone with the reason why MPI cannot begin; other processes leave then."""
+    try:
+        return launch.start_mpi(), ""
+    except HpcdemError as error:
+        if not launch.speaks_for_all():
+            sys.exit(EXIT_OK)
+        from hpcdem.halo.comm import SerialComm
+
+        return SerialComm(), str(error)
+
+
+def scene(comm: SerialComm, directory: Path, cores_before: int, threads: int, refusal: str = "") -> Scene:
+    """Collective: what there is to look at."""
+    from hpcdem.post.movie import ffmpeg
+    from hpcdem.runtime.doctor import Scene
+
+    places = comm.allgather(launch.place(cores_before, threads))
+    begun = comm.mpi is not None or "mpi4py.MPI" in sys.modules
+    return Scene(
+        places, comm.rank, launch.launcher(), launch.mpi_library() if begun else None, refusal, directory, ffmpeg=ffmpeg
+    )
+
+
+def examine(comm: SerialComm, seen: Scene) -> list[Finding]:
+    """Collective: all findings, on rank 0."""
+    from hpcdem.runtime.doctor import examine as examined
+
+    return examined(seen, comm)
+
+
+def report(findings: Sequence[Finding], stream: TextIO) -> int:
+    """Print the findings, one per line, those that matter last; returns the exit code."""
+    if not findings:  # another rank speaks
+        return EXIT_OK
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    # Cut into lines for people only: who reads a file or a pipe wants one line per finding. Open MPI gives its
+    # processes a terminal, wherever their output goes in the end.
+    terminal = stream.isatty() and "OMPI_COMM_WORLD_SIZE" not in os.environ
+    console = Console(file=stream, highlight=False, force_terminal=terminal, width=None if terminal else 10_000)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for name in ("", "what", "found", "what to do"):
+        table.add_column(name, overflow="fold")
+    for finding in sorted(findings, key=lambda finding: finding.level):
+        name = finding.level.name
+        row = (finding.topic, finding.text, finding.cure)
+        table.add_row(f"[{STYLES[name]}]{name.lower()}[/]", *(escape(" ".join(text.split())) for text in row))
+    console.print(table)
+    counts = {name: sum(f.level.name == name for f in findings) for name in ("PROBLEM", "WARNING")}
+    said = [f"{n} {name.lower()}{'s' * (n > 1)}" for name, n in counts.items() if n]
+    console.print(", ".join(said) if said else "no problems", end="\n")
+    return EXIT_ERROR if counts["PROBLEM"] else EXIT_OK
