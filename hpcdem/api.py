@@ -284,7 +284,7 @@ class Simulation:
     @_verb
     def set(self, **options: Any) -> None:
         """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, wallside, outdir, and the
-        steps between outputs: print, ps, vtk, save, stepbar."""
+        steps between outputs: print, ps, vtk, save, stepbar, energy."""
         for name, value in options.items():
             value = self.directory / value if name == "outdir" else value
             self._do.settings.set_option(self.engine, name, value)
@@ -350,7 +350,8 @@ class Simulation:
 
     @_verb
     def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: append kinetic, step, time, unbalanced, contacts or bonds to hist_<id>.dat every `interval` steps."""
+        """HIST: append kinetic, step, time, unbalanced, contacts, bonds or energy to hist_<id>.dat every `interval`
+        steps."""
         self._do.history.hist(self.engine, id, interval, what)
 
     @_verb
@@ -525,6 +526,15 @@ class Simulation:
 
         self._ready()
         return observe.kinetic_energy(self.engine)
+
+    @_verb
+    def energy(self) -> dict[str, float]:
+        """The energy budget since the first cycle after ``set(energy=n)`` [J]: the columns of energy.csv by name."""
+        import dataclasses
+
+        if self.engine.energy is None or self.engine.energy.start is None:
+            raise CommandError("there is no account yet: set(energy=n) comes first, then a cycle")
+        return dataclasses.asdict(self.engine.energy.look(self.engine))
 
     @_verb
     def unbalanced(self) -> float:

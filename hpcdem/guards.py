@@ -23,12 +23,18 @@ def outside(particles: Particles, box: tuple[float, float, float, float]) -> np.
     return ~((x >= left) & (x <= right) & (y >= bottom) & (y <= top))
 
 
+def _first(particles: Particles, which: np.ndarray) -> np.ndarray:
+    """Rows of the flagged particles of the lowest ids, at most NAMED: a message must not depend on the ranks."""
+    at = np.flatnonzero(which)
+    return at[np.argsort(particles["gid"][at])][:NAMED]
+
+
 def places(particles: Particles, which: np.ndarray, comm: Any) -> str:
-    """The first flagged particles by id and place, over all ranks, and how many there are. Collective."""
-    at = np.flatnonzero(which)[:NAMED]
-    mine = [(int(particles["gid"][c]), float(particles["x"][c]), float(particles["y"][c])) for c in at]
-    rows = sorted(row for part in comm.allgather(mine) for row in part)[:NAMED]
-    return "; ".join(f"{g} at ({x:g}, {y:g})" for g, x, y in rows)
+    """Flagged particles by id, place and velocity, over all ranks: the lowest ids, at most NAMED. Collective."""
+    at = _first(particles, which)
+    columns = [particles[name][at].tolist() for name in ("gid", "x", "y", "vx", "vy")]
+    rows = sorted(row for part in comm.allgather(list(zip(*columns))) for row in part)[:NAMED]
+    return "; ".join(f"{g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g})" for g, x, y, vx, vy in rows)
 
 
 def stop_on_runaway(
@@ -45,7 +51,7 @@ def stop_on_runaway(
     with np.errstate(invalid="ignore"):
         bad = ~np.isfinite(hot[:, :5]).all(axis=1) | ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
     mine = []
-    for c in np.flatnonzero(bad)[:NAMED]:
+    for c in _first(p, bad):
         known = np.isfinite(hot[c, :2]).all()  # else tell where it was when the lists were built
         x, y = hot[c, :2] if known else origin[c]
         mine.append((int(p["gid"][c]), float(x), float(y), float(p["vx"][c]), float(p["vy"][c]), comm.rank))

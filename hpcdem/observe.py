@@ -10,11 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hpcdem.fields import FIELDS, GID, MATERIAL, RADIUS
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.physics.dem import contacts, mass, totals
+from hpcdem.physics.dem import contacts, mass, modes, totals
 from hpcdem.physics.dem import walls as wall_kernels
-from hpcdem.physics.exact_sum import BINS_SHAPE, rounded_sums
+from hpcdem.physics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
+from hpcdem.physics.fingerprint import as_text, of_rows
 from hpcdem.simulation import Simulation
 
 FN, FS, FORCE_X, FORCE_Y, AT_X, AT_Y, OVERLAP, STIFFNESS = range(8)
@@ -83,7 +85,7 @@ class Totals:
     kinetic [J]; unbalanced: largest unbalanced force of a free particle over the mean normal contact force, 0 without
     contacts; contacts: pairs that touch or are bonded; critical_dt: 0.8 min sqrt(m / sum k) over the particles that are
     free to move [s], inf without contacts, k being the tangent normal stiffness of each touching contact of the
-    particle (PFC's estimate).
+    particle (PFC's estimate); deepest: the largest overlap of a pair or a wall contact over the (smaller) radius.
     """
 
     kinetic: float
@@ -91,6 +93,7 @@ class Totals:
     particles: int
     contacts: int
     critical_dt: float
+    deepest: float = 0.0
 
 
 def survey(sim: Simulation) -> Totals:
@@ -99,31 +102,161 @@ def survey(sim: Simulation) -> Totals:
     bins = np.zeros((2, *BINS_SHAPE), np.int64)
     stiffness = np.zeros(len(p))
     counts = np.array([len(p), 0], np.int64)
+    deepest = 0.0
     for t in range(lists.n_blocks):
-        counts[1] += totals.pairs(
+        touching, deep = totals.pairs(
             t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
             sim.bond_laws, len(sim.materials), mass.SPHERES[s.disk], p.n_left, bins[0], stiffness,
         )  # fmt: skip
+        counts[1] += touching
+        deepest = max(deepest, deep)
     out, iout = wall_rows(sim)
-    totals.add_wall_stiffness(
-        len(out), iout, out[:, STIFFNESS].copy(), p.ihot, lists.slot_row, lists.slot_wall, p.n_left, stiffness
-    )
+    deep = totals.add_wall_stiffness(
+        len(out), iout, out[:, STIFFNESS].copy(), out[:, OVERLAP].copy(), p.hot, p.ihot, lists.slot_row,
+        lists.slot_wall, p.n_left, stiffness,
+    )  # fmt: skip
     totals.kinetic(p.hot, p.n_left, sim.body, bins[1])
     largest, shortest = totals.extremes(p.icold, sim.body, lists.owned_forces(), s.gx, s.gy, stiffness)
     broken = math.isnan(largest)
-    largest, shortest, broken = comm.max_into(np.array([0.0 if broken else largest, -shortest, broken])).tolist()
+    extremes = np.array([0.0 if broken else largest, -shortest, broken, max(deepest, deep)])
+    largest, shortest, broken, deepest = comm.max_into(extremes).tolist()
     comm.sum_into(counts)
     normal, kinetic = rounded_sums(bins, comm).tolist()
     particles, touching = counts.tolist()
     ratio = 0.0
     if normal > 0.0:
         ratio = math.nan if broken else largest / (normal / max(touching, 1))
-    return Totals(kinetic, ratio, particles, touching, 0.8 * math.sqrt(-shortest))
+    return Totals(kinetic, ratio, particles, touching, 0.8 * math.sqrt(-shortest), deepest)
+
+
+@dataclass(frozen=True, order=True)
+class Overlap:
+    """A contact that has come too close: overlap U over the smaller radius, ids (the second that of a wall if `wall`),
+    contact point [m], U [m], rows of the material table."""
+
+    ratio: float
+    id1: int
+    id2: int
+    wall: bool
+    x: float
+    y: float
+    u: float
+    materials: tuple[int, ...]
+
+
+def overlaps_beyond(sim: Simulation, ratio: float, most: int) -> tuple[list[Overlap], int]:
+    """The worst contacts with an overlap above `ratio` times the smaller radius, deepest first, at most so many; and
+    how many there are. Collective."""
+    p = sim.particles
+    row_of = dict(zip(p.ihot[:, GID].tolist(), range(len(p.hot))))
+    found = []
+    out, iout = contact_rows(sim)
+    for k in np.flatnonzero(out[:, OVERLAP] > ratio * p.hot[:, RADIUS].min(initial=math.inf)):
+        a, b = (row_of[g] for g in iout[k, :2].tolist())
+        depth = float(out[k, OVERLAP] / min(p.hot[a, RADIUS], p.hot[b, RADIUS]))
+        materials = int(p.ihot[a, MATERIAL]), int(p.ihot[b, MATERIAL])
+        found.append(Overlap(depth, int(iout[k, 0]), int(iout[k, 1]), False, *_place_of(out[k]), materials))
+    out, iout = wall_rows(sim)
+    for k in np.flatnonzero(out[:, OVERLAP] > ratio * p.hot[:, RADIUS].min(initial=math.inf)):
+        a = row_of[int(iout[k, 0])]
+        depth, wall = float(out[k, OVERLAP] / p.hot[a, RADIUS]), int(sim.walls.id[iout[k, 1]])
+        found.append(Overlap(depth, int(iout[k, 0]), wall, True, *_place_of(out[k]), (int(p.ihot[a, MATERIAL]),)))
+    found = [overlap for overlap in found if overlap.ratio > ratio]
+    worst = sorted(found, key=lambda o: (-o.ratio, o.id1, o.id2))[:most]
+    everyone = sorted(
+        (o for part in sim.comm.allgather(worst) for o in part), key=lambda o: (-o.ratio, o.id1, o.id2)
+    )  # fmt: skip
+    return everyone[:most], sim.count(len(found))
+
+
+def _place_of(row: np.ndarray) -> tuple[float, float, float]:
+    return float(row[AT_X]), float(row[AT_Y]), float(row[OVERLAP])
 
 
 def critical_dt(sim: Simulation) -> float:
     """The largest time step that is thought stable [s], see `Totals`; inf without contacts. Collective."""
     return survey(sim).critical_dt
+
+
+MOST_LANCZOS, EVERY_LANCZOS = 60, 5
+"""Most products with the stiffness, and after how many to ask whether the frequency still changes."""
+
+
+def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:
+    """The largest eigenfrequency omega [rad/s] of small motions with the present contacts and bonds; 0 without any.
+
+    omega^2 is the largest eigenvalue of M^-1/2 K M^-1/2 (K: physics/dem/modes.py), by Lanczos iterations (Golub & Van
+    Loan, Matrix Computations, ch. 10) from a start that depends on the ids alone, until it changes by less than
+    `within` in a few of them. It is approached from below. Products are exact sums, so it does not depend on ranks. An
+    undamped leap-frog is stable for dt < 2 / omega. Reads only. Collective.
+    """
+    p, lists, comm = sim.particles, sim.lists, sim.comm
+    scale, x = np.empty((len(p), 3)), np.empty((len(p), 3))
+    modes.begin(p.ihot, p.n_left, sim.body, scale, x)
+    before, length = np.zeros_like(x), math.sqrt(exact_sum(x * x, comm))
+    diagonal: list[float] = []
+    beside: list[float] = []
+    found = 0.0
+    if length == 0.0:
+        return 0.0
+    x /= length
+    motion, force = np.zeros((len(p.hot), 3)), np.zeros((len(lists.force), 3))
+    while len(diagonal) < MOST_LANCZOS:
+        y = scale * _stiffness_times(sim, scale * x, motion, force)
+        diagonal.append(exact_sum(x * y, comm))
+        y -= diagonal[-1] * x + (beside[-1] * before if beside else 0.0)
+        length = math.sqrt(exact_sum(y * y, comm))
+        done = not length > 1e-12 * max(map(abs, diagonal))
+        if done or len(diagonal) % EVERY_LANCZOS == 0:
+            largest = float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside, -1))[-1])
+            if done or largest - found <= 2.0 * within * largest:
+                found = max(found, largest)
+                break
+            found = largest
+        beside.append(length)
+        before, x = x, y / length
+    return math.sqrt(max(found, 0.0))
+
+
+def _stiffness_times(sim: Simulation, u: np.ndarray, motion: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """K u (n_own, 3) for motions u of the owned particles; motion, force: room per storage and force row."""
+    p, lists, b = sim.particles, sim.lists, sim.lists.blocks
+    motion[p.owned] = u
+    sim.halo.fill(motion)
+    out = np.empty_like(u)
+    for t in range(lists.n_blocks):
+        modes.pairs(
+            t, p.hot, p.ihot, b.cut, b.lo, b.hi, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, lists.u_made,
+            sim.pair_laws, sim.bond_laws, len(sim.materials), mass.SPHERES[sim.settings.disk], motion, force,
+        )  # fmt: skip
+        first, last = b.foff[t] + b.cut[t] - b.lo[t], b.foff[t] + b.cut[t + 1] - b.lo[t]
+        out[b.cut[t] - p.n_left : b.cut[t + 1] - p.n_left] = force[first:last]
+    sim._wall_table[:, 0:2], sim._wall_table[:, 2:4] = sim.walls.p1, sim.walls.p2
+    modes.walls(
+        p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws,
+        len(sim.materials), p.n_left, motion, out,
+    )  # fmt: skip
+    return out
+
+
+def fingerprint(sim: Simulation) -> dict[str, str]:
+    """128 bits for what the next step depends on: particles (all fields, with the forces on them), contacts (shear
+    forces, bonds, sides at walls: what a checkpoint holds) and walls, as hexadecimal text. The same on any number of
+    ranks and threads. Collective.
+    """
+    p, w = sim.particles, sim.walls
+    columns = {name: p[name] for name in FIELDS}
+    if sim.closed:
+        force = sim.lists.owned_forces()
+        columns |= {name: force[:, k] for k, name in enumerate(("fx", "fy", "torque"))}
+    hist = sim.lists.histories(p.ihot) if sim.closed else sim.hist
+    owner = np.repeat(p["gid"], hist.counts())
+    once = (hist.partner > owner) | (hist.partner < 0)  # the owner of the lower id tells of a pair
+    remembered = [column[once] for column in (owner, hist.partner, hist.fs, hist.extra, hist.bond)]
+    sums = np.array([of_rows(list(columns.values())), of_rows(remembered)], np.uint64)
+    sim.comm.sum_into(sums)  # integers without sign go round, as they should
+    walls = of_rows([w.id, *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric])
+    return {"particles": as_text(sums[0]), "contacts": as_text(sums[1]), "walls": as_text(walls)}
 
 
 def frame(sim: Simulation) -> Frame:

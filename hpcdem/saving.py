@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.budget import Budget
 from hpcdem.clock import Clock
 from hpcdem.errors import CommandError, HpcdemError
 from hpcdem.fields import FIELDS, FX, TORQUE
@@ -21,6 +22,7 @@ from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
 from hpcdem.physics.dem.contacts import LONGEST2
 from hpcdem.physics.dem.neighbours import Histories
+from hpcdem.runtime import run_folder
 from hpcdem.simulation import Lattice, Simulation
 
 
@@ -55,6 +57,8 @@ def _state(sim: Simulation) -> dict[str, Any]:
         "streams": sim.streams,
         "breaks": sim.comm.sum_into(breaks).tolist(),
         "bonds": sim.bonds_left(),
+        "lost": sim.lost,
+        "energy": sim.energy.state(sim) if sim.energy is not None else None,
         "rebuilds": sim.rebuilds,
         "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
         "progress": sim.progress,
@@ -120,12 +124,13 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
 def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | None:
     """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. Collective.
 
-    Returns what `restore` returns, and "path". A damaged file is named in the log and the one before it is tried.
+    The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
+    earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
+    the log and the one before it is tried.
     """
-    found = []
-    if sim.comm.rank == 0:
-        names = {path for folder in folders for path in folder.glob("*.sav")}
-        found = sorted(names, key=lambda path: -path.stat().st_mtime_ns)
+    found, damaged = checkpoints(folders) if sim.comm.rank == 0 else ([], [])
+    for error in damaged if sim.log is not None else []:
+        sim.log.warn(f"{error}; it is passed over")
     for path in sim.comm.bcast(found):
         try:
             state = restore(sim, path)
@@ -135,10 +140,35 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
             continue
         if sim.log is not None:
             sim.log.info(f"going on from {path}, step {sim.clock.step}")
+        sim.resumed = True
         return {**state, "path": path}
     if sim.log is not None:
         sim.log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
     return None
+
+
+def checkpoints(folders: list[Path]) -> tuple[list[Path], list[str]]:
+    """The checkpoints of the runs that wrote last into some folders, the newest first, and what is wrong with those of
+    which not even the state can be read. Tables are not looked at. Not collective."""
+    ranked, damaged = [], []
+    for folder in dict.fromkeys(path.resolve() for path in folders):
+        try:
+            record = run_folder.read(folder)
+        except HpcdemError as error:
+            record = None
+            damaged.append(str(error))
+        for path in sorted(folder.glob("*.sav")):
+            if run_folder.is_older(path, record):
+                continue
+            try:
+                state = checkpoint.read_state(path)
+                place = int(state.get("position") or 0), int(state["clock"]["step"]), path.stat().st_mtime_ns
+            except (HpcdemError, OSError, KeyError, TypeError, ValueError) as error:
+                text = str(error) if isinstance(error, HpcdemError) else f"{path} is damaged: {error!r}"
+                damaged.append(text)
+            else:
+                ranked.append((place, path))
+    return [path for _, path in sorted(ranked, reverse=True)], damaged
 
 
 def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
@@ -161,6 +191,9 @@ def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, n
     if state.get("drawing") is not None:
         sim.drawing = int(state["drawing"][0]), tuple(state["drawing"][1])
     sim.bonds = state["bonds"]
+    sim.lost = state.get("lost", 0)
+    if state.get("energy") is not None:
+        sim.energy = Budget.restored(state["energy"], sim.comm.rank == 0)
     sim._longest2 = state["longest2"]
     sim.restart_step = sim.clock.step
     if sim.comm.rank == 0:

@@ -34,6 +34,10 @@ class Expression:
     text: str
     program: tuple[float | str, ...]
 
+    def __str__(self) -> str:
+        """As messages show it."""
+        return f"'{self.text if len(self.text) <= 40 else self.text[:37] + '...'}'"
+
     def value(self, extents: Mapping[str, float]) -> float:
         """The number for these extents [m]; CommandError where it does not exist."""
         stack: list[float] = []
@@ -45,16 +49,16 @@ class Expression:
             else:
                 right, left = stack.pop(), stack.pop()
                 if item == "/" and right == 0.0:
-                    raise CommandError(f"'{self.text}' divides by zero")
+                    raise CommandError(f"{self} divides by zero")
                 stack.append(_OPERATORS[item](left, right))
         if not math.isfinite(stack[0]):
-            raise CommandError(f"'{self.text}' is not a finite number")
+            raise CommandError(f"{self} is not a finite number")
         return stack[0]
 
     def _extent(self, name: str, extents: Mapping[str, float]) -> float:
         value = extents.get(name, math.nan)
         if not math.isfinite(value):
-            raise CommandError(f"'{self.text}': {{{name}}} has no value, there is no free particle")
+            raise CommandError(f"{self}: {{{name}}} has no value, there is no free particle")
         return float(value)
 
 

@@ -79,7 +79,8 @@ class Simulation:
 
     comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
     stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
-    draws: DRAW makes pictures.
+    draws: DRAW makes pictures; lost: particles that left the BOX so far; energy: the account of SET energy
+    (budget.Budget), or None.
     """
 
     def __init__(
@@ -95,6 +96,9 @@ class Simulation:
         self.threads = threads
         self.outdir = Path(outdir)
         self.folder_made = False
+        self.job: Any = None  # runtime.run_folder.Job: what was started
+        self.resumed = False  # goes on from a checkpoint that lies where it writes
+        self.keep = 0  # numbered checkpoints that are kept, 0: all
         self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
         self.goes_on_with = "--resume"
@@ -121,6 +125,8 @@ class Simulation:
         self.streams = 0
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
+        self.lost = 0
+        self.energy: Any = None
         self.history_wishes: dict[int, tuple[int, str]] = {}
         self.plots: list[tuple[int, int]] = []
         self.drawing: tuple[int, tuple[str, ...]] | None = None
@@ -151,6 +157,8 @@ class Simulation:
         Returns what the outside asked for (0 nothing, 1 save, 2 save and stop), agreed by all ranks.
         """
         timers, halo, request = self.timers, self.halo, 0
+        if self.energy is not None:
+            self.energy.before_move(self)
         with timers("move"):
             for first, last in halo.border:
                 self._move(self.lists.n_blocks, first, last, *self._move_args)
@@ -167,9 +175,15 @@ class Simulation:
         with timers("halo"):
             halo.finish()
         if stale:
+            if self.energy is not None:
+                self.energy.before_rebuild(self)
             self.rebuild()
+        if self.energy is not None:
+            self.energy.before_forces(self)
         with timers("force"):
             self._forces()
+        if self.energy is not None:
+            self.energy.after_forces(self)
         self.clock.tick()
         return request
 
@@ -193,9 +207,8 @@ class Simulation:
         found[4] = self.stop.local_request() if self.stop is not None else 0
         self.comm.max_into(found)
         if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
-            mixed_laws = bool(np.isnan(self.pair_laws[:, contacts.MODEL]).any())
             broken = bool(found[motion.BROKEN])
-            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, mixed_laws, self.comm)
+            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, self._mixed_laws(), self.comm)
         wall_speed = float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), wall_speed) * dt
@@ -209,9 +222,9 @@ class Simulation:
         fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
         wait = min(LONGEST_WATCH, 2 * lattice.pace)
         if stride > 0.0:
-            wait = min(wait, int(0.5 * room / stride))
+            wait = int(min(wait, 0.5 * room / stride))  # the quotient may be infinite
         if fall > 0.0:
-            wait = min(wait, int(math.sqrt(0.5 * room / fall)))
+            wait = int(min(wait, math.sqrt(0.5 * room / fall)))
         lattice.pace = lattice.countdown = max(1, wait)
         return stale, int(found[4])
 
@@ -355,12 +368,33 @@ class Simulation:
         return outside
 
     def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
-        """Particles whose centre has left the BOX are deleted, with a line in the log. Collective."""
+        """Particles whose centre has left the BOX are deleted, with a line in the log; PhysicsError if they ran away,
+        which the next look would no longer see. Collective."""
         gone = guards.outside(self.particles, box)
+        self._refuse_runaways(gone)
         names = guards.places(self.particles, gone, self.comm)
         number = self.remove(gone)
+        self.lost += number
         if self.log is not None:
-            self.log.info(f"step {self.clock.step}: {number} particles left the BOX and were deleted: {names}")
+            more = f"; and {number - guards.NAMED} more" if number > guards.NAMED else ""
+            self.log.info(f"step {self.clock.step}: {number} particles left the BOX and were deleted: {names}{more}")
+
+    def _refuse_runaways(self, which: np.ndarray) -> None:
+        """PhysicsError if one of the flagged owned particles (n_own,) bool of an open model is not finite, or goes too
+        far in a step. Collective."""
+        p, found = self.particles, np.zeros(4)
+        places, hot = p.positions()[which], p.hot[p.owned][which]
+        motion.survey(hot, 0, len(hot), places, self.clock.dt, found)
+        self.comm.max_into(found)
+        if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
+            broken = bool(found[motion.BROKEN])
+            guards.stop_on_runaway(
+                p, p.positions(), self.clock.dt, self.clock.step, broken, self._mixed_laws(), self.comm
+            )
+
+    def _mixed_laws(self) -> bool:
+        """Whether there are pairs of materials without a common law."""
+        return bool(np.isnan(contacts.pair_table(self.materials.rows)[:, contacts.MODEL]).any())
 
     def remove(self, which: np.ndarray) -> int:
         """Delete the flagged owned particles (n_own,) bool and all memory of them. The model must be open. Collective.

@@ -13,6 +13,8 @@ import click
 from hpcdem.cli.common import HELP, PATH
 from hpcdem.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
+from hpcdem.runtime.run_folder import Job, claim
+from hpcdem.runtime.stopping import AUTOSAVE
 from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.lang.zdem.parser import Script
     from hpcdem.runtime.progress import Log
+    from hpcdem.runtime.reproducing import Reproduction
     from hpcdem.simulation import Simulation
 
 
@@ -36,14 +39,25 @@ class Options:
     figure: bool = True
     balance: bool = True
     draw: bool = False
+    keep: int = 0
+    autosave: float | None = AUTOSAVE
+    check_reproducible: int | None = None
+    against: Path | None = None
     arguments: tuple[str, ...] = ()
+    saved_in: Path | None = None
+    """Take the script out of the newest checkpoint of this folder (cli/resume.py)."""
 
 
 def run(session: Session, options: Options) -> None:
     """Collective: read and carry out a script, then draw its last state. The same text on any number of ranks."""
     from hpcdem.lang import detect
 
-    name, source = str(options.script), read_script(session.comm, options.script)
+    name = str(options.script)
+    if options.saved_in is None:
+        source = read_script(session.comm, options.script)
+    else:
+        source = saved_script(session.comm, options.saved_in)
+    session.reproduction = reproduction(session, options)
     kind = detect.kind(source, name)
     if kind == "python":
         run_python(session, options, source)
@@ -65,16 +79,21 @@ def run_zdem(session: Session, options: Options, source: bytes) -> None:
         log.info(check.summary(script, options.outdir))
         return
     execute.refuse_unexecuted(script.statements)
+    if options.saved_in is not None:
+        execute.refuse_escapes(script, options.saved_in)
+    session.job = Job(name, "zdem", (), session.threads)
+    for statement in script.statements:
+        if statement.get("outdir"):
+            claim(script.directory / statement.get("outdir"), session.comm, session.job)
     sim = session.simulation(log=log)
     try:
         if not (options.resume and go_on(sim, script, log)):
             log.script_started(name, plan.expected_steps(script.statements) or 0)
             execute.Interpreter(script).run(sim)
-    except StoppedWithCheckpoint:  # on all ranks at the same step
-        log.stages(sim.timers, session.comm)
-        raise
-    except BaseException:
-        session.close(failed=True)
+    except BaseException as error:
+        if isinstance(error, StoppedWithCheckpoint):  # on all ranks at the same step
+            log.stages(sim.timers, session.comm)
+        session.close(error)
         raise
     session.close()
 
@@ -86,6 +105,7 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
         if given:
             raise UsageError(f"{name}: {option} is for ZDEM scripts; a Python program uses Simulation.resume() itself")
     session.text = source.decode("utf-8", errors="replace")
+    session.job = Job(name, "python", options.arguments, session.threads)
     session.ends_with_frame = True
     enter_session(session)
     session.log.script_started(name, 0)
@@ -95,10 +115,10 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
         exec(compile(source, name, "exec"), {"__name__": "__main__", "__file__": name, "__builtins__": __builtins__})
     except SystemExit as leaving:
         if leaving.code not in (None, EXIT_OK):
-            session.close(failed=True)
+            session.close(leaving)
             raise
     except BaseException as error:
-        session.close(failed=True)
+        session.close(error)
         if isinstance(error, (HpcdemError, KeyboardInterrupt)):
             raise
         raise HpcdemError(f"{name} ended with an error\n{own_traceback(error, name)}") from None
@@ -141,6 +161,26 @@ def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, 
     before = sum(run.steps or 0 for run in runs if run.index < position)
     inside = sim.clock.step - sim.progress["first"] if sim.progress is not None else 0
     return sum(run.steps or 0 for run in runs), before + inside
+
+
+def reproduction(session: Session, options: Options) -> Reproduction | None:
+    """Collective: what --check-reproducible and --against ask for."""
+    from hpcdem.runtime.reproducing import Reproduction, read
+
+    if options.check_reproducible is None:
+        if options.against is not None:
+            raise UsageError("--against LOG needs --check-reproducible N")
+        return None
+    expected, error = None, None
+    if options.against is not None and session.comm.rank == 0:
+        try:
+            expected = read(options.against)
+        except UsageError as problem:
+            error = str(problem)
+    expected, error = session.comm.bcast((expected, error))
+    if error is not None:
+        raise UsageError(error)
+    return Reproduction(options.check_reproducible, session.log, expected, str(options.against or ""))
 
 
 def read_script(comm: SerialComm, path: Path) -> bytes:
@@ -191,12 +231,29 @@ def other_options(command: click.Command) -> click.Command:
     return command
 
 
+def saved_script(comm: SerialComm, folder: Path) -> bytes:
+    """Collective: the text of the script that the newest checkpoint of a folder holds."""
+    from hpcdem.io import checkpoint
+    from hpcdem.io.agreed import on_first
+    from hpcdem.saving import checkpoints
+
+    def text() -> bytes:
+        found, damaged = checkpoints([folder])
+        if not found:
+            raise UsageError("; ".join([f"{folder}: no checkpoint to go on from", *damaged]))
+        return str(checkpoint.read_state(found[0])["script"]).encode()
+
+    return on_first(comm, text)
+
+
 def time_limit(context: click.Context, option: click.Parameter, value: str | None) -> float | None:
-    """Seconds of HH:MM:SS."""
+    """Seconds of HH:MM:SS; of `--autosave off` none."""
     from hpcdem.runtime.stopping import parse_limit
 
+    if option.name == "autosave" and value == "off":
+        return None
     try:
-        return None if value is None else parse_limit(value)
+        return None if value is None else parse_limit(value, option.opts[0])
     except UsageError as error:
         raise click.UsageError(str(error)) from None
 
@@ -206,7 +263,8 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     context_settings=HELP,
     no_args_is_help=True,
     epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s DIR --help), `hpcdem "
-    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs. "
+    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs, "
+    "`hpcdem doctor` says what is wrong with this machine or job. "
     "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a "
     "checkpoint (go on with --resume).",
 )
@@ -219,11 +277,18 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
 @click.option("--resume", is_flag=True, help="Go on from the newest checkpoint of this script.")
+@click.option("--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all].")
+@click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
+              "the last one, or off [30:00].")  # fmt: skip
 @click.option("--check", is_flag=True, help="Read the whole script, say what it would do, run nothing.")
 @click.option("--outdir", type=PATH, metavar="DIR", help="Results [data beside the script].")
 @click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
 @click.option("--balance/--no-balance", default=True, help="Move strip borders with the measured load [yes].")
 @click.option("--draw", is_flag=True, help="Let DRAW commands make pictures, draw_<step>.jpg.")
+@click.option(
+    "--check-reproducible", type=click.IntRange(1), metavar="N", help="Log a fingerprint of the state every N steps."
+)
+@click.option("--against", type=PATH, metavar="LOG", help="Compare the fingerprints with those of an earlier log.")
 @click.version_option(launch.version(), "-v", "--version", prog_name="hpcdem", message="%(prog)s %(version)s")
 def hpcdem(**options: Any) -> None:
     """Run a discrete-element SCRIPT (ZDEM commands, or Python that uses hpcdem), alone or under mpiexec or srun.

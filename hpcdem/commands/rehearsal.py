@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hpcdem import observe
+from hpcdem.budget import Budget
 from hpcdem.commands import bonds, particles, properties, running, settings, walls
 from hpcdem.halo.comm import SerialComm
 from hpcdem.selection import Ids
@@ -27,7 +28,13 @@ def rehearse(threads: int = 1) -> None:
     bonds.break_bonds(sim, Ids(0, 1))
     settings.set_option(sim, "frac", 0.1)
     running.prepare(sim)
+    walls.wall(sim, 0, xv=0.1)
+    running.prepare(sim)
+    sim.energy = Budget()
+    sim.energy.begin(sim)
     sim.rebuild()
     sim.step()
+    sim.energy.look(sim)
+    observe.highest_frequency(sim)
     observe.frame(sim)
     observe.critical_dt(sim)

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from hpcdem import observe, output
+from hpcdem.budget import Budget
 from hpcdem.errors import CommandError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.physics.dem.contacts import MODEL
 from hpcdem.physics.dem.laws import tangent_normal_stiffness
@@ -17,6 +18,8 @@ from hpcdem.simulation import Simulation
 
 STEPBAR = 1000
 """Steps between progress reports and rows of walls.csv when the script sets none."""
+NEAR = 0.5
+"""Time step over the estimate of the critical one from which the true limit is computed."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
 KINDS = ("print", "vtk", "ps", "save")
@@ -166,23 +169,44 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
             f"{name} cannot be used by a function that is called in the middle of {sim.progress['name']}"
         )
     prepare(sim)
+    if sim.settings.energy > 0 and sim.energy is None:
+        sim.energy = Budget()
     sim.progress = {
         "name": name, "first": sim.clock.step, "last": sim.clock.step + n, "origin": origin,
         "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
     }  # fmt: skip
     _warn_about_the_time_step(sim)
+    sim.last_frame = None  # the model may have been changed since, at the same step
     output.Snapshot(sim, initial=True, waits=False).write_print()
+    if sim.energy is not None:
+        new = sim.energy.start is None
+        sim.energy.begin(sim)
+        if new:
+            output.write_energy(sim)
     _run(sim)
 
 
 def _warn_about_the_time_step(sim: Simulation) -> None:
-    """Once: dt beyond the estimate of the critical step, or lattice-solid damping that reverses a velocity."""
+    """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
+    or if lattice-solid damping reverses a velocity."""
     critical, dt = observe.critical_dt(sim), sim.clock.dt
     free = sim.particles["fix"] != 7
     light = np.array([sim.body[free, 0].min() if free.any() else math.inf])
     damping = sim.settings.lsm * dt / float(sim.comm.min_into(light)[0])
+    near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
+    highest = observe.highest_frequency(sim) if near else 0.0
     if sim.log is None:
         return
+    if highest > 0.0:
+        estimate = f"{dt / critical:.2f} of the estimate 0.8 min sqrt(m / sum k) = {critical:.4g} s, "
+        text = (
+            f"time step {dt:g} s: {estimate if math.isfinite(critical) else ''}{0.5 * dt * highest:.2f} of "
+            f"2 / omega = {2.0 / highest:.4g} s, the limit of the contacts and bonds there are"
+        )
+        if 0.5 * dt * highest > 1.0:
+            sim.log.warn_once("unstable time step", f"{text}; beyond it the undamped step is unstable")
+        else:
+            sim.log.info(text)
     if dt > critical:
         sim.log.warn_once(
             "critical time step",
@@ -225,6 +249,8 @@ def _tasks(sim: Simulation) -> list[Task]:
     if sim.drawing is not None and sim.draws:
         every, what = sim.drawing
         tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))
+    if sim.energy is not None and sim.settings.energy > 0:
+        tasks.append(Task(sim.settings.energy, 0, partial(output.write_energy, sim)))
     if intervals["save"] > 0:
         tasks.append(Task(intervals["save"], origin, partial(output.write_checkpoint, sim)))
     return tasks
@@ -267,6 +293,8 @@ def _run(sim: Simulation) -> None:
         sim.progress = None
         if sim.log is not None:
             sim.log.command_finished()
+    if sim.energy is not None:
+        sim.energy.pause(sim)
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     output.settle(sim)
@@ -288,6 +316,8 @@ def _call_watchers(sim: Simulation) -> bool:
     due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
     if due:
         output.settle(sim)  # they may look at files
+        if sim.energy is not None:
+            sim.energy.pause(sim)
     for task in due:
         with sim.timers.around("callback"):
             enough |= bool(task.run())
@@ -297,6 +327,8 @@ def _call_watchers(sim: Simulation) -> bool:
         sim.refresh_tables()
     else:
         prepare(sim, dt_known=True)
+    if sim.energy is not None:
+        sim.energy.begin(sim)
     return sim.comm.any(enough)
 
 
@@ -305,14 +337,15 @@ def _answer(sim: Simulation, request: int) -> None:
     what = sim.stop.decide(request)
     if what == "none":
         return
-    path = output.write_checkpoint(sim)
+    path = output.write_checkpoint(sim, automatic=what == "auto")
     if what == "stop":
         raise StoppedWithCheckpoint(
             f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
             f"go on with {sim.goes_on_with}"
         )
     if sim.log is not None:
-        sim.log.info(f"step {sim.clock.step}: checkpoint {path} written on request")
+        why = "as the last one was long ago" if what == "auto" else "on request"
+        sim.log.info(f"step {sim.clock.step}: checkpoint {path} written {why}")
 
 
 def _warn_about_late_lists(sim: Simulation, progress: dict) -> None:

@@ -10,7 +10,7 @@ from hpcdem.errors import CommandError
 from hpcdem.physics.dem.mass import SPHERES
 from hpcdem.simulation import Simulation
 
-INTERVALS = ("stepbar", "save", "print", "ps", "vtk")
+INTERVALS = ("stepbar", "save", "print", "ps", "vtk", "energy")
 POSITIVE = ("dt", "frac", "gentry")
 CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both")}
 
@@ -36,6 +36,8 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         setattr(s, name, max(int(value), 0))
         if name == "stepbar" and sim.log is not None:
             sim.log.set_interval(explicit=s.stepbar > 0)
+        if name == "energy" and s.energy == 0:
+            sim.energy = None
     elif name == "lsm":
         if value < 0.0:
             raise CommandError(f"SET damp lsm must not be negative, got {value:g}")

@@ -40,6 +40,11 @@ class PropertyTable:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def describe(self, row: int) -> str:
+        """A row in words: its columns other than 0, ``density 2500, kn 1e+07``."""
+        values = zip(self.rows.dtype.names or (), self.rows[row].tolist())
+        return ", ".join(f"{name} {value:g}" for name, value in values if value) or "no properties"
+
     def as_floats(self) -> np.ndarray:
         """The table as (n, columns) f8 for the kernels."""
         return self.rows.view(np.float64).reshape(len(self.rows), -1).copy()

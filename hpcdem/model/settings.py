@@ -21,6 +21,7 @@ class Settings:
     print: int = 0
     ps: int = 0
     vtk: int = 0
+    energy: int = 0
     seed: int = 5
     wallside: str = "both"
     gentry: float = 0.0

@@ -75,6 +75,25 @@ def rounded(bins: np.ndarray) -> float:
         return math.inf if total > 0 else -math.inf
 
 
+def as_integer(bins: np.ndarray) -> int | None:
+    """The exact value of `bins` (2, 2112) i8 in units of 2**-1133, or None if a value was not finite.
+
+    Integers have no size and no order: bins that are emptied into one now and then never run out of room.
+    """
+    if bins[1, 0]:
+        return None
+    used = np.flatnonzero(bins.any(axis=0)).tolist()
+    return sum(((int(bins[0, slot]) << _LOW) + int(bins[1, slot])) << slot for slot in used)
+
+
+def from_integer(total: int) -> float:
+    """The double nearest to an integer of `as_integer`."""
+    try:  # int / int is correctly rounded in Python
+        return total / (1 << (_SHIFT + 53))
+    except OverflowError:
+        return math.inf if total > 0 else -math.inf
+
+
 def rounded_sums(bins: np.ndarray, comm: Any) -> np.ndarray:
     """Sums over all ranks of bins (k, 2, 2112) i8, each correctly rounded, (k,) f8. Collective.
 

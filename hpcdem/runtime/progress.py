@@ -112,6 +112,10 @@ class Log:
             self._warned.add(key)
             self.warn(text)
 
+    def has_warned(self, key: str) -> bool:
+        """Whether `warn_once` has been called with this key; ask rank 0."""
+        return key in self._warned
+
     def _print(self, text: str) -> None:
         if self._bar is not None:
             self._bar.print(text)
@@ -224,12 +228,19 @@ class Log:
         if not self._speaks:
             return summary
         self.command_finished()
-        if self._terminal:
-            print_table(summary, self._stream)
-        else:
-            self._print(stage_text(summary))
+        self.table("", HEADINGS, stage_rows(summary))
         self._print(closing_line(summary))
         return summary
+
+    def table(self, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """A table, drawn on a terminal, aligned text in a file; the first column to the left, the others to the
+        right."""
+        if not self._speaks:
+            return
+        if self._terminal:
+            print_table(title, headings, rows, self._stream)
+        else:
+            self._print((f"{title}\n" if title else "") + aligned(headings, rows))
 
 
 def bonds(status: StepStatus) -> str:
@@ -263,10 +274,10 @@ def stage_rows(summary: Summary) -> list[tuple[str, ...]]:
     return rows
 
 
-def stage_text(summary: Summary) -> str:
-    """The table in aligned plain text."""
-    table = [HEADINGS, *stage_rows(summary)]
-    widths = [max(len(row[i]) for row in table) for i in range(len(HEADINGS))]
+def aligned(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in aligned plain text."""
+    table = [headings, *rows]
+    widths = [max(len(row[i]) for row in table) for i in range(len(headings))]
     lines = []
     for first, *others in table:
         cells = [first.ljust(widths[0]), *(c.rjust(w) for c, w in zip(others, widths[1:], strict=True))]
@@ -290,15 +301,15 @@ def closing_line(summary: Summary) -> str:
 # -- terminal --------------------------------------------------------------------------------------------------
 
 
-def print_table(summary: Summary, stream: TextIO) -> None:
-    """The table of stages, drawn."""
+def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], stream: TextIO) -> None:
+    """The table, drawn."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table()
-    for i, name in enumerate(HEADINGS):
+    table = Table(title=title or None)
+    for i, name in enumerate(headings):
         table.add_column(name, justify="right" if i else "left")
-    for row in stage_rows(summary):
+    for row in rows:
         table.add_row(*row)
     Console(file=stream).print(table)
 

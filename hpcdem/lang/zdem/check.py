@@ -141,8 +141,11 @@ def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | 
         found.append((f"{data}/all_<last step>.jpg", "picture of the last frame"))
     for s in statements:
         if s.command == "HIST":
-            what = "kinetic energy" if "kinetic" in s.arguments else "step"
+            names = {"kinetic": "kinetic energy", "step": "step", "energy": "kinetic and elastic energy"}
+            what = next(what for name, what in names.items() if name in s.arguments)
             found.append((f"{data}/hist_{s.get('id')}.dat", f"line {s.line}: {what}"))
+        elif s.command == "SET" and s.get("energy", 0) > 0:
+            found.append((f"{data}/energy.csv", f"line {s.line}: the energy budget"))
         elif s.command == "PLOT":
             found.append((f"{data}/hist_{s.get('y')}_vs_{s.get('x')}.txt", f"line {s.line}: history against history"))
     return found

@@ -13,7 +13,7 @@ from typing import Any
 
 from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.zdem.parser import Script, parse_text
-from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2
+from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, RECORDED
 from hpcdem.lang.zdem.statement import Statement
 from hpcdem.selection import Selection, has_expressions, number
 
@@ -56,6 +56,20 @@ def refuse_lost_files(script: Script, outdir: Path | None = None) -> None:
             raise statement.error(f"{statement.get('file')} is a folder, expected a file name")
         if not path.parent.is_dir() and os.path.normpath(path.parent) not in map(os.path.normpath, results):
             raise statement.error(f"there is no folder {path.parent} to write {path.name} into")
+
+
+def refuse_escapes(script: Script, folder: Path) -> None:
+    """ScriptError at the first file name that leads out of the folder of the script and that of the results. For
+    scripts that came with a checkpoint: whoever goes on with a run of others did not write them."""
+    allowed = [path.resolve() for path in (script.directory, folder)]
+    for statement in script.statements:
+        for word in ("file", "outdir"):
+            name = statement.get(word)
+            if name and not any((script.directory / name).resolve().is_relative_to(root) for root in allowed):
+                raise statement.error(
+                    f"{name} is outside of {script.directory}, and this script was taken from a checkpoint; to run it, "
+                    "give the script itself: hpcdem SCRIPT --resume"
+                )
 
 
 class Interpreter:
@@ -295,7 +309,7 @@ def _sav(call: _Call) -> None:
 
 
 def _hist(call: _Call) -> None:
-    what = "kinetic" if "kinetic" in call.arguments else "step"
+    what = next(name for name in RECORDED if name in call.arguments)
     call.verbs.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
 
 

@@ -17,6 +17,9 @@ BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")
 BOND_MODEL_2 = ("n_bond", "s_bond")
 BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext")
 
+RECORDED = ("kinetic", "step", "energy")
+"""What HIST follows."""
+
 
 def check_statement(statement: Statement) -> None:
     """ScriptError if the words of the line do not fit together."""
@@ -105,8 +108,8 @@ def _imple(s: Statement) -> None:
 
 
 def _hist(s: Statement) -> None:
-    if ("kinetic" in s.arguments) == ("step" in s.arguments):
-        raise s.error("say what to record: kinetic or step")
+    if sum(name in s.arguments for name in RECORDED) != 1:
+        raise s.error(f"say what to record: {', '.join(RECORDED[:-1])} or {RECORDED[-1]}")
 
 
 def _output(s: Statement) -> None:

@@ -65,6 +65,21 @@ def tangent_normal_stiffness(model, a, two_rt, u):
 
 
 @njit(cache=True, error_model="numpy")
+def normal_energy(model, fn, u):
+    """Elastic energy [J] of a normal force fn at overlap u: the integral of Fn dU from 0.
+
+    2/5 Fn U for Fn ~ U^(3/2) (HERTZ), Fn U / 2 for a spring; open bonds are springs, whatever the contact.
+    """
+    return 0.4 * fn * u if model == HERTZ else 0.5 * fn * u
+
+
+@njit(cache=True, error_model="numpy")
+def shear_energy(fs, ks):
+    """Elastic energy [J] of a shear force in a spring of the present stiffness: Fs^2 / (2 ks); 0 without stiffness."""
+    return 0.5 * fs * fs / ks if ks > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def coulomb(fs, limit):
     """Shear force cut to |Fs| <= limit. Adding 0.0 turns -0.0 into 0.0, so that an empty history is all zero bits."""
     if fs > limit:

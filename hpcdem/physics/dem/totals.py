@@ -28,14 +28,15 @@ def pairs(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_
     """Block t: the sizes of its normal forces |Fn| into bins (2, 2112) i8, the tangent normal stiffness of touching
     pairs added to its owned particles, stiffness (n_own,) f8 [N/m].
 
-    Returns how many pairs touch or are bonded; each pair counts once in the whole model, in the sum too.
+    Returns how many pairs touch or are bonded, and the largest overlap over the smaller radius; each pair counts once
+    in the whole model, in the sum too.
     """
     cut, lo, _, poff, _ = blocks
     a, b = cut[t], cut[t + 1]
     p = poff[t] - lo[t]
     forces = np.empty(_ROOM)
     bits = forces.view(np.int64)
-    n, count = 0, 0
+    n, count, deepest = 0, 0, 0.0
     for i in range(lo[t], b):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
@@ -70,22 +71,28 @@ def pairs(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_
                 forces[n] = abs(fn)
                 n += 1
                 count += 1
+                deepest = max(deepest, u / min(ri, rj))
     _empty_into(bins, n, bits)
-    return count
+    return count, deepest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_wall_stiffness(n, wall_contacts, wall_stiffness, ihot, slot_row, slot_wall, n_left, stiffness):
-    """Add the stiffness [N/m] of n wall contacts (gid, wall row) to their particles, stiffness (n_own,) f8.
+def add_wall_stiffness(
+    n, wall_contacts, wall_stiffness, overlaps, hot, ihot, slot_row, slot_wall, n_left, stiffness
+):  # fmt: skip
+    """Add the stiffness [N/m] of n wall contacts (gid, wall row) to their particles, stiffness (n_own,) f8; returns the
+    largest overlap over radius.
 
     The contacts are some of the slots, in the order of the slots.
     """
-    k = 0
+    k, deepest = 0, 0.0
     for c in range(n):
         while ihot[slot_row[k], GID] != wall_contacts[c, 0] or slot_wall[k] != wall_contacts[c, 1]:
             k += 1
         stiffness[slot_row[k] - n_left] += wall_stiffness[c]
+        deepest = max(deepest, overlaps[c] / hot[slot_row[k], RADIUS])
         k += 1
+    return deepest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

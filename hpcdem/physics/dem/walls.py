@@ -42,7 +42,7 @@ def closest(wall, x, y):
 
 
 @njit(cache=True, error_model="numpy")
-def _geometry(wall, x, y, r, side):
+def geometry(wall, x, y, r, side):
     """Contact of a disc with a wall: (where, side, n_x, n_y, overlap, nearest point). where is NONE without contact.
 
     n points from the particle to the wall. `side` is the stored side (+1 left, -1 right, 0 none yet).
@@ -77,7 +77,7 @@ def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py
     for q in range(first, last):
         if q == k:
             continue
-        where, _, _, _, _, qx, qy = _geometry(walls[slot_wall[q]], x, y, r, slot_side[q])
+        where, _, _, _, _, qx, qy = geometry(walls[slot_wall[q]], x, y, r, slot_side[q])
         if where == FACE:
             _, _, qx, qy = closest(walls[slot_wall[q]], px, py)
         if where != NONE and abs(qx - px) <= 1e-9 * r and abs(qy - py) <= 1e-9 * r and (where == FACE or q < k):
@@ -86,18 +86,25 @@ def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py
 
 
 @njit(cache=True, error_model="numpy")
-def _contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
-    """Geometry and law of wall slot k: (where, side, n_x, n_y, U, Fn, ks, friction)."""
-    i = slot_row[k]
-    w = slot_wall[k]
-    x, y, r = hot[i, X], hot[i, Y], hot[i, RADIUS]
-    where, side, nx, ny, u, qx, qy = _geometry(walls[w], x, y, r, slot_side[k])
+def meeting(k, first, last, x, y, r, walls, slot_wall, slot_side):
+    """Geometry of wall slot k, of a particle with the slots first : last and this place and radius: (where, side, n_x,
+    n_y, U)."""
+    where, side, nx, ny, u, qx, qy = geometry(walls[slot_wall[k]], x, y, r, slot_side[k])
     if where > FACE and _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, qx, qy):
         where = NONE
         side = 0.0
+    return where, side, nx, ny, u
+
+
+@njit(cache=True, error_model="numpy")
+def contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
+    """Geometry and law of wall slot k: (where, side, n_x, n_y, U, Fn, ks, friction)."""
+    i = slot_row[k]
+    r = hot[i, RADIUS]
+    where, side, nx, ny, u = meeting(k, first, last, hot[i, X], hot[i, Y], r, walls, slot_wall, slot_side)
     if where == NONE:
         return where, side, nx, ny, u, 0.0, 0.0, 0.0
-    law = laws_table[w * n_mat + ihot[i, MATERIAL]]
+    law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
     fn, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
     return where, side, nx, ny, u, fn, ks, law[MU]
 
@@ -120,7 +127,7 @@ def _block(
             last += 1
         vx, vy, w, r = hot[i, VX], hot[i, VY], hot[i, SPIN], hot[i, RADIUS]
         for k in range(first, last):
-            where, side, nx, ny, u, fn, ks, mu = _contact(
+            where, side, nx, ny, u, fn, ks, mu = contact(
                 k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
             )
             new_side[k] = side
@@ -172,7 +179,7 @@ def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table
         while last < len(slot_row) and slot_row[last] == slot_row[first]:
             last += 1
         for k in range(first, last):
-            where, _, nx, ny, u, fn, _, _ = _contact(
+            where, _, nx, ny, u, fn, _, _ = contact(
                 k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
             )
             if where == NONE:

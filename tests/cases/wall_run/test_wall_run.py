@@ -80,6 +80,17 @@ def test_v24_the_manuals_list_of_ini_files(tmp_path):
     assert names(tmp_path, ".dat") == stems(5, 36, 58, ini=(0, 5, 6, 36, 56))
 
 
+def test_frames_of_a_step_are_written_anew_when_the_model_was_changed(tmp_path):
+    """By the next command, if the one before has made no step."""
+    sim = flight(tmp_path)
+    running.imple(sim, 4, xmove=0.0)
+    properties.prop(sim, xv=-7.0)
+    running.imple(sim, 4, xmove=0.0)
+    assert names(tmp_path, ".dat") == stems(0, ini=(0,))
+    for path in (tmp_path / "data").glob("all_*"):
+        assert read_frame(path).tables["particles"].columns["vx"] == [-7.0]
+
+
 @pytest.mark.parametrize(("way", "steps"), [(0.1, 1), (0.14, 1), (0.16, 2), (0.7, 7), (0.04, 0), (1e-9, 0)])
 def test_the_number_of_steps_is_the_nearest_one(tmp_path, way, steps):
     sim = flight(tmp_path)
