@@ -10,7 +10,7 @@ import pytest
 
 from tests.conftest import ROOT
 
-PROGRAMS = [ROOT / "scripts" / "run", ROOT / "scripts" / "test", ROOT / ".ci" / "run"]
+PROGRAMS = [ROOT / "scripts" / "run", ROOT / "scripts" / "test", ROOT / "scripts" / "faults", ROOT / ".ci" / "run"]
 
 
 @pytest.mark.parametrize("script", [*PROGRAMS, ROOT / "scripts" / "lib" / "setup.sh"], ids=lambda path: path.name)

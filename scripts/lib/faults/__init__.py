@@ -1,0 +1,1 @@
+"""A fault campaign: small runs are disturbed, gone on with, and compared with the undisturbed run."""

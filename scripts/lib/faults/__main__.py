@@ -1,0 +1,5 @@
+"""`python -m faults`: see cli.py."""
+
+from faults.cli import main
+
+main()

@@ -1,0 +1,130 @@
+"""Checkpoints that are no good when the run is to go on."""
+
+from __future__ import annotations
+
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+
+from faults import judge
+from faults.case import DONE, USAGE, Case
+from faults.kinds import kind
+
+
+def _stopped(case: Case) -> list[Path]:
+    """A run that was killed after its second checkpoint; the checkpoints, the last one last."""
+    if not case.data.exists() or len(list(case.data.glob("*.sav"))) < 3:
+        job = case.start()
+        number = case.rng.randint(3, 20)
+        case.until(lambda: len(list(case.data.glob("*.sav"))) >= number, job, 0.005)
+        for pid in job.rank_pids():
+            job.signal(pid, signal.SIGKILL)
+        case.end(job, quiet=job.ranks > 1)
+    return sorted(case.data.glob("*.sav"))
+
+
+def _damaged(case: Case, damage: Callable[[bytearray], bytes | bytearray]) -> None:
+    """One checkpoint, or the last few, are damaged; the run goes on from the last one that is whole."""
+    found = _stopped(case)
+    for path in found[-case.rng.choice((1, 1, 1, 2, 3)) :]:
+        case.moments.append(judge.reached(case.data))
+        path.write_bytes(damage(bytearray(path.read_bytes())))
+    _goes_on(case, found)
+
+
+def _goes_on(case: Case, damaged: list[Path]) -> None:
+    """What could not be taken is named; it stays as it is, and may be written anew."""
+    case.spoiled |= {path.name for path in damaged}
+    expected = judge.newest(case.data)
+    job = case.start()
+    case._expected = expected
+    case.end(job, {DONE})
+    case.spoiled -= {path.name for path in damaged if judge.newest(case.data) is not None and _whole(path)}
+
+
+def _whole(path: Path) -> bool:
+    from hpcdem.errors import HpcdemError
+    from hpcdem.io import checkpoint
+
+    try:
+        checkpoint.read(path)
+    except (HpcdemError, OSError):
+        return False
+    return True
+
+
+@kind(".sav cut", "the last checkpoints are cut at random lengths")
+def cut(case: Case) -> None:
+    _damaged(case, lambda data: data[: case.rng.randrange(len(data))])
+
+
+@kind(".sav with a wrong bit", "one bit of the last checkpoints, anywhere in the file, is the other one")
+def bit(case: Case) -> None:
+    def flip(data: bytearray) -> bytearray:
+        data[case.rng.randrange(len(data))] ^= 1 << case.rng.randrange(8)
+        return data
+
+    _damaged(case, flip)
+
+
+@kind(".sav with a wrong byte", "one byte of the last checkpoints is another one")
+def byte(case: Case) -> None:
+    def change(data: bytearray) -> bytearray:
+        data[case.rng.randrange(len(data))] ^= case.rng.randint(1, 255)
+        return data
+
+    _damaged(case, change)
+
+
+@kind(".sav with an empty page", "4 KiB of the last checkpoints are zeros, as a lost page of the disk leaves them")
+def page(case: Case) -> None:
+    def blank(data: bytearray) -> bytearray:
+        first = case.rng.randrange(len(data) // 4096) * 4096
+        data[first : first + 4096] = bytes(len(data[first : first + 4096]))
+        return data
+
+    _damaged(case, blank)
+
+
+@kind(".sav emptied or foreign", "the last checkpoints are empty, random bytes, text, or another HDF5 file")
+def foreign(case: Case) -> None:
+    frame = next(case.world.reference.data.glob("*.vtkhdf")).read_bytes()
+    texts = (b"", case.rng.randbytes(5000), b"no checkpoint at all\n" * 50, frame)
+    _damaged(case, lambda data: case.rng.choice(texts))
+
+
+@kind(".sav of the future", "the last checkpoint has a later version of the layout: it is passed over")
+def future(case: Case) -> None:
+    found = _stopped(case)
+    case.moments.append(judge.reached(case.data))
+    with h5py.File(found[-1], "r+") as file:
+        file.attrs["version"] = 99
+    _goes_on(case, found)
+
+
+@kind(".sav missing", "the last checkpoints were removed: the one before is taken; without any, the beginning")
+def missing(case: Case) -> None:
+    found = _stopped(case)
+    case.moments.append(judge.reached(case.data))
+    for path in found[-case.rng.choice((1, 2, len(found))) :]:
+        path.unlink()
+
+
+@kind(".sav of another script", "a later checkpoint of another script lies in the folder: refused by the line in which "
+      "the two differ, and the run goes on when it is gone")  # fmt: skip
+def another(case: Case) -> None:
+    _stopped(case)
+    last = sorted(case.world.other.data.glob("*.sav"))[-1]
+    place = case.data / ("9" + last.name[1:])
+    shutil.copyfile(last, place)
+    case.moments.append(judge.reached(case.data))
+    case.spoiled.add(place.name)
+    job = case.start()
+    case._expected = None
+    case.end(job, {USAGE}, "must not be changed")
+    case.refused = True
+    place.unlink()
+    case.spoiled.discard(place.name)

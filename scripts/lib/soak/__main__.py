@@ -1,0 +1,5 @@
+"""`python -m soak`: see cli.py."""
+
+from soak.cli import main
+
+main()
