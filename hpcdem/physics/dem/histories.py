@@ -187,12 +187,12 @@ def _hand_out(
             q = U(at[U(i - n_left)])
             at[U(i - n_left)] = q + U(1)
             bits[q, PARTNER], bits[q, BOND] = ihot[U(j), GID], bond[k]
-            rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k]
+            rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k] if bond[k] != 0 else 0.0  # nothing of broken ones
         if a <= j < b:
             q = U(at[U(j - n_left)])
             at[U(j - n_left)] = q + U(1)
             bits[q, PARTNER], bits[q, BOND] = ihot[U(i), GID], bond[k]
-            rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k]
+            rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k] if bond[k] != 0 else 0.0  # nothing of broken ones
     for k in range(wptr[t], wptr[t + 1]):
         if slot_fs[k] != 0.0 or slot_side[k] != 0.0:
             q = at[slot_row[k] - n_left]

@@ -47,7 +47,7 @@ def plan(number: int, seed: int, kinds: list[Kind], most_ranks: int) -> list[tup
         if rare and index % RARE == RARE - 1:
             first = rare[(index // RARE) % len(rare)]
         else:
-            first = often[index % len(often)]
+            first = often[(index - index // RARE) % len(often)]
         chain = [first]
         while len(chain) < 3 and rng.random() < 0.15 and first.name not in FIRST_ONLY:
             chain.append(KINDS[rng.choice(CHAINED)])

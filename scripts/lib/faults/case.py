@@ -155,7 +155,7 @@ class Case:
         """Go on without any fault, to the same end."""
         before = set() if self.gone else judge.final_names(self.data)
         self.gone = False
-        if not self._done():
+        if not self.done():
             self.end(self.start(), {DONE})
         self.kept(before)
         for why in judge.other_end(self.data, self.world.reference, self.spoiled):
@@ -163,7 +163,8 @@ class Case:
         if not self.problems and self.lost > 2 * LAST:
             self.problem(f"{self.lost} steps were done twice")
 
-    def _done(self) -> bool:
+    def done(self) -> bool:
+        """Whether the last run came to its end."""
         names = [name for name in self.world.reference.names if name.endswith((".dat", ".txt"))]
         return all((self.data / name).exists() for name in names) and bool(self.jobs) and self._last_code() == DONE
 

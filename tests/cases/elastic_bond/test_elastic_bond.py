@@ -182,6 +182,17 @@ def test_break_command_leaves_an_ordinary_contact(tmp_path):
     assert pair(sim) is None
 
 
+def test_a_broken_bond_leaves_no_trace_but_the_shear_force(tmp_path):
+    """What a contact remembers is the same whether its bond broke before or after a restart."""
+    sim = bonded(tmp_path, 1.0)
+    shear(sim, 1.0)
+    assert sim.lists.histories(sim.particles.ihot).extra.all(), "bonds remember the overlap they were made at"
+    bonds.break_bonds(sim)
+    steps(sim, 1)
+    remembered = sim.lists.histories(sim.particles.ihot)
+    assert remembered.counts().tolist() == [1, 1] and not remembered.extra.any()
+
+
 def test_a_bond_made_across_a_gap_starts_in_tension(tmp_path):
     sim = model(tmp_path, disk="off")
     particles.ball(sim, 0, 0.0, 0.0, exact.RADIUS)
