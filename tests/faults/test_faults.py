@@ -312,7 +312,9 @@ def test_two_runs_in_one_folder(launch, script, undisturbed, wait_until):
     data = script.parent / "data"
     job = launch.start(1, script, "--no-figure", cwd=script.parent)
     wait_until(lambda: checkpoints(data), 120, "the first checkpoint")
+    os.kill(job.pid, signal.SIGSTOP)  # or it might be done before the other has begun
     second = launch(1, script, "--no-figure", cwd=script.parent)
+    os.kill(job.pid, signal.SIGCONT)
     assert second.returncode == 2
     assert second.stderr.count("another run is writing into") == 1 and "pile.py" in second.stderr
     out, err = job.communicate(timeout=120)
