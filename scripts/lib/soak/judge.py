@@ -9,15 +9,20 @@ from typing import Any
 
 import numpy as np
 
-MEMORY = 1.0
-"""Most memory a rank may take on, MB per million steps; and least that is told from noise, MB over the whole run."""
+MEMORY, NOISE = 1.0, 3.0
+"""Most memory a rank may take on, MB per million steps; and least that is told from noise in a run that is judged over
+less than a million, MB: libraries take half a megabyte at a time, and three times in the first 100 000 steps."""
 OBJECTS, FILES = 200, 0.5
 """Objects of Python and open files by which a run may grow by chance: one table more, a cache that fills."""
 NAMES = {"rss_mb": "megabytes", "objects": "objects", "files": "open files"}
-MOMENTUM = 1e-9
-"""Largest part of the impulse of gravity that may be missing from the balance: what rounding leaves is 1e-12 of it."""
-DRIFT = 3.0
-"""Largest ratio of the mean kinetic energy of the last and the first third: the load repeats itself."""
+MOMENTUM = 1e-13
+"""Largest part of the impulse of gravity that may be missing from the balance: what rounding leaves is 1e-15 of it."""
+KINETIC = (1e-3, 1e-2)
+"""Mean kinetic energy of a line of at least LONG steps over what the fall can give: found were 0.0024 to 0.0033 in the
+first 100 000 steps. In shorter lines turns follow each other quickly, and only the fall itself is a limit."""
+LONG = 10_000
+DRIFT = 1.5
+"""Largest ratio of the mean kinetic energy of the last and the second third: the load repeats itself."""
 FULL = 60
 """Lines from which on means of the kinetic energy are compared; a short run never comes to repeat itself."""
 
@@ -45,7 +50,11 @@ def growth(late: list[Row]) -> list[str]:
     """Memory, objects, open files."""
     found = []
     span = (late[-1]["step"] - late[0]["step"]) * 1e-6
-    for name, unit, room in (("rss_mb", "MB", MEMORY * max(span, 1.0)), ("objects", "", OBJECTS), ("files", "", FILES)):
+    for name, unit, room in (
+        ("rss_mb", "MB", MEMORY * span if span >= 1.0 else NOISE),
+        ("objects", "", OBJECTS),
+        ("files", "", FILES),
+    ):
         for rank, slope in enumerate(slopes(late, name)):
             if slope * span > room:
                 what, first, last = NAMES[name], late[0][name][rank], late[-1][name][rank]
@@ -64,8 +73,12 @@ def balance(rows: list[Row]) -> list[str]:
     if not worst <= MOMENTUM:
         found.append(f"{worst:.2g} of the impulse is missing from the balance of momentum, at most {MOMENTUM}")
     energy = np.array([row["kinetic"] / row["kinetic_limit"] for row in rows])
-    if not (np.all(energy > 0.0) and np.all(energy <= 1.0)):
-        found.append(f"kinetic energy between {energy.min():.3g} and {energy.max():.3g} of what the fall can give")
+    least, most = KINETIC if rows[0]["step"] >= LONG else (0.0, 1.0)
+    if not (np.all(energy > least) and np.all(energy <= most)):
+        found.append(
+            f"kinetic energy between {energy.min():.3g} and {energy.max():.3g} of what the fall can give, not between "
+            f"{least:g} and {most:g}"
+        )
     third = len(rows) // 3
     if len(rows) >= FULL:
         ratio = energy[-third:].mean() / energy[third : 2 * third].mean()
