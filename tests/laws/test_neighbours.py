@@ -149,7 +149,7 @@ def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds):
 @pytest.mark.parametrize("n_blocks", [1, 3])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
 def test_what_is_put_in_comes_out(seed, columns, bonds, n_blocks):
-    """Everything that is not nothing, walls after pairs."""
+    """Everything that is not nothing, walls after pairs; the overlap at bonding only where there is a bond."""
     model = Model(seed, ranks_columns=columns, bonds=bonds)
     hist = model.build(n_blocks).histories(model.hot.view(np.int64))
     shown = {(i, j) for i, j, *_ in model.expected()}
@@ -158,7 +158,8 @@ def test_what_is_put_in_comes_out(seed, columns, bonds, n_blocks):
         found = list(zip(hist.partner[rows], hist.fs[rows], hist.extra[rows], hist.bond[rows]))
         partners = [j for j in range(len(model.gid)) if (min(i, j), max(i, j)) in shown]
         names = [model.gid[j] for j in partners] + [-1 - w for w in range(len(WALLS))]
-        expected = [(name, *model.memory[model.gid[i], name]) for name in names if (model.gid[i], name) in model.memory]
+        put_in = [(name, *model.memory[model.gid[i], name]) for name in names if (model.gid[i], name) in model.memory]
+        expected = [(name, fs, extra if bond or name < 0 else 0.0, bond) for name, fs, extra, bond in put_in]
         assert sorted(found) == sorted(expected)
         assert [partner < 0 for partner, *_ in found] == sorted(partner < 0 for partner, *_ in found)
 
