@@ -2,7 +2,8 @@
 
 Layout: attributes `format`, `version`, `state` (JSON: everything that is not a table) on the root; one group per table,
 one dataset per column. The root attribute `sums` (JSON) holds a checksum of each dataset, and `crc` the CRC-32 of
-`state` and `sums`; they are compared after writing, before the file gets its name, and again on reading.
+`state` and `sums`; they are compared after writing, before the file gets its name, and again on reading. Behind the
+HDF5 part is a seal (`io/seal.py`), which is looked at first.
 
 A file of an earlier version of this layout is read by all later programs; one of a later version is refused.
 
@@ -11,6 +12,7 @@ A file of an earlier version of this layout is read by all later programs; one o
 | 1 | checksums of datasets: sum of their 64-bit words |
 | 2 | `crc` |
 | 3 | each word is mixed with its place before it is added up, so that rows that changed places are noticed too |
+| 4 | the seal |
 """
 
 from __future__ import annotations
@@ -18,18 +20,19 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from hpcdem.errors import HpcdemError
+from hpcdem.io import seal
 from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to
 
 FORMAT = "hpcdem checkpoint"
-VERSION = 3
+VERSION = 4
 
 
 _PART = 1 << 18
@@ -79,6 +82,7 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
 
     def read_back(temporary: str) -> None:
         try:
+            _seal(temporary, list(columns))
             read(temporary)
         except HpcdemError as failure:
             raise HpcdemError(f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}") from None
@@ -127,9 +131,22 @@ def version_of(path: str | os.PathLike) -> int:
         return int(file.attrs["version"])
 
 
+def _seal(path: str | os.PathLike, names: Sequence[str]) -> None:
+    """Put a seal on a finished file with these datasets."""
+    with reading(path) as file:
+        rows = [(file[name].id.get_offset() or 0, int(file[name].nbytes)) for name in names]
+    seal.put(path, rows)
+
+
 @contextmanager
 def _opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any], dict[str, int], Callable]]:
     """The open file, its state, the checksums of its datasets, and the function that makes them."""
+    try:
+        sealed = seal.check(path)
+    except seal.Broken as problem:
+        raise HpcdemError(f"{os.fspath(path)} is damaged: {problem}") from None
+    except OSError:
+        sealed = False  # `reading` says why it cannot be opened
     with reading(path) as file:
         try:
             if file.attrs.get("format") != FORMAT:
@@ -139,6 +156,8 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any], dict
                 raise HpcdemError(
                     f"{os.fspath(path)} has checkpoint version {version}, this program reads up to {VERSION}"
                 )
+            if version > 3 and not sealed:
+                raise HpcdemError(f"{os.fspath(path)} is damaged: its seal is missing")
             texts = {name: str(file.attrs[name]) for name in ("state", "sums")}
             if version > 1 and int(file.attrs["crc"]) != _crc(**texts):
                 raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of its state is wrong")

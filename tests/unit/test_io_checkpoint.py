@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 
 from hpcdem.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
-from hpcdem.io import checkpoint
+from hpcdem.io import checkpoint, seal
 from hpcdem.io.frame import Table
 
 STATE = {"clock": {"step": 12, "time": 0.1}, "script": "START\n", "position": 3}
@@ -29,6 +31,15 @@ def file(tmp_path: Path) -> Path:
     path = tmp_path / "0000000012.sav"
     checkpoint.write(path, STATE, tables(), SerialComm())
     return path
+
+
+@contextmanager
+def resealed(path: Path) -> Iterator[h5py.File]:
+    """The file, to be changed, and sealed again then, as if it had been written so."""
+    with h5py.File(path, "r+") as opened:
+        yield opened
+        names = list(json.loads(opened.attrs["sums"]))
+    checkpoint._seal(path, names)
 
 
 def test_it_comes_back(file):
@@ -56,7 +67,7 @@ def test_long_arrays_are_summed_in_parts(monkeypatch):
 
 def test_rows_that_changed_places_are_noticed(file):
     """The sum of words, as earlier versions had it, does not see them."""
-    with h5py.File(file, "r+") as opened:
+    with resealed(file) as opened:
         x = opened["particles/x"][...]
         before = checkpoint.word_sum(x)
         x[[3, 4]] = x[[4, 3]]
@@ -68,7 +79,7 @@ def test_rows_that_changed_places_are_noticed(file):
 
 @pytest.mark.parametrize("bit", range(0, 64, 7))
 def test_one_bit_is_noticed(file, bit):
-    with h5py.File(file, "r+") as opened:
+    with resealed(file) as opened:
         gid = opened["particles/gid"][...]
         gid.view(np.uint64)[500] ^= np.uint64(1 << bit)
         opened["particles/gid"][...] = gid
@@ -77,19 +88,20 @@ def test_one_bit_is_noticed(file, bit):
 
 
 def test_a_changed_state_is_noticed(file):
-    with h5py.File(file, "r+") as opened:
+    with resealed(file) as opened:
         opened.attrs["state"] = json.dumps(STATE | {"position": 4})
     for look in (checkpoint.read, checkpoint.read_state):
         with pytest.raises(HpcdemError, match="checksum of its state is wrong"):
             look(file)
 
 
-@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("version", [1, 2, 3])
 def test_earlier_versions_are_read(file, version):
-    """As programs of that time wrote them: sums of words, and before version 2 no crc."""
-    with h5py.File(file, "r+") as opened:
+    """As programs of that time wrote them: no seal, before version 3 sums of words, and before version 2 no crc."""
+    old = {1: checkpoint.word_sum, 2: checkpoint.word_sum, 3: checkpoint.placed_sum}
+    with h5py.File(file, "r+") as opened:  # which takes the seal off
         sums = json.loads(opened.attrs["sums"])
-        text = json.dumps({name: checkpoint.word_sum(opened[name][...]) for name in sums})
+        text = json.dumps({name: old[version](opened[name][...]) for name in sums})
         opened.attrs["sums"], opened.attrs["version"] = text, version
         opened.attrs["crc"] = checkpoint._crc(opened.attrs["state"], text)
         if version == 1:
@@ -113,3 +125,46 @@ def test_a_cut_file_is_damaged(file, length):
     file.write_bytes(file.read_bytes()[:length])
     with pytest.raises(HpcdemError):
         checkpoint.read(file)
+
+
+def test_what_describes_the_rows_is_under_seal(file):
+    """One bit of any byte outside the rows: HDF5 is not asked to read it. The last eight bytes say that there is a
+    seal; without them it is missing."""
+    whole = file.read_bytes()
+    assert seal.check(file)
+    with h5py.File(file) as opened:
+        rows = [(column.id.get_offset(), column.nbytes) for column in opened["particles"].values()]
+    rng = np.random.default_rng(4)
+    for at in rng.permutation(len(whole))[:500].tolist():
+        if any(first <= at < first + size for first, size in rows):
+            continue
+        file.write_bytes(whole[:at] + bytes([whole[at] ^ (1 << int(rng.integers(8)))]) + whole[at + 1 :])
+        if at >= len(whole) - 8:
+            assert not seal.check(file)
+        else:
+            with pytest.raises(seal.Broken):
+                seal.check(file)
+        with pytest.raises(HpcdemError, match=r"is damaged: (checksum of its description is wrong|its seal is)"):
+            checkpoint.read(file)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"", b"{}", b"[]", b"nonsense", b'{"length": 3, "rows": []}', b'{"length": 3, "rows": [[2, 9], [1, 1]]}',
+     b'{"length": 3, "rows": [[0, 1e400]]}', b'{"length": 3, "rows": [["a"]]}', b'{"length": 3, "rows": [[-5, 1]]}'],
+)  # fmt: skip
+@pytest.mark.parametrize("count", [None, 0, 2**64 - 1])
+def test_a_seal_that_makes_no_sense_is_broken(tmp_path, text, count):
+    path = tmp_path / "x"
+    path.write_bytes(b"abc" + text + seal._END.pack(len(text) if count is None else count, 7, seal.MARK))
+    with pytest.raises(seal.Broken):
+        seal.check(path)
+
+
+def test_files_without_a_seal(tmp_path):
+    path = tmp_path / "x"
+    for text in (b"", b"abc", bytes(100)):
+        path.write_bytes(text)
+        assert not seal.check(path)
+    seal.put(path, [(10, 5), (40, 60), (20, 0)])
+    assert seal.check(path)

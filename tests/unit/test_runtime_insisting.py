@@ -170,13 +170,15 @@ def test_an_event_loop_that_listens_is_not_disturbed():
 
 
 def test_nothing_is_left_behind():
-    threads = threading.active_count()
+    """Threads of tests before this one may still be ending: only those begun here are looked at."""
+    before = set(threading.enumerate())
     for _ in range(5):
         resort = LastResort()
         resort.listen()
+        assert set(threading.enumerate()) - before
         resort.close()
     end = time.monotonic() + 5.0
-    while threading.active_count() > threads and time.monotonic() < end:
+    while set(threading.enumerate()) - before and time.monotonic() < end:
         time.sleep(0.01)
-    assert threading.active_count() == threads
+    assert set(threading.enumerate()) <= before
     assert signal.set_wakeup_fd(-1) == -1
