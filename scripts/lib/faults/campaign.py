@@ -60,27 +60,31 @@ def plan(number: int, seed: int, kinds: list[Kind], most_ranks: int) -> list[tup
 
 
 def carry_out(world: World, seed: int, index: int, chain: list[Kind], ranks: tuple[int, ...]) -> Row:
-    """One case: its faults, and the way to the end."""
+    """One case: its faults, and the way to the end. Only what came before the end of a run counts as a fault."""
     began = time.monotonic()
     rng = random.Random(f"{seed}-{index}-case")
     case = Case(world, rng, world.folder / f"case{index:04d}", ranks)
     if runs.has_option("--keep") and rng.random() < 0.25:
         case.options += ["--keep", "3"]
-    skipped = ""
+    skipped, made = "", []
     try:
         for kind in chain:
+            if case.done():  # some kinds go on to the end: then there is nothing left to be disturbed
+                break
+            before = len(case.moments)
             kind.call(case)
+            made += [kind.name] if len(case.moments) > before else []
         case.finish()
     except Skipped as why:
         skipped = str(why)
     except Exception:
         case.problem("a mistake of the campaign: " + " ".join(traceback.format_exc().split("\n")[-6:]))
     result = "skipped" if skipped else "failed" if case.problems else "refused" if case.refused else "survived"
-    if not skipped and result == "survived" and not case.moments:
+    if not skipped and result == "survived" and not made:
         result = "missed"
     case.close(keep=result == "failed")
     return {
-        "kind": chain[0].name, "chain": [k.name for k in chain[1:]], "seed": f"{seed}-{index}", "ranks": list(ranks),
+        "kind": (made or [chain[0].name])[0], "chain": made[1:], "seed": f"{seed}-{index}", "ranks": list(ranks),
         "moments": case.moments, "lost": case.lost, "result": result, "why": [skipped] if skipped else case.problems,
         "folder": str(case.folder) if result == "failed" else "", "seconds": round(time.monotonic() - began, 2),
     }  # fmt: skip
