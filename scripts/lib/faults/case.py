@@ -81,13 +81,13 @@ class Case:
 
     def moment(self, job: Job, least: int = 0, begins: bool = True) -> bool:
         """Wait for a random moment of a run, at a step after `least`; False if it was over before. begins: it may also
-        be before the first step."""
+        be before the first step; else the program has taken over the signals."""
         if begins and least == 0 and self.rng.random() < 0.08:
             time.sleep(self.rng.uniform(0.0, 1.5))
         else:
             last = LAST - 2 * STEPBAR if begins else LAST - 1500  # a signal shall not come when the run is over
             target = self.rng.randint(min(max(least, judge.reached(self.data) + 1), last), last)
-            while judge.reached(self.data) < target and not job.ended():
+            while (judge.reached(self.data) < target or not (begins or job.at_work())) and not job.ended():
                 time.sleep(0.002)
             time.sleep(self.rng.uniform(0.0, 0.02))
         return self.note(job)

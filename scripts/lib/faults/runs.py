@@ -106,6 +106,11 @@ class Job:
     def ended(self) -> bool:
         return self.process.poll() is not None
 
+    def at_work(self) -> bool:
+        """Whether it has said where it begins: signals are answered from then on."""
+        said = self.output.read_bytes()
+        return b"going on from" in said or b"starting at the beginning" in said
+
     def rank_pids(self) -> list[int]:
         """Process ids of the ranks in their order; those that are there."""
         if self.ranks == 1:
