@@ -99,7 +99,8 @@ have_debian_packages() {
     if ! dpkg -s "${debian_packages[@]}" >/dev/null 2>&1; then
         if ! sudo=$(root_prefix); then say "apt-get needs root or a sudo without password"; return 1; fi
         say "Installing Debian packages for parallel HDF5, PETSc, Open MPI and Slurm (once; about a minute) ..."
-        apt_install "$sudo" || { say "apt-get could not install: ${debian_packages[*]}"; return 1; }
+        apt_install "$sudo" "${debian_packages[@]}" ||
+            { say "apt-get could not install: ${debian_packages[*]}"; return 1; }
     fi
     if ! /usr/bin/python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))'; then
         say "the system's $(/usr/bin/python3 --version) is older than 3.11"
@@ -107,7 +108,22 @@ have_debian_packages() {
     fi
 }
 
-# Another apt may be at work (a fresh cloud machine updates itself): wait for its locks, up to five minutes each.
+# A browser for the tests of the page of `hpcdem grade --serve`: one that is here, else Debian's (about half a minute;
+# Ubuntu has none of this name).
+have_browser() {
+    local sudo name
+    for name in chromium-headless-shell chromium chromium-browser google-chrome google-chrome-stable; do
+        if command -v "$name" >/dev/null; then return; fi
+    done
+    if ! apt-cache show chromium-headless-shell >/dev/null 2>&1; then say "no browser, and apt-get has none"; return 1; fi
+    if ! sudo=$(root_prefix); then say "no browser, and apt-get needs root"; return 1; fi
+    say "Installing a browser without windows for the tests of the page (once; about half a minute) ..."
+    apt_install "$sudo" chromium-headless-shell fonts-dejavu-core ||
+        { say "apt-get could not install chromium-headless-shell"; return 1; }
+}
+
+# apt_install SUDO PACKAGE...: another apt may be at work (a fresh cloud machine updates itself): wait for its locks, up
+# to five minutes each.
 apt_install() {
     local try log options=(-qq -o DPkg::Lock::Timeout=300)
     for try in {1..10}; do
@@ -116,7 +132,7 @@ apt_install() {
         if ((try < 10)); then sleep 30; fi
     done
     if ! log=$($1 env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends "${options[@]}" \
-        "${debian_packages[@]}" </dev/null 2>&1); then
+        "${@:2}" </dev/null 2>&1); then
         tail -n 20 <<<"$log" >&2
         return 1
     fi

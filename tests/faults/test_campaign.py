@@ -25,6 +25,7 @@ QUICK = (
 )  # fmt: skip
 
 
+@pytest.mark.alone
 def test_a_dozen_faults(tmp_path: Path) -> None:
     """All runs come to the same end. One rank; two runs at a time."""
     paths = [str(ROOT / "scripts" / "lib"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]

@@ -18,6 +18,8 @@ from hpcdem.runtime.insisting import LastResort
 from hpcdem.runtime.stopping import StopRequests
 from tests.conftest import ROOT
 
+pytestmark = pytest.mark.alone  # times of a second and less
+
 HANGS = """\
 import ctypes, sys
 from hpcdem.runtime import insisting
