@@ -209,6 +209,26 @@ class Simulation:
         return self._do.particles.load(self.engine, self._existing(file), scale, x, y)
 
     @_verb
+    def clump(
+        self,
+        file: str | Path,
+        x: float = 0.0,
+        y: float = 0.0,
+        angle: float = 0.0,
+        scale: float = 1.0,
+        color: str | int = 0,
+        group: str = "***",
+    ) -> int:
+        """CLUMP file: rigid bodies of discs from a clump file, scaled, turned by `angle` [rad] about its origin, moved
+        by (x, y); how many bodies."""
+        return self._do.clumps.clump(self.engine, self._existing(file), x, y, angle, scale, _color(color), group)
+
+    @_verb
+    def join(self, where: Where, group: str | None = None, color: str | int | None = None) -> int:
+        """CLUMP RANGE: make one rigid clump of the chosen particles; of how many."""
+        return self._do.clumps.join(self.engine, _selection(where), group, _color(color))
+
+    @_verb
     def delete(self, where: Where = None) -> int:
         """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
         return self._do.particles.delete(self.engine, _selection(where))
@@ -401,13 +421,16 @@ class Simulation:
         """A field of this rank's own particles (n,), read-only; valid until the next method that changes or steps.
 
         The names are those of `hpcdem.fields` (x y vx vy spin radius gid angle fx fy torque fix color group birth),
-        of materials (density fric shear poiss damp kn ks hertz), and mass, inertia.
+        of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump, which
+        is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
         """
         p, engine = self.engine.particles, self.engine
         if name == "group":
             values = np.array(engine.groups)[p["group"]]
         elif name in ("fx", "fy", "torque") and engine.closed:
             values = engine.lists.owned_forces()[:, ("fx", "fy", "torque").index(name)]
+        elif name == "clump":
+            values = p.clump.view()
         elif name in FIELDS:
             values = p[name].view()
         elif name in MATERIAL_FIELDS:
@@ -421,7 +444,11 @@ class Simulation:
         return values
 
     def __setitem__(self, name: str, values: Any) -> None:
-        """Set a field of this rank's own particles: ``sim["vx"] = 0.0``. Collective."""
+        """Set a field of this rank's own particles: ``sim["vx"] = 0.0``. Collective.
+
+        A clump takes the velocity, spin and fixed directions that are given to its first member; the places, radii and
+        angles of members cannot be set.
+        """
         if name not in SETTABLE:
             raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(SETTABLE)}")
         engine = self.engine
@@ -436,10 +463,21 @@ class Simulation:
             raise ScriptError(*_place(), "radius must be positive")
         if engine.comm.any(values.dtype.kind == "f" and not bool(np.isfinite(values).all())):
             raise ScriptError(*_place(), f"field '{name}' must be finite")
+        p = engine.particles
+        before = p[name].copy()
         try:
-            engine.particles[name][:] = values
+            p[name][:] = values
         except ValueError as error:
             raise ScriptError(*_place(), f"field '{name}' has {len(self)} values on this rank: {error}") from error
+        if engine.clumps and name in ("x", "y", "radius", "angle"):
+            changed = bool((p[name] != before)[p.clump >= 0].any())
+            if engine.comm.any(changed):
+                p[name][:] = before
+                raise ScriptError(*_place(), f"field '{name}' of members of a clump cannot be set")
+        elif engine.clumps:
+            p[name][:] = engine.clumps.of_first_members(p, p[name], engine.comm)
+            if name in ("vx", "vy", "spin"):
+                engine.clumps.set_motion(p, np.ones(len(p), bool), **{name: p[name].copy()})
         engine.look_soon()
         if name in ("radius", "fix"):
             engine.tables_changed()
@@ -558,6 +596,15 @@ class Simulation:
         table = self._table("wall_contacts")
         w = self.engine.walls
         return {**table, "wall": w.id[w.in_output_order()][table["wall"]]}
+
+    @_verb
+    def clumps(self) -> dict[str, np.ndarray]:
+        """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
+        spin, angle, area, mass, inertia, members (how many)."""
+        from hpcdem import observe
+
+        self._ready()
+        return observe.clumps(self.engine)
 
     @property
     def bonds_left(self) -> int:

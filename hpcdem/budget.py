@@ -232,6 +232,9 @@ def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
             t, p.hot, p.ihot, b.cut, b.lo, b.poff, lists.ptr, lists.partner, lists.fs, lists.bond, lists.u_made,
             sim.pair_laws, sim.bond_laws, n_mat, spheres, bins,
         )  # fmt: skip
+    if sim.clumps:
+        c = sim.clumps.bodies
+        energy.kinetic(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, whole_step, bins)
     _wall_energy(*_wall_slots(sim), sim.wall_laws, n_mat, bins)
     return bins
 
@@ -242,6 +245,9 @@ def _kicks(sim: Simulation, whole: bool, sign: float, bins: np.ndarray) -> None:
         energy.kicks(
             t, p.hot, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins
         )
+    if sim.clumps:
+        c = sim.clumps.bodies
+        energy.kicks(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins)
     if sim.walls.v.any():
         _wall_work(*_wall_slots(sim), sim.wall_laws, len(sim.materials), sign * (dt if whole else 0.5 * dt), bins)
 

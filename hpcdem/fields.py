@@ -20,6 +20,15 @@ X, Y, VX, VY, SPIN, RADIUS, MATERIAL, GID = range(8)
 # Columns of the cold row.
 ANGLE, FX, FY, TORQUE, FIX, GROUP, COLOR, BIRTH = range(8)
 
+# Columns of a third row that particles have while there are clumps: the clump (int64; that is the gid of its first
+# member, -1 for a free particle), its centre [m], velocity [m/s], spin [rad/s], angle [rad], area [m2] and polar second
+# moment of area [m4], place of the member in the frame of the clump [m], number of members (int64). What all members of
+# a clump share is equal to the last bit in all their rows.
+CLUMP, CLUMP_X, CLUMP_Y, CLUMP_VX, CLUMP_VY, CLUMP_SPIN, CLUMP_ANGLE = range(7)
+AREA, MOMENT, OFFSET_X, OFFSET_Y, MEMBERS = range(7, 12)
+CLUMP_WIDTH = 12
+FREE = -1
+
 FIX_X, FIX_Y, FIX_SPIN = 1, 2, 4
 FIX_BITS = {"x": FIX_X, "y": FIX_Y, "spin": FIX_SPIN}
 

@@ -16,10 +16,9 @@ NAMED = 10
 """Most particles named in a message."""
 
 
-def outside(particles: Particles, box: tuple[float, float, float, float]) -> np.ndarray:
-    """Flags (n_own,) of the particles whose centre has left the box (left, right, bottom, top) [m]."""
+def outside(x: np.ndarray, y: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
+    """Flags (n,) of the centres (x, y) [m] that have left the box (left, right, bottom, top) [m]."""
     left, right, bottom, top = box
-    x, y = particles["x"], particles["y"]
     return ~((x >= left) & (x <= right) & (y >= bottom) & (y <= top))
 
 

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.fields import FIELDS, GID, MATERIAL, RADIUS
+from hpcdem.fields import ANGLE, FIELDS, FIX, GID, MATERIAL, RADIUS
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.physics.dem import contacts, mass, modes, totals
+from hpcdem.physics.dem import contacts, mass, modes, rigid, totals
 from hpcdem.physics.dem import walls as wall_kernels
+from hpcdem.physics.dem.motion import CLUMPED, INERTIA, MASS
 from hpcdem.physics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
 from hpcdem.physics.fingerprint import as_text, of_rows
 from hpcdem.simulation import Simulation
@@ -74,8 +75,16 @@ def _sum_by_wall(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> np.ndarr
 def kinetic_energy(sim: Simulation) -> float:
     """Sum of (m v^2 + I w^2) / 2 over all particles [J], exactly summed. Collective."""
     bins = np.zeros((1, *BINS_SHAPE), np.int64)
-    totals.kinetic(sim.particles.hot, sim.particles.n_left, sim.body, bins[0])
+    _kinetic(sim, bins[0])
     return float(rounded_sums(bins, sim.comm)[0])
+
+
+def _kinetic(sim: Simulation, bins: np.ndarray) -> None:
+    """Kinetic energy of this rank's particles and clumps into bins (2, 2112) i8."""
+    totals.kinetic(sim.particles.hot, sim.particles.n_left, sim.body, bins)
+    if sim.clumps:
+        c = sim.clumps.bodies
+        totals.kinetic(c.hot, 0, c.body[: c.mine], bins)
 
 
 @dataclass(frozen=True)
@@ -85,7 +94,8 @@ class Totals:
     kinetic [J]; unbalanced: largest unbalanced force of a free particle over the mean normal contact force, 0 without
     contacts; contacts: pairs that touch or are bonded; critical_dt: 0.8 min sqrt(m / sum k) over the particles that are
     free to move [s], inf without contacts, k being the tangent normal stiffness of each touching contact of the
-    particle (PFC's estimate); deepest: the largest overlap of a pair or a wall contact over the (smaller) radius.
+    particle (PFC's estimate); of a clump sum k (1/m + a^2/I) takes the place of sum k / m, a being the distance of the
+    member from the centre; deepest: the largest overlap of a pair or a wall contact over the (smaller) radius.
     """
 
     kinetic: float
@@ -115,8 +125,13 @@ def survey(sim: Simulation) -> Totals:
         len(out), iout, out[:, STIFFNESS].copy(), out[:, OVERLAP].copy(), p.hot, p.ihot, lists.slot_row,
         lists.slot_wall, p.n_left, stiffness,
     )  # fmt: skip
-    totals.kinetic(p.hot, p.n_left, sim.body, bins[1])
+    _kinetic(sim, bins[1])
     largest, shortest = totals.extremes(p.icold, sim.body, lists.owned_forces(), s.gx, s.gy, stiffness)
+    if sim.clumps:
+        of_clumps = _extremes_of_clumps(sim, stiffness)
+        # Not max(): it drops NaN.
+        largest = math.nan if math.isnan(largest) or math.isnan(of_clumps[0]) else max(largest, of_clumps[0])
+        shortest = min(shortest, of_clumps[1])
     broken = math.isnan(largest)
     extremes = np.array([0.0 if broken else largest, -shortest, broken, max(deepest, deep)])
     largest, shortest, broken, deepest = comm.max_into(extremes).tolist()
@@ -127,6 +142,48 @@ def survey(sim: Simulation) -> Totals:
     if normal > 0.0:
         ratio = math.nan if broken else largest / (normal / max(touching, 1))
     return Totals(kinetic, ratio, particles, touching, 0.8 * math.sqrt(-shortest), deepest)
+
+
+def _extremes_of_clumps(sim: Simulation, stiffness: np.ndarray) -> tuple[float, float]:
+    """What totals.extremes says of the clumps of this rank; stiffness (n_own,) [N/m]: of the particles. Collective."""
+    p, c, s = sim.particles, sim.clumps.bodies, sim.settings
+    member, total = np.zeros(len(p.hot)), np.zeros(c.n)
+    member[p.owned] = stiffness
+    sim.halo.fill(member)
+    rigid.stiffness(c.start, c.row, c.arm, c.body, member, total)
+    return totals.extremes(c.cold.view(np.int64)[: c.mine], c.body[: c.mine], c.force[: c.mine], s.gx, s.gy, total)
+
+
+def clumps(sim: Simulation) -> dict[str, np.ndarray]:
+    """The clumps of the whole model, on every rank, in the order of ids: id, x, y, vx, vy, spin, angle, area, mass,
+    inertia, members (number). The model must be closed. Collective."""
+    names = ("x", "y", "vx", "vy", "spin")
+    columns: dict[str, np.ndarray] = {name: np.empty(0) for name in ("id", *names, "angle", "area", "mass", "inertia")}
+    columns["id"] = columns["members"] = np.empty(0, np.int64)
+    if sim.clumps:
+        c = sim.clumps.bodies
+        columns |= {name: c.hot[: c.mine, k] for k, name in enumerate(names)}
+        columns["id"], columns["members"] = c.hot.view(np.int64)[: c.mine, GID], np.diff(c.start)[: c.mine]
+        columns["angle"], columns["area"] = c.cold[: c.mine, ANGLE], c.area[: c.mine]
+        columns["mass"], columns["inertia"] = c.body[: c.mine, MASS], c.body[: c.mine, INERTIA]
+    parts = sim.comm.allgather({name: values.copy() for name, values in columns.items()})
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in columns}
+    order = np.argsort(whole["id"])
+    return {name: values[order] for name, values in whole.items()}
+
+
+def lightest(sim: Simulation) -> float:
+    """The least mass that a contact of a free particle or clump has to move [kg], inf if nothing is free: of a clump
+    1 / (1/m + a^2/I), a being the distance of its farthest member from the centre. Collective."""
+    p = sim.particles
+    free = (p["fix"] != 7) & (sim.body[:, CLUMPED] == 0.0)
+    masses = [sim.body[free, MASS]]
+    if sim.clumps:
+        c = sim.clumps.bodies
+        moving = c.cold.view(np.int64)[:, FIX] != 7
+        mass, inertia = c.body[moving, MASS], c.body[moving, INERTIA]
+        masses.append(1.0 / (1.0 / mass + c.reach()[moving] ** 2 / inertia))
+    return float(sim.comm.min_into(np.array([min(m.min(initial=math.inf) for m in masses)]))[0])
 
 
 @dataclass(frozen=True, order=True)
@@ -191,9 +248,18 @@ def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:
     undamped leap-frog is stable for dt < 2 / omega. Reads only. Collective.
     """
     p, lists, comm = sim.particles, sim.lists, sim.comm
-    scale, x = np.empty((len(p), 3)), np.empty((len(p), 3))
-    modes.begin(p.ihot, p.n_left, sim.body, scale, x)
-    before, length = np.zeros_like(x), math.sqrt(exact_sum(x * x, comm))
+    n_bodies, mine = (sim.clumps.bodies.n, len(p) + sim.clumps.bodies.mine) if sim.clumps else (0, len(p))
+    # Rows of particles, then of clumps; those from `mine` on are also another rank's, which counts them.
+    scale, x = np.empty((len(p) + n_bodies, 3)), np.empty((len(p) + n_bodies, 3))
+    modes.begin(p.ihot, p.n_left, sim.body, scale[: len(p)], x[: len(p)])
+    if sim.clumps:
+        c = sim.clumps.bodies
+        modes.begin(c.hot.view(np.int64), 0, c.body, scale[len(p) :], x[len(p) :])
+
+    def dot(a: np.ndarray, b: np.ndarray) -> float:
+        return exact_sum(a[:mine] * b[:mine], comm)
+
+    before, length = np.zeros_like(x), math.sqrt(dot(x, x))
     diagonal: list[float] = []
     beside: list[float] = []
     found = 0.0
@@ -203,9 +269,9 @@ def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:
     motion, force = np.zeros((len(p.hot), 3)), np.zeros((len(lists.force), 3))
     while len(diagonal) < MOST_LANCZOS:
         y = scale * _stiffness_times(sim, scale * x, motion, force)
-        diagonal.append(exact_sum(x * y, comm))
+        diagonal.append(dot(x, y))
         y -= diagonal[-1] * x + (beside[-1] * before if beside else 0.0)
-        length = math.sqrt(exact_sum(y * y, comm))
+        length = math.sqrt(dot(y, y))
         done = not length > 1e-12 * max(map(abs, diagonal))
         if done or len(diagonal) % EVERY_LANCZOS == 0:
             largest = float(np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside, -1))[-1])
@@ -219,11 +285,15 @@ def highest_frequency(sim: Simulation, within: float = 1e-3) -> float:
 
 
 def _stiffness_times(sim: Simulation, u: np.ndarray, motion: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """K u (n_own, 3) for motions u of the owned particles; motion, force: room per storage and force row."""
+    """K u (n, 3) for motions u of the owned particles, then of the clumps of this rank; motion, force: room per storage
+    and force row. Members of clumps move as these do, and what acts on them acts on the clumps."""
     p, lists, b = sim.particles, sim.lists, sim.lists.blocks
-    motion[p.owned] = u
+    motion[p.owned] = u[: len(p)]
+    if sim.clumps:
+        c = sim.clumps.bodies
+        rigid.motions_of_members(c.start, c.row, c.arm, u[len(p) :], motion)
     sim.halo.fill(motion)
-    out = np.empty_like(u)
+    out = np.zeros_like(u)
     for t in range(lists.n_blocks):
         modes.pairs(
             t, p.hot, p.ihot, b.cut, b.lo, b.hi, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, lists.u_made,
@@ -236,6 +306,11 @@ def _stiffness_times(sim: Simulation, u: np.ndarray, motion: np.ndarray, force: 
         p.hot, p.ihot, sim._wall_table, lists.slot_row, lists.slot_wall, lists.slot_side, sim.wall_laws,
         len(sim.materials), p.n_left, motion, out,
     )  # fmt: skip
+    if sim.clumps:
+        member = np.zeros_like(motion)
+        member[p.owned] = out[: len(p)]
+        sim.halo.fill(member)
+        rigid.forces_of_members(c.start, c.row, c.arm, member, out[len(p) :])
     return out
 
 
@@ -249,6 +324,9 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     if sim.closed:
         force = sim.lists.owned_forces()
         columns |= {name: force[:, k] for k, name in enumerate(("fx", "fy", "torque"))}
+    rows = sim.clumps.rows(p)
+    if rows is not None:
+        columns |= {f"clump {k}": rows[:, k] for k in range(rows.shape[1])}
     hist = sim.lists.histories(p.ihot) if sim.closed else sim.hist
     owner = np.repeat(p["gid"], hist.counts())
     once = (hist.partner > owner) | (hist.partner < 0)  # the owner of the lower id tells of a pair
@@ -273,6 +351,9 @@ def frame(sim: Simulation) -> Frame:
         columns[name] = rows[name][p["material"]]
     columns["hertz"] = rows["hertz"][p["material"]].astype(np.int8)
     columns["fix"] = p["fix"].astype(np.uint8)
+    if sim.clumps:
+        columns["clump"] = p.clump
+        columns["clump_x"], columns["clump_y"] = sim.clumps.centres(p)
     columns["color"], columns["group"] = p["color"].astype(np.int32), p["group"].astype(np.int32)
 
     out, iout = contact_rows(sim)

@@ -12,12 +12,31 @@ import numpy as np
 
 from hpcdem.budget import Budget
 from hpcdem.clock import Clock
+from hpcdem.clumps import Clumps
 from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.fields import FIELDS, FX, TORQUE
+from hpcdem.fields import (
+    AREA,
+    CLUMP,
+    CLUMP_ANGLE,
+    CLUMP_SPIN,
+    CLUMP_VX,
+    CLUMP_VY,
+    CLUMP_WIDTH,
+    CLUMP_X,
+    CLUMP_Y,
+    FIELDS,
+    FX,
+    MEMBERS,
+    MOMENT,
+    OFFSET_X,
+    OFFSET_Y,
+    TORQUE,
+)
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.model.materials import PropertyTable
+from hpcdem.model.particles import free_rows
 from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
 from hpcdem.physics.dem.contacts import LONGEST2
@@ -57,6 +76,7 @@ def _state(sim: Simulation) -> dict[str, Any]:
         "streams": sim.streams,
         "breaks": sim.comm.sum_into(breaks).tolist(),
         "bonds": sim.bonds_left(),
+        "clumps": {"number": sim.clumps.number, "reach": sim.clumps.reach},
         "lost": sim.lost,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
         "rebuilds": sim.rebuilds,
@@ -94,7 +114,47 @@ def _tables(sim: Simulation) -> dict[str, Table]:
         # A pair whose partners live on two ranks is remembered by both; the lower gid's owner writes it.
         "pairs": to_slabs(sim.comm, ("gid", "partner"), pairs),
         "wall_contacts": to_slabs(sim.comm, ("gid", "wall"), wall_contacts),
+        **_clump_tables(sim),
     }
+
+
+CLUMP_STATE = {
+    "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
+    "inertia": MOMENT,
+}  # fmt: skip
+"""Columns of the table `clumps`, which its first member's owner writes, besides id and number of members."""
+
+
+def _clump_tables(sim: Simulation) -> dict[str, Table]:
+    """Each clump once, and the places of their members in them."""
+    rows = sim.clumps.rows(sim.particles)
+    if rows is None:
+        return {}
+    gid, clump, size = sim.particles["gid"], sim.particles.clump, rows.view(np.int64)[:, MEMBERS]
+    first, member = clump == gid, clump >= 0
+    clumps = {"id": clump[first], **{name: rows[first, k] for name, k in CLUMP_STATE.items()}, "members": size[first]}
+    members = {
+        "gid": gid[member], "clump": clump[member], "dx": rows[member, OFFSET_X], "dy": rows[member, OFFSET_Y],
+    }  # fmt: skip
+    return {"clumps": to_slabs(sim.comm, ("id",), clumps), "clump_members": to_slabs(sim.comm, ("gid",), members)}
+
+
+def _take_clumps(sim: Simulation, tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+    """The rows of clumps, on this rank, of the particles it has."""
+    p = sim.particles
+    p.rigid = free_rows(len(p))
+    if tables is None:
+        return
+    clumps, members = tables["clumps"], tables["clump_members"]
+    at = np.searchsorted(p["gid"], members["gid"])
+    of = np.searchsorted(clumps["id"], members["clump"])
+    rows = np.zeros((len(at), CLUMP_WIDTH))
+    for name, k in CLUMP_STATE.items():
+        rows[:, k] = clumps[name][of]
+    rows[:, OFFSET_X], rows[:, OFFSET_Y] = members["dx"], members["dy"]
+    numbers = rows.view(np.int64)
+    numbers[:, CLUMP], numbers[:, MEMBERS] = members["clump"], clumps["members"][of]
+    p.rigid[at] = rows
 
 
 def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
@@ -199,6 +259,9 @@ def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, n
     if sim.comm.rank == 0:
         sim.breaks[:] = state["breaks"]
     origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)
+    sim.clumps = Clumps(**state.get("clumps", {}))
+    if sim.clumps:
+        _take_clumps(sim, tables)
     if state["closed"]:
         _close_as_it_was(sim, state, origin)
     sim.rebuilds = state["rebuilds"]
@@ -241,6 +304,8 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     p["x"][:], p["y"][:] = p.cold[:, FX], p.cold[:, FX + 1]
     all_gid, all_forces = sim.comm.bcast((gid, forces))
     sim.lists.set_owned_forces(all_forces[np.searchsorted(all_gid, p["gid"])])
+    if sim.clumps:
+        sim.clumps.sum_forces(p, sim.halo, sim.lists)
     sim.lists.tally[:, LONGEST2] = state["longest2"]
     sim._longest2 = state["longest2"]
     sim.halo.refresh()

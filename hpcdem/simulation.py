@@ -19,9 +19,10 @@ import numpy as np
 from hpcdem import guards
 from hpcdem.cells import columns, keys
 from hpcdem.clock import Clock
+from hpcdem.clumps import Clumps
 from hpcdem.decomp import strips
 from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.fields import FX, TORQUE, WIDTH
+from hpcdem.fields import CLUMP, FX, TORQUE, WIDTH
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
@@ -120,6 +121,7 @@ class Simulation:
         self.materials = PropertyTable(MATERIAL)
         self.bond_types = PropertyTable(BOND_TYPE)
         self.walls = Walls()
+        self.clumps = Clumps()
         self.groups: list[str] = ["***"]
         self.next_gid = 0
         self.streams = 0
@@ -160,10 +162,13 @@ class Simulation:
         if self.energy is not None:
             self.energy.before_move(self)
         with timers("move"):
-            for first, last in halo.border:
-                self._move(self.lists.n_blocks, first, last, *self._move_args)
-            halo.start()
-            self._move(self.lists.n_blocks, *halo.inside, *self._move_args)
+            if self.clumps:
+                self._move_with_clumps()
+            else:
+                for first, last in halo.border:
+                    self._move(self.lists.n_blocks, first, last, *self._move_args)
+                halo.start()
+                self._move(self.lists.n_blocks, *halo.inside, *self._move_args)
             if self._walls_move:
                 self.walls.move(self.clock.dt)
         self.lattice.age += 1
@@ -187,6 +192,13 @@ class Simulation:
         self.clock.tick()
         return request
 
+    def _move_with_clumps(self) -> None:
+        """Particles, then clumps with their members: these overwrite what the loop made of members."""
+        s = self.settings
+        self._move(self.lists.n_blocks, 0, self.particles.n_own, *self._move_args)
+        self.clumps.move(self.particles, self.lists, s.gx, s.gy, s.lsm, self.clock.dt)
+        self.halo.start()
+
     def _forces(self) -> None:
         """Contact, bond and wall forces at the present positions."""
         lists = self.lists
@@ -194,6 +206,8 @@ class Simulation:
         if len(lists.slot_row):
             self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
             self._wall_forces(lists.n_blocks, *self._wall_args)
+        if self.clumps:
+            self.clumps.sum_forces(self.particles, self.halo, lists)
 
     def _look(self) -> tuple[bool, int]:
         """How far has anyone gone since the lists were built? Sets the step of the next look.
@@ -276,7 +290,8 @@ class Simulation:
         self._longest2 = self.lists.longest_bond2()
         self._hist = self.lists.histories(p.ihot)
         self.halo.close()
-        p.set_owned(p.hot[p.owned], p.cold)
+        p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p))
+        self.clumps.open()
         self._lists = None
 
     def _harvest(self) -> None:
@@ -292,6 +307,8 @@ class Simulation:
         if not self.closed:
             self._close(least_skin=least_skin)
             self.lists.set_owned_forces(self.particles.cold[:, FX : TORQUE + 1])
+            if self.clumps:
+                self.clumps.sum_forces(self.particles, self.halo, self.lists)
         self.refresh_tables()
         self.halo.refresh()
 
@@ -309,9 +326,11 @@ class Simulation:
             cell = cell[order]
         with self.timers("halo"):
             storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads)
+            rigid = self.clumps.storage(p, order, self.halo, self.threads)
+            clump = None if rigid is None else rigid.view(np.int64)[:, CLUMP].copy()
         with self.timers("neighbour"):
             halo, hist = self.halo, self.hist
-            p.place(storage, take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads), halo.n_left)
+            p.place(storage, take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads), halo.n_left, rigid)
             left, right = storage[: halo.n_left], storage[halo.n_left + p.n_own :]
             cell = np.concatenate([keys(left, lattice.side), cell, keys(right, lattice.side)])
             self.origin = p.positions()
@@ -320,8 +339,9 @@ class Simulation:
             bond_reach = min(lattice.side, lattice.bond_reach + lattice.skin) if self.bonds else 0.0
             self._lists = neighbours.build(
                 storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, lattice.side, self.largest_radius,
-                lattice.skin, bond_reach, self.threads,
+                lattice.skin, bond_reach, self.threads, clump,
             )  # fmt: skip
+            self.clumps.close(p, halo, self._lists, self.clock.step, lattice.side)
             self._count_bonds(hist)
             self._hist = None
             lattice.age = 0
@@ -351,6 +371,8 @@ class Simulation:
         lattice, p = self.lattice, self.particles
         seen = np.array([0.0, self._longest2, 0.0])
         seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)
+        if self.clumps and box is not None:
+            seen[2] = guards.outside(*self.clumps.centres(p), box).any()
         self.comm.max_into(seen)
         self.largest_radius, outside = float(seen[0]), bool(seen[2])
         if frozen:
@@ -362,15 +384,15 @@ class Simulation:
             lattice.skin_factor = NARROW
         lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
         side = 2.0 * self.largest_radius + lattice.skin
-        while 0.0 < side < lattice.bond_reach + lattice.skin:
+        while 0.0 < side < max(lattice.bond_reach + lattice.skin, 1.000001 * self.clumps.reach):
             side *= 1.05  # in steps, so that the lattice seldom changes
         lattice.side = side if side > 0.0 else 1.0
         return outside
 
     def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
-        """Particles whose centre has left the BOX are deleted, with a line in the log; PhysicsError if they ran away,
-        which the next look would no longer see. Collective."""
-        gone = guards.outside(self.particles, box)
+        """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;
+        PhysicsError if they ran away, which the next look would no longer see. Collective."""
+        gone = guards.outside(*self.clumps.centres(self.particles), box)
         self._refuse_runaways(gone)
         names = guards.places(self.particles, gone, self.comm)
         number = self.remove(gone)
@@ -397,16 +419,20 @@ class Simulation:
         return bool(np.isnan(contacts.pair_table(self.materials.rows)[:, contacts.MODEL]).any())
 
     def remove(self, which: np.ndarray) -> int:
-        """Delete the flagged owned particles (n_own,) bool and all memory of them. The model must be open. Collective.
+        """Delete the flagged owned particles (n_own,) bool, clumps as a whole, and all memory of them. The model must
+        be open. Collective.
 
         Returns how many went, over all ranks.
         """
         gone = np.concatenate(self.comm.allgather(self.particles["gid"][which].copy()))
         if not len(gone):
             return 0
+        first_members = which & (self.particles.clump == self.particles["gid"])
+        clumps_gone = self.count(int(first_members.sum())) if self.clumps else 0
         self.hist = self.hist.take(np.flatnonzero(~which))
         self.hist = self.hist.keep(~np.isin(self.hist.partner, gone))
         self.particles.keep(~which)
+        self.clumps.forget(clumps_gone, self.particles)
         self.ownership.wanted = True
         return len(gone)
 
@@ -427,9 +453,8 @@ class Simulation:
             migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
             leave = migration.leave
             hist = self.hist.take(leave)
-            arrived, counts, entries = migration.exchange(
-                np.hstack([p.hot[leave], p.cold[leave]]), hist.counts(), hist.rows
-            )
+            rows = [p.hot[leave], p.cold[leave]] + ([p.rigid[leave]] if p.rigid is not None else [])
+            arrived, counts, entries = migration.exchange(np.hstack(rows), hist.counts(), hist.rows)
             if not len(leave) and not len(arrived):
                 return cell
             stay = migration.stay()
@@ -437,8 +462,9 @@ class Simulation:
             hot, cold = (aligned((len(stay) + len(arrived), WIDTH)) for _ in range(2))
             take_rows(p.hot, stay, hot[: len(stay)], self.threads)
             take_rows(p.cold, stay, cold[: len(stay)], self.threads)
-            hot[len(stay) :], cold[len(stay) :] = arrived[:, :WIDTH], arrived[:, WIDTH:]
-            p.set_owned(hot, cold)
+            hot[len(stay) :], cold[len(stay) :] = arrived[:, :WIDTH], arrived[:, WIDTH : 2 * WIDTH]
+            rigid = None if p.rigid is None else np.concatenate([p.rigid[stay], arrived[:, 2 * WIDTH :]])
+            p.set_owned(hot, cold, rigid)
             return np.concatenate([cell[stay], keys(arrived, side)])
 
     def broken(self) -> tuple[int, int]:
@@ -477,6 +503,8 @@ class Simulation:
             p.hot, p.ihot, p.icold, p.n_left, rows["density"].copy(), rows["damp"].copy(), mass.shape(s.disk), dt,
             self.body,
         )  # fmt: skip
+        if self.clumps:
+            self.clumps.fill(p, rows["density"].copy(), rows["damp"].copy(), dt, self.body)
         self.pair_laws = contacts.pair_table(rows)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
         self.bond_laws = self.bond_types.as_floats()

@@ -263,7 +263,8 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     context_settings=HELP,
     no_args_is_help=True,
     epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s DIR --help), `hpcdem "
-    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem warmup` compiles all kernels for later runs, "
+    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem grade FILE` makes grains from a grading curve, "
+    "`hpcdem warmup` compiles all kernels for later runs, "
     "`hpcdem doctor` says what is wrong with this machine or job. "
     "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a "
     "checkpoint (go on with --resume).",

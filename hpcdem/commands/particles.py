@@ -46,12 +46,12 @@ def load(
     if not keep.any():
         raise CommandError(f"none of the {len(rows)} particles of {path} lies within the bounds of x and y")
     rows, names = rows[keep] * scale, [g for g, k in zip(groups, keep, strict=True) if k]
-    _check_circles(rows)
+    check_circles(rows)
     if sim.log is not None and not keep.all():
         sim.log.info(f"LOAD: {len(rows)} of {len(keep)} particles lie within the bounds")
     sim.clear()
     numbers = {name: sim.group_number(name) for name in dict.fromkeys(names)}
-    return _add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
+    return add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
 
 
 def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, list[str]] | None:
@@ -98,7 +98,7 @@ def ball(
             raise CommandError(f"id must not be negative, got {gid}")
         if sim.comm.any(bool((sim.particles["gid"] == gid).any())):
             raise CommandError(f"there is a particle with id {gid} already")
-    _add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=gid)
+    add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=gid)
 
 
 def gen(
@@ -122,7 +122,7 @@ def gen(
     ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
     rows, tried = packing.insert_randomly(num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, **ends)
     sim.streams += 1
-    made = _add(sim, rows, sim.group_number(group), color)
+    made = add(sim, rows, sim.group_number(group), color)
     if sim.log is not None:
         cover = float(np.pi * (rows[:, 2] ** 2).sum() / ((x[1] - x[0]) * (y[1] - y[0])))
         sim.log.info(f"GEN: {num} asked, {made} placed in {tried} attempts, {100.0 * cover:.1f} % of the area covered")
@@ -144,7 +144,7 @@ def gen_grid(
     sim.streams += 1
     if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
         raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
-    return _add(sim, rows, sim.group_number(group), color, first_gid=idmin)
+    return add(sim, rows, sim.group_number(group), color, first_gid=idmin)
 
 
 def gline(
@@ -164,7 +164,7 @@ def gline(
     centres = row(p1, p2, rad, cratio)
     material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
     rows = np.column_stack([centres, np.full(len(centres), rad)])
-    return _add(sim, rows, sim.group_number(group), color, material=sim.materials.row(**material))
+    return add(sim, rows, sim.group_number(group), color, material=sim.materials.row(**material))
 
 
 def delete(sim: Simulation, where: Selection | None = None) -> int:
@@ -196,7 +196,7 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
     write_sections(path, sim.comm, lambda: [text.encode()])
 
 
-def _check_circles(rows: np.ndarray) -> None:
+def check_circles(rows: np.ndarray) -> None:
     """As limits.check_circle, for (n, 3) rows x, y, r."""
     size = np.abs(rows[:, :2]).max(axis=1) / rows[:, 2]
     for worst in {int(size.argmax()), int(rows[:, 2].argmin()), int(rows[:, 2].argmax())}:
@@ -210,7 +210,7 @@ def _everyone(sim: Simulation) -> np.ndarray:
     return np.concatenate(sim.comm.allgather(mine))
 
 
-def _add(
+def add(
     sim: Simulation,
     rows: np.ndarray,
     group: np.ndarray | int,

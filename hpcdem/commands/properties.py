@@ -14,8 +14,8 @@ NOT_NEGATIVE = ("density", "fric", "shear", "damp", "kn", "ks")
 
 
 def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
-    """Flags (n_own,) of the owned particles in a selection; None is all. Collective if `where` uses {top} and the
-    like."""
+    """Flags (n_own,) of the owned particles in a selection; None is all. Clumps are chosen as a whole: by the place of
+    their centre, or if a member's id or group is asked for. Collective."""
     p = sim.particles
     if where is None:
         return np.ones(len(p), bool)
@@ -25,7 +25,9 @@ def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
     for name in _group_names(where):
         if name not in known and sim.log is not None:
             sim.log.warn_once(f"group {name}", f"no particle has ever been in group {name}")
-    return where.mask({"x": p["x"], "y": p["y"], "gid": p["gid"], "group": p["group"], "group_names": sim.groups})
+    x, y = sim.clumps.centres(p)
+    which = where.mask({"x": x, "y": y, "gid": p["gid"], "group": p["group"], "group_names": sim.groups})
+    return sim.clumps.whole(p, which, sim.comm) if sim.clumps else which
 
 
 def _group_names(where: Selection) -> tuple[str, ...]:
@@ -57,7 +59,8 @@ def prop(
     """Set properties of the particles in `where`; keys left out keep their values.
 
     SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving
-    kn or ks without it the linear one. Existing contacts use the new values from the next step.
+    kn or ks without it the linear one. Existing contacts use the new values from the next step. Velocities of a clump
+    are those of its centre; its members follow.
     """
     given = {
         k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None
@@ -78,12 +81,15 @@ def prop(
         mapping = sim.materials.changed(sim.used(material[which], sim.materials), **given)
         material[which] = mapping[material[which]]
         sim.tables_changed()
-    for name, value in (("vx", xv), ("vy", yv), ("spin", spin), ("color", color)):
+    motion = {name: value for name, value in (("vx", xv), ("vy", yv), ("spin", spin)) if value is not None}
+    for name, value in (*motion.items(), ("color", color)):
         if value is not None:
             p[name][which] = value
+    if motion and sim.clumps:
+        sim.clumps.set_motion(p, which, **motion)
     if group is not None:
         p["group"][which] = sim.group_number(group)
-    if xv is not None or yv is not None:
+    if xv is not None or yv is not None or (motion and sim.clumps):
         sim.look_soon()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hpcdem import observe
 from hpcdem.budget import Budget
-from hpcdem.commands import bonds, particles, properties, running, settings, walls
+from hpcdem.commands import bonds, clumps, particles, properties, running, settings, walls
 from hpcdem.halo.comm import SerialComm
 from hpcdem.selection import Ids
 from hpcdem.simulation import Simulation
@@ -22,6 +22,9 @@ def rehearse(threads: int = 1) -> None:
     particles.gen_grid(sim, [0.5], (-2.0, 2.0), (-0.1, 2.0))
     particles.gen(sim, 2, [0.5], (3.0, 6.0), (1.0, 6.0))
     properties.prop(sim, density=1.0, shear=1e3, poiss=0.2, hertz=True)
+    running.prepare(sim)
+    sim.step()
+    clumps.join(sim, Ids(4, 6))
     running.prepare(sim)
     sim.step()
     bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)

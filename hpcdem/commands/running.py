@@ -90,6 +90,11 @@ def _nearest(steps: float) -> int:
 def prepare(sim: Simulation, dt_known: bool = False) -> None:
     """Closed, checked and with a time step: ready for the first cycle. Collective."""
     _check_materials(sim)
+    if sim.clumps and sim.settings.disk != "on":
+        raise CommandError(
+            f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "
+            "SET disk on"
+        )
     sim.close()
     _check_laws(sim)
     dt = sim.clock.dt if dt_known else time_step(sim)
@@ -126,8 +131,9 @@ def _check_laws(sim: Simulation) -> None:
 def time_step(sim: Simulation) -> float:
     """The time step [s]: SET DT, or SET frac f: f sqrt(m_min / k_max). Collective.
 
-    m_min: the smallest mass of a particle with a free degree of freedom; k_max: the largest pair stiffness, linear: of
-    any two materials or material and wall in use; Hertz: tangent at the largest overlap (1 % of R without contacts).
+    m_min: the smallest mass of a particle with a free degree of freedom (of clumps see observe.lightest); k_max: the
+    largest pair stiffness, linear: of any two materials or material and wall in use; Hertz: tangent at the largest
+    overlap (1 % of R without contacts).
     Source: step count published with Li et al. 2021.
     """
     s, p = sim.settings, sim.particles
@@ -135,8 +141,7 @@ def time_step(sim: Simulation) -> float:
         return s.dt
     if s.frac <= 0.0:
         raise CommandError("no time step: SET DT or SET frac must come before the first cycle")
-    free = p["fix"] != 7
-    light = float(sim.comm.min_into(np.array([sim.body[free, 0].min() if free.any() else math.inf]))[0])
+    light = observe.lightest(sim)
     if not math.isfinite(light):
         raise CommandError(
             "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
@@ -190,9 +195,7 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
     or if lattice-solid damping reverses a velocity."""
     critical, dt = observe.critical_dt(sim), sim.clock.dt
-    free = sim.particles["fix"] != 7
-    light = np.array([sim.body[free, 0].min() if free.any() else math.inf])
-    damping = sim.settings.lsm * dt / float(sim.comm.min_into(light)[0])
+    damping = sim.settings.lsm * dt / observe.lightest(sim)
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = observe.highest_frequency(sim) if near else 0.0
     if sim.log is None:

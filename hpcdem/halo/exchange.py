@@ -17,6 +17,8 @@ from hpcdem.cells import COLUMN
 from hpcdem.memory import aligned, take_rows
 
 TO_LEFT, TO_RIGHT = 11, 12
+BACK = 2
+"""Added to the tags of a second table of rows."""
 
 
 class Halo:
@@ -30,6 +32,7 @@ class Halo:
     def __init__(self, comm: Any, n_own: int, first: int, last: int) -> None:
         self.comm, self.n_own, self.first, self.last = comm, n_own, first, last
         self.requests: list = []
+        self.more: list = []
         # Owned particles first : last that others wait for, in up to two pieces, and the rest between them.
         first, last = min(first, n_own), min(last, n_own)
         if first + last >= n_own:
@@ -71,18 +74,27 @@ class Halo:
 
     def keep_fresh(self, rows: np.ndarray) -> None:
         """From now on `refresh` renews the ghost rows of this array; its memory must stay where it is."""
+        self.requests += self._persistent(rows, 0)
+
+    def keep_too(self, rows: np.ndarray) -> None:
+        """The same of a second array, renewed by `refresh_more`."""
+        self.more += self._persistent(rows, BACK)
+
+    def _persistent(self, rows: np.ndarray, shift: int) -> list:
         if self.comm.mpi is None:
-            return
+            return []
         from_left, to_left, to_right, from_right = self._pieces(rows)
         mpi = self.comm.mpi
-        for piece, start, peer, tag in (
-            (from_left, mpi.Recv_init, self.left, TO_RIGHT),
-            (from_right, mpi.Recv_init, self.right, TO_LEFT),
-            (to_left, mpi.Send_init, self.left, TO_LEFT),
-            (to_right, mpi.Send_init, self.right, TO_RIGHT),
-        ):
-            if len(piece):
-                self.requests.append(start(_bytes(piece), peer, tag))
+        return [
+            start(_bytes(piece), peer, tag + shift)
+            for piece, start, peer, tag in (
+                (from_left, mpi.Recv_init, self.left, TO_RIGHT),
+                (from_right, mpi.Recv_init, self.right, TO_LEFT),
+                (to_left, mpi.Send_init, self.left, TO_LEFT),
+                (to_right, mpi.Send_init, self.right, TO_RIGHT),
+            )
+            if len(piece)
+        ]
 
     def start(self) -> None:
         """Begin to renew the ghosts. Until `finish` the rows of `border` must not change, ghosts must not be read."""
@@ -99,11 +111,17 @@ class Halo:
         self.start()
         self.finish()
 
+    def refresh_more(self) -> None:
+        """The ghost rows of the second array get the present ones of their owners."""
+        if self.more:
+            self._start_all(self.more)
+            self.comm.wait_all(self.more)
+
     def close(self) -> None:
         """Give the requests back to MPI."""
-        for request in self.requests:
+        for request in self.requests + self.more:
             request.Free()
-        self.requests = []
+        self.requests, self.more = [], []
 
 
 def _bytes(rows: np.ndarray) -> np.ndarray:

@@ -89,6 +89,7 @@ class Ownership:
             columns = max(columns, int(ends[1] - ends[0]) + 1)
         if columns < self.comm.size:
             raise UsageError(
-                f"{self.comm.size} ranks are too many for this model: its width in columns of {self.side:g} m (largest "
-                f"contact or bond plus skin) is {columns}, so at most {columns} ranks fit; start it with fewer"
+                f"{self.comm.size} ranks are too many for this model: its width in columns of {self.side:g} m (the "
+                f"largest contact, bond or clump, plus skin) is {columns}, so at most {columns} ranks fit; start it "
+                "with fewer"
             )

@@ -12,7 +12,7 @@ A file of an earlier version of this layout is read by all later programs; one o
 | 1 | checksums of datasets: sum of their 64-bit words |
 | 2 | `crc` |
 | 3 | each word is mixed with its place before it is added up, so that rows that changed places are noticed too |
-| 4 | the seal |
+| 4 | the seal; tables `clumps` and `clump_members`, where there are clumps |
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Stress of a particle (Christoffersen, Mehrabadi & Nemat-Nasser 1981, J. Appl. Me
 positive: V s_ij = - sum_c l_i f_j over its contacts with particles and walls and its bonds, l from the centre to the
 contact point, f the force on the particle. The stress of a region is the sum of V s_ij over its particles divided by
 area and thickness.
+
+A rigid clump is one body: l begins at its centre, and V s is shared out to its members by the area of their discs.
 """
 
 from __future__ import annotations
@@ -25,10 +27,12 @@ def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """
     p = frame.tables["particles"].columns
     n, row_of = len(p["gid"]), _finder(p["gid"])
+    member = _members(p)
+    x, y = (np.where(member, p[f"clump_{axis}"], p[axis]) if member.any() else p[axis] for axis in ("x", "y"))
     result, held = np.zeros((n, 4)), np.zeros(n, dtype=bool)
 
     def add(at: np.ndarray, place: tuple[np.ndarray, np.ndarray], force: tuple[np.ndarray, np.ndarray]) -> None:
-        arm = place[0] - p["x"][at], place[1] - p["y"][at]
+        arm = place[0] - x[at], place[1] - y[at]
         for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
             result[:, k] -= np.bincount(at, arm[i] * force[j], n)
         held[at] = True
@@ -52,7 +56,19 @@ def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     if len(frame.tables["wall_contacts"]):
         a, force = row_of(t["id1"]), _force(t, "wall contacts")
         add(a, _wall_place(t, p, a, frame.walls, force), force)
+    if member.any():
+        of = np.unique(p["clump"][member], return_inverse=True)[1]
+        area = p["radius"][member] ** 2
+        share = area / np.bincount(of, area)[of]
+        for k in range(4):
+            result[member, k] = np.bincount(of, result[member, k])[of] * share
+        held[member] = np.bincount(of, held[member])[of] > 0
     return result, held
+
+
+def _members(p: dict[str, np.ndarray]) -> np.ndarray:
+    """Which particles (n,) belong to a clump; a .dat does not say."""
+    return p["clump"] >= 0 if "clump" in p else np.zeros(len(p["gid"]), bool)
 
 
 def _finder(gid: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -123,12 +139,16 @@ def _wall_place(
 
 
 def volume_rule(frame: Frame) -> tuple[np.ndarray, float]:
-    """Volume of each particle (n,) [m^3] by SET disk, and the thickness of the model [m]: 1 for discs, twice the mean
-    radius for spheres. HpcdemError for a rule that is not known."""
-    radius, disk = frame.tables["particles"].columns["radius"], str(frame.settings.get("disk", "off"))
+    """Volume of each particle (n,) [m^3] by SET disk, of members of clumps their share, and the thickness of the model
+    [m]: 1 for discs, twice the mean radius for spheres. HpcdemError for a rule that is not known."""
+    p = frame.tables["particles"].columns
+    radius, disk = p["radius"], str(frame.settings.get("disk", "off"))
     if disk not in mass.SPHERES:
         raise HpcdemError(f"its rule for volumes, disk {disk}, is none of {', '.join(mass.SPHERES)}")
-    return mass.volume(radius, disk), 2.0 * float(np.mean(radius)) if mass.SPHERES[disk] else 1.0
+    volume = mass.volume(radius, disk)
+    if "clump" in p:
+        volume = np.where(p["clump"] >= 0, p["mass"] / p["density"], volume)
+    return volume, 2.0 * float(np.mean(radius)) if mass.SPHERES[disk] else 1.0
 
 
 def principal(sxx: np.ndarray, sxy: np.ndarray, syy: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -34,8 +34,9 @@ def test_no_keyword_is_taken_for_range(command):
     ("word", "name"),
     [
         *[(stem, name) for stem, name in [
-            ("bal", "BALL"), ("bon", "BOND"), ("cyc", "CYC"), ("del", "DEL"), ("exp", "EXP"), ("fix", "FIX"),
-            ("fre", "FREE"), ("gen", "GEN"), ("gli", "GLINE"), ("imp", "IMPLE"), ("ini", "INIT"), ("loa", "LOAD"),
+            ("bal", "BALL"), ("bon", "BOND"), ("clu", "CLUMP"), ("cyc", "CYC"), ("del", "DEL"), ("exp", "EXP"),
+            ("fix", "FIX"), ("fre", "FREE"), ("gen", "GEN"), ("gli", "GLINE"), ("imp", "IMPLE"),
+            ("ini", "INIT"), ("loa", "LOAD"),
             ("pro", "PROP"), ("res", "RESTORE"), ("set", "SET"), ("sta", "START"), ("sto", "STOP"), ("wal", "WALL"),
             ("his", "HIST"), ("plo", "PLOT"), ("dra", "DRAW"), ("sav", "SAV"), ("box", "BOX")]],
         ("impl", "IMPLE"), ("imple", "IMPLE"), ("implie", "IMPLE"),

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 MARK = "# model: "
 """Begins the line of a stored script that holds what is not in its commands, as JSON."""
-POINTS, END = "points.dat", "end.sav"
+POINTS, BODIES, END = "points.dat", "bodies.clumps", "end.sav"
 DENSITY = 2500.0
 
 
@@ -217,7 +217,7 @@ class Maker:
         self.intervals()
         self.enclosure()
         for ident, what in ((1, "kinetic"), (2, "step"), (3, "energy")):
-            if self.chance(40):
+            if self.chance(40 if ident < 3 else 15):
                 self.add(f"HIST id {ident} interval {self.whole(5, 40)}, {what}")
         if all(any(line.startswith(f"HIST id {n}") for line in self.lines) for n in (1, 2)):
             self.add("PLOT hist 2 1")
@@ -274,7 +274,8 @@ class Maker:
 
     def populate(self) -> None:
         """One to three kinds of particles, then what they are made of."""
-        for kind in self.draw(st.lists(st.sampled_from(["gen", "grid", "row", "ball"]), min_size=1, max_size=3)):
+        kinds = st.sampled_from(["gen", "grid", "row", "ball", "clumps"])
+        for kind in self.draw(st.lists(kinds, min_size=1, max_size=3)):
             getattr(self, f"make_{kind}")()
         self.add(self.pick("PROP", "INIT"), self.material())
         if self.chance(30):
@@ -317,7 +318,44 @@ class Maker:
             self.color(), self.perhaps(50, self.group("ball")),
         )  # fmt: skip
 
+    def make_clumps(self) -> None:
+        """Rods and triangles above all others, in a group of their own; discs only, as clumps want it."""
+        if self.disk != "on":
+            return
+        r, lines = self.r, ["hpcdem clumps 1"]
+        for k in range(self.whole(1, 4)):
+            discs = [(1.3 * r * i, 0.0, self.pick(1.0, 0.8) * r) for i in range(self.whole(1, 5))]
+            if self.chance(40):
+                discs.append((0.0, 1.2 * r, 0.9 * r))
+            area = math.pi * sum(d[2] ** 2 for d in discs)
+            x, y = (sum(math.pi * d[2] ** 2 * d[axis] for d in discs) / area for axis in (0, 1))
+            discs = [(dx - x, dy - y, dr) for dx, dy, dr in discs]
+            inertia = sum(math.pi * d[2] ** 2 * (d[0] ** 2 + d[1] ** 2 + 0.5 * d[2] ** 2) for d in discs)
+            turn = self.between(0.0, 6.0)
+            lines.append(f"clump {number(8 * r * k)} 0 {number(turn)} {number(area)} {number(inertia)} {len(discs)}")
+            lines += [" ".join(map(number, disc)) for disc in discs]
+        self.files[BODIES] = "\n".join(lines) + "\n"
+        where = f"x {number(self.x(0.1, 0.5))} y {number(self.y(1.2, 1.6))}"
+        self.add(
+            "CLUMP file", BODIES, where, self.perhaps(30, f"angle {number(self.between(-0.3, 0.3))}"),
+            self.perhaps(20, "scale 0.8"), self.color(), self.group("rock"),
+        )  # fmt: skip
+
     # ---- what happens to them
+
+    def do_clumps(self) -> None:
+        if self.disk == "on" and BODIES not in self.files:
+            self.make_clumps()
+            self.add("PROP", self.material(), "RANGE group rock")
+
+    def do_join(self) -> None:
+        """A few particles of neighbouring ids become one."""
+        if self.disk == "on":
+            first = self.whole(0, 40)
+            self.add(
+                "CLUMP", self.perhaps(30, "color red"), self.perhaps(30, self.group("rock")),
+                f"RANGE id {first} {first + self.whole(1, 4)}",
+            )  # fmt: skip
 
     def do_rain(self) -> None:
         """More particles on top of all others."""
@@ -415,7 +453,7 @@ class Maker:
             ident, speed = self.pick(*moving)
             way = self.whole(10, 90) * abs(speed) * self.dt
             kinds = [
-                self.perhaps(25, f"{kind} {number(way * self.pick(0.4, 0.3))}")
+                self.perhaps(35, f"{kind} {number(way * self.pick(0.4, 0.3))}")
                 for kind in ("print", "save", "vtk", "ps")
             ]
             sign = math.copysign(1.0, speed) * self.pick(1.0, 1.0, -1.0)
@@ -426,7 +464,7 @@ class Maker:
 
 
 EVENTS = ("rain", "delete", "bond", "prop", "move_a_wall", "break", "fix", "set", "new_wall", "row", "ball", "export",
-          "save", "draw")  # fmt: skip
+          "save", "draw", "clumps", "join")  # fmt: skip
 
 
 @st.composite
@@ -533,6 +571,8 @@ MISTAKES: dict[str, Callable[[Maker], None]] = {
     "same id": _inserted("BALL id 7000 x {x} y {y} rad {r}", "BALL id 7000 x {x} y {far} rad {r}"),
     "no density": _inserted("BALL id 7000 x {x} y {y} rad {r}"),
     "no folder": _inserted("SAV nowhere/there.sav"),
+    "clumps of spheres": _inserted("SET disk off", "CLUMP RANGE id 0 3"),
+    "nobody to join": _inserted("CLUMP RANGE id 900000"),
     "no file": lambda maker: maker.lines.__setitem__(0, "LOAD missing.dat"),
     "no room": _inserted("GEN num 5 rad discrete {far} x (0 {r}) y (0 {r})"),
     "expression without a value": _inserted("DEL RANGE y {{top}}/0 {{top}}"),
@@ -555,7 +595,7 @@ def same_but_noisy(draw: Any, lines: Sequence[str]) -> bytes:
     out = []
     for line in lines:
         words = line.split(" ")
-        if not re.match(r"(?i)sav|exp|res|loa|set outdir", line):  # file names keep their case
+        if not re.match(r"(?i)sav|exp|res|loa|set outdir|clump file", line):  # file names keep their case
             change = draw(st.sampled_from([str.lower, str.upper, str.title]))
             words = [change(word) for word in words]
         gap = draw(st.sampled_from([" ", "  ", "\t", " , ", " = ", "\u3000"]))

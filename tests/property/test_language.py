@@ -66,7 +66,7 @@ def test_words_may_be_shortened_to_three_letters(model: Model, data: st.DataObje
     lines = []
     for line in model.lines:
         first, *words = line.split(" ")
-        keep = first in ("SAV", "EXP", "LOAD")
+        keep = first in ("SAV", "EXP", "LOAD", "CLUMP")
         chosen = ["group", "color"]  # what follows is a name of the user's, `ball` too
         new = [w if keep or before in chosen else shortened(w) for before, w in zip([first, *words], words)]
         lines.append(" ".join([shortened(first), *new]))
@@ -122,7 +122,7 @@ def test_the_models_use_every_word_of_the_language() -> None:
                     used.update({(command.name, option.name)} if option else ())
             used.update((command.name, option.name) for option in command.leading if option.kind is not t.FLAG)
 
-    @settings(max_examples=400, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=600, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
     @given(good_models())
     def body(model: Model) -> None:
         collect(model.text)

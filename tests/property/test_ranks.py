@@ -66,6 +66,7 @@ def explore(pair: Pair, examples: int, number: int | None = None) -> list[dict[s
     except BaseException:
         for model in failing:  # hypothesis comes back to the smallest one before it gives up
             name = hashlib.sha256(model.text.encode()).hexdigest()[:8]
+            REGRESSIONS.mkdir(exist_ok=True)
             (REGRESSIONS / f"script_{name}.py").write_text(model.text)
         raise
     return seen

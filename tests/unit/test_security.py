@@ -44,6 +44,10 @@ KNOWN = {
     ("runtime/doctor/scene.py", "importlib.import_module"),
     # libgomp.so.1, by that name, where the system finds it.
     ("runtime/launch.py", "ctypes.CDLL"),
+    # Written, not read.
+    ("page/maker.py", "zipfile.ZipFile"),
+    # This Python with a module of this package; requests reach it as JSON in a pipe.
+    ("page/worker.py", "subprocess.Popen"),
     # Programs with a list of words, never through a shell.
     ("post/movie.py", "subprocess.Popen"),
     ("runtime/stopping.py", "subprocess.run"),

@@ -162,8 +162,9 @@ def _folder(statements: Sequence[Statement], outdir: Path | None = None) -> str:
 
 def _notes(script: Script, runs: Sequence[Run], restored: bool, outdir: Path | None) -> list[str]:
     notes = []
-    for statement in script.statements[:2]:
-        if statement.command not in ("RESTORE", "LOAD"):
+    for index, statement in enumerate(script.statements):
+        reads = statement.command == "CLUMP" or (index < 2 and statement.command in ("RESTORE", "LOAD"))
+        if not reads or statement.get("file") is None:
             continue
         if find(script.directory, statement.get("file")) is None:
             notes.append(

@@ -27,7 +27,7 @@ the ZDEM manual, 0.943 to 0.956; linear: a bed of 250 000 disks of 0.1 to 0.3 mm
 FAILURES = 1000
 """Attempts without room in a row after which GEN gives up, unless SET gentry gives a number per particle asked for."""
 
-MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN")
+MAKERS = ("RESTORE", "LOAD", "BALL", "GLINE", "GEN", "CLUMP")
 
 Rectangle = tuple[float, float, float, float]
 """x1, x2, y1, y2 [m]."""
@@ -116,6 +116,8 @@ class _Follower:
                 made = self._stand(math.floor(math.hypot(x2 - x1, y2 - y1) / spacing + 1e-9) + 1)
             case "GEN":
                 made = self._gen(index, s)
+            case "CLUMP":
+                made = self._clumps(s)
             case "DEL":
                 self._delete(s.selection)
             case "SET":
@@ -149,6 +151,19 @@ class _Follower:
         place = (min(a - c for a, c in zip(x, r)), max(a + c for a, c in zip(x, r)),
                  min(b - c for b, c in zip(y, r)), max(b + c for b, c in zip(y, r)))  # fmt: skip
         self.bed = Layer(len(x), sum(math.pi * c * c for c in r), place)
+        return len(x)
+
+    def _clumps(self, s: Statement) -> int | None:
+        """Discs of a clump file, which fall; particles that are joined are there already."""
+        if s.get("file") is None:
+            return 0
+        table = _discs(s, self.directory)
+        if table is None:
+            self.standing = None
+            return None
+        x, y, r = table
+        place = min(x) - max(r), max(x) + max(r), min(y) - max(r), max(y) + max(r)
+        self.falling.append(Layer(len(x), sum(math.pi * c * c for c in r), place))
         return len(x)
 
     # ---- GEN
@@ -294,6 +309,29 @@ def _rectangle(where: sel.Selection) -> Rectangle | None:
         low, high = bounds[term.axis]
         bounds[term.axis] = [max(low, float(term.low)), min(high, float(term.high))]  # type: ignore[arg-type]
     return (*bounds["x"], *bounds["y"])  # type: ignore[return-value]
+
+
+def _discs(s: Statement, directory: Path) -> tuple[list[float], list[float], list[float]] | None:
+    """Centres of the clump, and radius, of every disc that CLUMP would make; None if the file cannot be read."""
+    path = find(directory, s.get("file"))
+    if path is None:
+        return None
+    out: tuple[list[float], list[float], list[float]] = [], [], []
+    scale, at = s.get("scale", 1.0), (0.0, 0.0)
+    c, sn = (scale * f(s.get("angle", 0.0)) for f in (math.cos, math.sin))
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            for line in file:
+                words = line.split("#")[0].split()
+                if words[:1] == ["clump"]:
+                    x, y = float(words[1]), float(words[2])
+                    at = x * c - y * sn + s.get("x", 0.0), x * sn + y * c + s.get("y", 0.0)
+                elif len(words) == 3 and words[0] != "hpcdem":
+                    for column, value in zip(out, (*at, float(words[2]) * scale)):
+                        column.append(value)
+    except (OSError, ValueError, IndexError):
+        return None
+    return out if out[0] else None
 
 
 def _rows(s: Statement, directory: Path) -> Mapping[str, Any] | None:

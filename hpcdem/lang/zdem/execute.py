@@ -253,6 +253,14 @@ def _gline(call: _Call) -> None:
     call.verbs.particles.gline(call.sim, **call.given())
 
 
+def _clump(call: _Call) -> None:
+    arguments = call.given()
+    if arguments.pop("file", None) is not None:
+        call.verbs.clumps.clump(call.sim, call.existing(), **arguments)
+    else:
+        call.verbs.clumps.join(call.sim, call.where, **arguments)
+
+
 def _del(call: _Call) -> None:
     call.verbs.particles.delete(call.sim, call.where)
 
@@ -332,6 +340,7 @@ _VERBS: dict[str, Callable[[_Call], None]] = {
     "BALL": _ball,
     "GEN": _gen,
     "GLINE": _gline,
+    "CLUMP": _clump,
     "DEL": _del,
     "EXP": _exp,
     "PROP": _prop,

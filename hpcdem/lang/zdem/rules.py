@@ -81,6 +81,16 @@ def _gline(s: Statement) -> None:
     _within(s, limits.check_row, s.get("p1"), s.get("p2"), s.get("rad"), s.get("cratio", 1.0))
 
 
+def _clump(s: Statement) -> None:
+    placing = [name for name in ("x", "y", "angle", "scale") if name in s.arguments]
+    if "file" in s.arguments and s.selection is not None:
+        raise s.error("RANGE chooses particles that are there, a file brings new ones; give one of them")
+    if "file" not in s.arguments and placing:
+        raise s.error(f"{placing[0]} belongs to CLUMP file")
+    if "file" not in s.arguments and s.selection is None:
+        raise s.error("give a file, or RANGE and the particles that are to be one clump")
+
+
 def _prop(s: Statement) -> None:
     if not s.arguments:
         raise s.error("nothing to set before RANGE" if s.selection else "nothing to set")
@@ -141,6 +151,7 @@ _RULES: dict[str, Callable[[Statement], None]] = {
     "SAV": _output,
     "GEN": _gen,
     "GLINE": _gline,
+    "CLUMP": _clump,
     "PROP": _prop,
     "FIX": _degrees,
     "FREE": _degrees,

@@ -462,6 +462,29 @@ COMMANDS = (
         example=("GLINE P1 ( 2.0 10.0 ) P2 ( 40.0 10.0 ), RAD=0.5 kn=4.14e3 ks=4.14e3 fric=0.55 GROUP=bom CRATIO=0.8",),
     ),
     Command(
+        "CLUMP",
+        "Rigid bodies made of discs. With file: adds those of a clump file (docs/files.md), looked for as by LOAD; the "
+        "file is scaled, turned about its origin and moved by (x y); mass and inertia are density times area and polar "
+        "second moment of area in the file. Without: the chosen particles become one clump, with the sums of their "
+        "areas and moments. RANGE chooses clumps as a whole, by their centre; DEL, PROP, FIX act on them so, PROP xv "
+        "yv spin on their centre, and BOX deletes those whose centre leaves it. They need SET disk on.",
+        source="X",
+        options=(
+            Option("file", "clump file", kind=FILE, source="X"),
+            Option("x", "the origin of the file comes to this place", kind=FLOAT, unit="m", default="0", source="X"),
+            Option("y", "the origin of the file comes to this place", kind=FLOAT, unit="m", default="0", source="X"),
+            Option("angle", "turns the file, anticlockwise", kind=FLOAT, unit="rad", default="0", source="X"),
+            Option("scale", "factor on all lengths of the file", kind=POSITIVE, default="1", source="X"),
+            replace(_COLOR, default="lg; joined particles keep theirs", source="X"),
+            replace(_GROUP, default="***; joined particles keep theirs", source="X"),
+        ),
+        ranged=True,
+        example=(
+            "CLUMP file gravel.clumps x 10.0 y 4.0 color yellow group gravel",
+            "CLUMP group boulder RANGE id 10 14",
+        ),
+    ),
+    Command(
         "DEL",
         "Deletes particles with their contacts and bonds.",
         longest="delete",

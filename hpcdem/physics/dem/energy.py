@@ -23,7 +23,7 @@ from hpcdem.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.physics.dem import laws
 from hpcdem.physics.dem import walls as wall_kernels
 from hpcdem.physics.dem.contacts import E_MOD, G_MOD, KIND, MODEL, A, B
-from hpcdem.physics.dem.motion import ALPHA, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
+from hpcdem.physics.dem.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
 from hpcdem.physics.dem.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY
 from hpcdem.physics.exact_sum import add_to_bins
 from hpcdem.physics.lanes import as_bits
@@ -50,12 +50,14 @@ def kicks(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, dt, whole, si
     """Work of gravity, of what drives fixed particles, and losses by damping in the coming kick of block t.
 
     whole: the whole kick, otherwise the half up to the whole step; sign: 1 to book, -1 to take back. Arguments else as
-    motion.move.
+    motion.move. Members of clumps are passed over; the clumps themselves come in the same way as particles (rigid.py).
     """
     shift = foff[t] - lo[t]
     span, to_mean = (sign * dt, 0.5) if whole else (sign * 0.5 * dt, 0.0)
     for i in range(cut[t], cut[t + 1]):
         c, r = i - n_left, shift + i
+        if body[c, CLUMPED] != 0.0:
+            continue
         m, alpha = body[c, MASS], body[c, ALPHA]
         gravity, driven, lattice, local = 0.0, 0.0, 0.0, 0.0
         for axis in range(2):
@@ -86,10 +88,13 @@ def kicks(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, dt, whole, si
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def kinetic(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, whole_step, stored):
-    """Kinetic energy of the owned particles of block t at the whole step, or at the half step before it."""
+    """Kinetic energy of the owned particles of block t at the whole step, or at the half step before it; nothing of
+    members of clumps."""
     shift = foff[t] - lo[t]
     for i in range(cut[t], cut[t + 1]):
         c, r = i - n_left, shift + i
+        if body[c, CLUMPED] != 0.0:
+            continue
         m, alpha = body[c, MASS], body[c, ALPHA]
         vx, vy, w = hot[i, VX], hot[i, VY], hot[i, SPIN]
         next_vx, next_vy, next_w = vx, vy, w

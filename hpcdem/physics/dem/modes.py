@@ -24,8 +24,8 @@ from hpcdem.physics.rng import uniform
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def begin(ihot, n_left, body, scale, out):
-    """scale (n_own, 3) f8: 1/sqrt(m), 1/sqrt(I), 0 where a direction is fixed; out (n_own, 3): random numbers of the
-    ids, zero there."""
+    """scale (n_own, 3) f8: 1/sqrt(m), 1/sqrt(I), 0 where a direction is fixed and for members of clumps; out (n_own,
+    3): random numbers of the ids, zero there."""
     for c in range(len(body)):
         for axis in range(3):
             inertia = body[c, INERTIA if axis == 2 else MASS]

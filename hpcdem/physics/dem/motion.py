@@ -17,9 +17,10 @@ from numba import njit, prange
 from hpcdem.fields import ANGLE, FIX, FIX_SPIN, FIX_X, FIX_Y, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.physics.dem import laws
 
-# Columns of the body table (n_own, 8) f8: mass [kg], inertia [kg m^2], local damping alpha, a spare one, and what turns
-# a force into a change of velocity: dt / m for x and y, dt / I for the spin, zero where the component is fixed.
-MASS, INERTIA, ALPHA, _, KICK_X, KICK_Y, KICK_SPIN = range(7)
+# Columns of the body table (n_own, 8) f8: mass [kg], inertia [kg m^2], local damping alpha, 1 for members of clumps
+# (they are moved with their clump, rigid.py; their mass is only a share of its), and what turns a force into a change
+# of velocity: dt / m for x and y, dt / I for the spin, zero where the component is fixed.
+MASS, INERTIA, ALPHA, CLUMPED, KICK_X, KICK_Y, KICK_SPIN = range(7)
 
 # What a check of the motion returns per block (float64), all to be reduced by maximum.
 PATH2, SPEED2, STRIDE, BROKEN = range(4)
@@ -69,7 +70,7 @@ def fill_body(hot, ihot, icold, n_left, density, damp, shape, dt, body):
             volume *= r
         m = density[material] * volume
         inertia = gyration * m * r * r
-        body[c, MASS], body[c, INERTIA], body[c, ALPHA] = m, inertia, damp[material]
+        body[c, MASS], body[c, INERTIA], body[c, ALPHA], body[c, CLUMPED] = m, inertia, damp[material], 0.0
         body[c, KICK_X] = 0.0 if fix & FIX_X else dt / m
         body[c, KICK_Y] = 0.0 if fix & FIX_Y else dt / m
         body[c, KICK_SPIN] = 0.0 if fix & FIX_SPIN else dt / inertia

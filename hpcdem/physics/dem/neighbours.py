@@ -30,6 +30,8 @@ USUAL = 8
 """As many contacts as a particle usually has, or more."""
 SLOTS_PER_ROW = 6
 """Room for the list at first; discs of similar size need half of it."""
+SLOTS_IN_CLUMPS = 24
+"""The same where members of clumps lie upon each other; such pairs leave the list again."""
 
 
 class Blocks(NamedTuple):
@@ -98,6 +100,22 @@ def _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _drop_siblings(t, clump, cut, lo, poff, ptr, row, partner):
+    """Keep the pairs of block t that are not members of the same clump; returns how many."""
+    begin = ptr[poff[t]]
+    k = first = begin
+    for i in range(lo[t], cut[t + 1]):
+        last = ptr[poff[t] + i + 1 - lo[t]]
+        for q in range(first, last):
+            j = partner[q]
+            row[k], partner[k] = i, j
+            k += (clump[i] < 0) | (clump[i] != clump[j])
+        first = last
+        ptr[poff[t] + i + 1 - lo[t]] = k
+    return k - begin
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made):
     """Give the slots begin : end what their pairs remember, which stands with both ends."""
     for k in range(U(begin), U(end)):
@@ -149,7 +167,7 @@ def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
-    t, begin, room, hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
     where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
@@ -160,6 +178,8 @@ def _fill(
     n = _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, row, partner)
     if n > room:
         return n, 0, 0.0
+    if len(clump) > 0:
+        n = _drop_siblings(t, clump, cut, lo, poff, ptr, row, partner)
     if len(hrows) == 0:
         fs[begin : begin + n], bond[begin : begin + n], u_made[begin : begin + n] = 0.0, 0, 0.0
         return n, 0, 0.0
@@ -178,12 +198,12 @@ def _fill_blocks(n_blocks, need, placed, longest2, begin, room, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _fill_blocks_threaded(
     n_blocks, need, placed, longest2, begin, room,
-    hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
     where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     for t in prange(n_blocks):
         need[t], placed[t], longest2[t] = _fill(
-            t, begin[t], room[t], hot, ihot, cell, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+            t, begin[t], room[t], hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
             where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
         )  # fmt: skip
 
@@ -286,12 +306,14 @@ def build(
     skin: float,
     bond_reach: float,
     n_blocks: int,
+    clump: np.ndarray | None = None,
 ) -> ContactLists:
     """Make the lists for particles stored in global order.
 
     hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cell (n,) i8: keys of their cells of this side [m]; hist:
     of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
-    bond_reach [m]: bonded pairs are listed up to this distance, 0 if there are none.
+    bond_reach [m]: bonded pairs are listed up to this distance, 0 if there are none; clump (n,) i8: number of the rigid
+    clump of each row, -1 for none: members of one clump are no pairs (None: there are no clumps).
     """
     ihot = hot.view(np.int64)
     lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks))
@@ -299,7 +321,8 @@ def build(
     span = np.maximum(blocks.cut[1:] - blocks.lo, 0)
     lists.ptr = np.zeros(int((span + 1).sum()), np.int64)
     need, placed, longest2 = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64), np.zeros(n_blocks)
-    room = SLOTS_PER_ROW * span + 64
+    room = (SLOTS_PER_ROW if clump is None else SLOTS_IN_CLUMPS) * span + 64
+    siblings = np.empty(0, np.int64) if clump is None else clump
     bond2 = bond_reach**2 if bond_reach > 0.0 else -1.0
     fill = _fill_blocks if n_blocks == 1 else _fill_blocks_threaded
     while True:
@@ -309,7 +332,7 @@ def build(
             lists.ptr, np.empty(m, np.int32), np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m),
         )  # fmt: skip
         fill(
-            n_blocks, need, placed, longest2, begin, room, hot, ihot, cell, n_left, n_own,
+            n_blocks, need, placed, longest2, begin, room, hot, ihot, cell, siblings, n_left, n_own,
             blocks.cut, blocks.lo, blocks.hi, blocks.poff, skin, bond2,
             where, hist.ptr, hist.rows, hist.rows.view(np.int64), *slots,
         )  # fmt: skip

@@ -11,7 +11,7 @@ from numba import njit
 from hpcdem.fields import FIX, FIX_X, FIX_Y, GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.physics.dem import laws
 from hpcdem.physics.dem.contacts import E_MOD, G_MOD, KIND, MODEL, A, B
-from hpcdem.physics.dem.motion import INERTIA, MASS
+from hpcdem.physics.dem.motion import CLUMPED, INERTIA, MASS
 from hpcdem.physics.exact_sum import add_to_bins
 
 _ROOM = 256
@@ -97,7 +97,7 @@ def add_wall_stiffness(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def kinetic(hot, n_left, body, bins):
-    """(m v^2 + I w^2) / 2 [J] of the owned particles into bins (2, 2112) i8."""
+    """(m v^2 + I w^2) / 2 [J] of the owned particles into bins (2, 2112) i8; nothing of members of clumps."""
     energies = np.empty(_ROOM)
     bits = energies.view(np.int64)
     for start in range(0, len(body), _ROOM):
@@ -106,16 +106,21 @@ def kinetic(hot, n_left, body, bins):
             c = start + k
             i = n_left + c
             vx, vy, w = hot[i, VX], hot[i, VY], hot[i, SPIN]
+            if body[c, CLUMPED] != 0.0:
+                energies[k] = 0.0
+                continue
             energies[k] = 0.5 * (body[c, MASS] * (vx * vx + vy * vy) + body[c, INERTIA] * w * w)
         _empty_into(bins, n, bits)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def extremes(icold, body, force, gx, gy, stiffness):
-    """Of the owned particles: largest force (fx, fy) + m g in the directions that are not fixed [N] (NaN if any is),
-    and least m / sum k [s^2] of those that move and touch something (infinite without)."""
+    """Of the owned particles but members of clumps: largest force (fx, fy) + m g in the directions that are not fixed
+    [N] (NaN if any is), and least m / sum k [s^2] of those that move and touch something (infinite without)."""
     largest, shortest, broken = 0.0, math.inf, False
     for c in range(len(body)):
+        if body[c, CLUMPED] != 0.0:
+            continue
         fix = icold[c, FIX]
         fx = 0.0 if fix & FIX_X else force[c, 0] + body[c, MASS] * gx
         fy = 0.0 if fix & FIX_Y else force[c, 1] + body[c, MASS] * gy

@@ -3,9 +3,11 @@ against what their heads claim."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
@@ -64,6 +66,54 @@ def test_short_biaxial_is_the_same_on_two_ranks(launch: Launcher, tmp_path: Path
     assert frames[0] == frames[1]
 
 
+def triangles(launch: Launcher, ranks: int, folder: Path) -> str:
+    """What the test of 60 round and 60 triangular grains says."""
+    script = shortened(
+        "biaxial_triangles",
+        folder,
+        GRAINS="GRAINS, SIZES = 60, (4e-3, 5e-3, 6e-3)",
+        STRESS="STRESS, STRAIN, INERTIAL = 100e3, 0.03, 1e-2",
+    )
+    done = launch.python(ranks, script, cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (folder / "data" / "biaxial_triangles.jpg").stat().st_size > 10_000
+    return "\n".join(re.findall(r"(?:round|triangle): void ratio [^\r\n]*", done.stdout))
+
+
+@pytest.mark.mpi
+@pytest.mark.slow
+def test_short_triangles_are_the_same_on_two_ranks(launch: Launcher, tmp_path: Path) -> None:
+    """Clumps under a servo: what is printed and the last state."""
+    one, two = (triangles(launch, n, tmp_path / str(n)) for n in (1, 2))
+    assert one == two and one.count("peak of") == 2
+    frames = [list_frames(tmp_path / str(n) / "data")[-1].path.with_suffix(".dat").read_bytes() for n in (1, 2)]
+    assert frames[0] == frames[1]
+
+
+def test_the_triangle_is_what_it_says(tmp_path: Path) -> None:
+    """Area and moment of the rounded triangle of the example against a polygon of 30 000 corners; all discs lie inside
+    it, and leave out little of the outline."""
+    text = (EXAMPLES / "biaxial_triangles.py").read_text()
+    names: dict = {"math": math}
+    exec(text[text.index("def triangle") : text.index("def write_grains")], names)  # the function of the example
+    area, corner = 2.0, 0.22
+    discs, moment = names["triangle"](area, corner)
+    r = min(disc[2] for disc in discs)
+    inner = max(disc[2] for disc in discs) - r
+    turn = (np.arange(30_000) + 0.5) / 30_000 * 2.0 * math.pi
+    way = math.pi / 2 + np.round((turn - math.pi / 2) / (2 * math.pi / 3)) * 2 * math.pi / 3
+    x, y = (2 * inner * f(way) + r * f(turn) for f in (np.cos, np.sin))
+    x2, y2 = np.roll(x, -1), np.roll(y, -1)
+    cross = x * y2 - x2 * y
+    assert 0.5 * cross.sum() == pytest.approx(area, rel=1e-7)
+    assert (cross * (x * x + x * x2 + x2 * x2 + y * y + y * y2 + y2 * y2)).sum() / 12 == pytest.approx(moment, rel=1e-7)
+    gap = np.min([np.hypot(x - dx, y - dy) - dr for dx, dy, dr in discs], axis=0)
+    assert gap.min() > -1e-6
+    along = np.linspace(-1.0, 1.0, 2001) * math.sqrt(3) * inner  # the lower edge, which has no corner between its ends
+    gap = np.min([np.hypot(along - dx, -inner - r - dy) - dr for dx, dy, dr in discs], axis=0)
+    assert 0.0 < gap.max() < 0.04 * math.sqrt(area)
+
+
 def test_short_angle_of_repose_collapses(launch: Launcher, tmp_path: Path) -> None:
     """A smaller column, the wall drawn back by a few millimetres: sand follows it."""
     script = shortened(
@@ -92,6 +142,20 @@ def test_whole_biaxial_gives_a_rock(launch: Launcher, tmp_path: Path) -> None:
     assert number(done.stdout, r"friction angle (\S+) degrees") == pytest.approx(16.0, abs=1.0)
     assert number(done.stdout, r"cohesion (\S+) MPa") == pytest.approx(11.0, abs=1.0)
     assert (tmp_path / "biaxial.jpg").stat().st_size > 30_000
+
+
+@pytest.mark.slow
+def test_whole_triangles_are_stronger(launch: Launcher, tmp_path: Path) -> None:
+    """The head claims that triangles are stronger and swell more."""
+    done = launch(1, "--outdir", tmp_path, EXAMPLES / "biaxial_triangles.py", timeout=1800)
+    assert done.returncode == 0, done.stdout + done.stderr
+    seen = {
+        name: [number(done.stdout, rf"{name}: .*{what}") for what in (r"peak of s1 - s3 (\S+)", r"volume strain (\S+)")]
+        for name in ("round", "triangle")
+    }
+    assert seen["triangle"][0] > 1.3 * seen["round"][0]
+    assert seen["triangle"][1] > seen["round"][1] > 0.0
+    assert (tmp_path / "biaxial_triangles.jpg").stat().st_size > 30_000
 
 
 @pytest.mark.slow
