@@ -39,6 +39,8 @@ def main() -> NoReturn:
     words, cores_before = sys.argv[1:], launch.cores()
     if words[:1] and words[0] in PROGRAMS:
         start(words[0], words[1:])
+    if words[:1] == ["grade"]:
+        importlib.import_module("hpcdem.cli.grade_page").start(words[1:])
     if words[:1] == ["doctor"]:
         importlib.import_module("hpcdem.cli.doctor").start(words[1:], cores_before)
     if any(word.split("=")[0] in STRESS_AND_STRAIN for word in words):
