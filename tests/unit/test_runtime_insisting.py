@@ -77,6 +77,20 @@ def test_signals_that_come_by_several_ways_are_one(hanging):
         process.wait(1.0)
 
 
+def test_signals_that_were_seen_together_are_one_and_the_next_one_counts(hanging):
+    """As when a rank waits for its disk, and the system delivers what came meanwhile as one."""
+    process = hanging(insist=0.1, patience=60.0, same=0.3)
+    process.send_signal(signal.SIGSTOP)
+    for _ in range(2):
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.4)
+    process.send_signal(signal.SIGCONT)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(1.0)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == EXIT_TERMINATED
+
+
 def test_a_sigterm_that_is_not_answered_ends_it_too(hanging):
     process = hanging(insist=5.0, patience=0.5)
     process.send_signal(signal.SIGTERM)
