@@ -122,20 +122,20 @@ def needs_manual_scripts(manual_scripts: Path) -> Path:
     return manual_scripts
 
 
-_STARTS_OTHERS = {"launch", "launch_once", "wait_until", "needs_mpi", "needs_parallel_hdf5", "slurm", "serve_page"}
-"""Fixtures of tests that start programs and watch them."""
+_WATCHES = {"launch_once", "wait_until", "needs_mpi", "needs_parallel_hdf5", "slurm", "serve_page"}
+"""Fixtures of tests that start several ranks, or look at a program while it runs."""
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest sorts out what `-m` asks for
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A mark is a promise about the machine: let it check the machine too. And who starts ranks needs all cores."""
+    """A mark is a promise about the machine: let it check the machine too. And ranks need all cores."""
     for item in items:
         if not isinstance(item, pytest.Function):
             continue
         for mark in ("mpi", "petsc"):
             if item.get_closest_marker(mark):
                 item.fixturenames.insert(0, f"needs_{mark}")
-        if item.get_closest_marker("slurm") or not _STARTS_OTHERS.isdisjoint(item.fixturenames):
+        if item.get_closest_marker("slurm") or not _WATCHES.isdisjoint(item.fixturenames):
             item.add_marker("alone")
 
 

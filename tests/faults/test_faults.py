@@ -16,6 +16,8 @@ import pytest
 
 from tests.faults.conftest import LAST_FRAME, PILE
 
+pytestmark = pytest.mark.alone
+
 SECONDS = 20.0
 """Longest time from an accident to the end of the job."""
 
