@@ -90,9 +90,11 @@ def _members(bodies: File, x: float, y: float, angle: float, scale: float, first
     rigid[:, CLUMP_ANGLE] = (bodies.angle + angle)[of]
     rigid[:, AREA], rigid[:, MOMENT] = (scale**2 * bodies.area)[of], (scale**4 * bodies.inertia)[of]
     rigid[:, OFFSET_X], rigid[:, OFFSET_Y] = scale * bodies.dx, scale * bodies.dy
-    turned_c, turned_s = np.cos(rigid[:, CLUMP_ANGLE]), np.sin(rigid[:, CLUMP_ANGLE])
-    px = rigid[:, CLUMP_X] + rigid[:, OFFSET_X] * turned_c - rigid[:, OFFSET_Y] * turned_s
-    py = rigid[:, CLUMP_Y] + rigid[:, OFFSET_X] * turned_s + rigid[:, OFFSET_Y] * turned_c
+    # numpy's cos of a column takes another routine, rounded differently, if the result happens to lie beside it.
+    turned = np.array([(math.cos(a), math.sin(a)) for a in (bodies.angle + angle).tolist()]).reshape(-1, 2)[of]
+    dx, dy = rigid[:, OFFSET_X], rigid[:, OFFSET_Y]
+    px = rigid[:, CLUMP_X] + (dx * turned[:, 0] - dy * turned[:, 1])
+    py = rigid[:, CLUMP_Y] + (dx * turned[:, 1] + dy * turned[:, 0])
     return np.column_stack([px, py, scale * bodies.r]), rigid
 
 

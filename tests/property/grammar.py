@@ -274,8 +274,8 @@ class Maker:
 
     def populate(self) -> None:
         """One to three kinds of particles, then what they are made of."""
-        kinds = st.sampled_from(["gen", "grid", "row", "ball", "clumps"])
-        for kind in self.draw(st.lists(kinds, min_size=1, max_size=3)):
+        kinds = ["gen", "grid", "row", "ball", *(["clumps"] if self.disk == "on" else [])]
+        for kind in self.draw(st.lists(st.sampled_from(kinds), min_size=1, max_size=3)):
             getattr(self, f"make_{kind}")()
         self.add(self.pick("PROP", "INIT"), self.material())
         if self.chance(30):
@@ -320,8 +320,6 @@ class Maker:
 
     def make_clumps(self) -> None:
         """Rods and triangles above all others, in a group of their own; discs only, as clumps want it."""
-        if self.disk != "on":
-            return
         r, lines = self.r, ["hpcdem clumps 1"]
         for k in range(self.whole(1, 4)):
             discs = [(1.3 * r * i, 0.0, self.pick(1.0, 0.8) * r) for i in range(self.whole(1, 5))]

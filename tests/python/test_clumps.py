@@ -19,7 +19,7 @@ GLINE p1 (0.0, 170.0) p2 (60.0, 170.0) rad 3.0 group row
 CLUMP group bar color blue RANGE group row
 PROP density 2e3 kn 2e7 ks 1e7 fric 0.2 damp 0.1
 PROP spin 0.3 RANGE group bar
-CYC 300
+CYC 400
 DEL RANGE x 100.0 120.0
 SAV end.sav
 STOP
@@ -36,7 +36,7 @@ row = sim.gline((0.0, 170.0), (60.0, 170.0), 3.0, group="row")
 assert sim.join("group row", group="bar", color="blue") == row
 sim.prop(density=2e3, kn=2e7, ks=1e7, fric=0.2, damp=0.1)
 sim.prop("group bar", spin=0.3)
-sim.cycle(300)
+sim.cycle(400)
 sim.delete("x 100.0 120.0")
 sim.save("end.sav")
 sim.finish()
