@@ -335,8 +335,8 @@ class Maker:
         self.files[BODIES] = "\n".join(lines) + "\n"
         where = f"x {number(self.x(0.1, 0.5))} y {number(self.y(1.2, 1.6))}"
         self.add(
-            "CLUMP file", BODIES, where, self.perhaps(30, f"angle {number(self.between(-0.3, 0.3))}"),
-            self.perhaps(20, "scale 0.8"), self.color(), self.group("rock"),
+            "CLUMP file", BODIES, where, self.perhaps(50, f"angle {number(self.between(-0.3, 0.3))}"),
+            self.perhaps(50, "scale 0.8"), self.color(), self.group("rock"),
         )  # fmt: skip
 
     # ---- what happens to them
