@@ -22,5 +22,5 @@ def cost_per_particle(busy: np.ndarray, owned: np.ndarray) -> np.ndarray:
     Kept within a factor of two of the mean, so that one noisy measurement cannot throw the borders about.
     """
     rate = np.where(owned > 0, busy / np.maximum(owned, 1), 0.0)
-    mean = float(busy.sum()) / max(int(owned.sum()), 1)
+    mean = float(busy.sum()) / max(float(owned.sum()), 1)
     return np.clip(rate / mean, 0.5, 2.0) if mean > 0.0 else np.ones(len(busy))

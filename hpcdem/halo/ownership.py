@@ -33,10 +33,19 @@ class Ownership:
         """Rank that owns each column index."""
         return strips.owner_of(cx, self.borders)
 
-    def renew(self, cx: np.ndarray, side: float, step: int, busy: float, room: tuple[float, float] | None) -> None:
-        """Choose borders for particles in columns cx (n,) i8 of this rank. Collective.
+    def renew(
+        self,
+        cx: np.ndarray,
+        side: float,
+        step: int,
+        busy: float,
+        room: tuple[float, float] | None,
+        cost: np.ndarray | float = 1.0,
+    ) -> None:
+        """Choose borders for particles (or elements) in columns cx (n,) i8 of this rank. Collective.
 
-        busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known.
+        busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known; cost:
+        (n,), if it is known that some are dearer than others.
         UsageError when a new model has fewer columns than there are ranks. One that lost them on its way, or was
         restored so, goes on with ranks that wait.
         """
@@ -47,26 +56,29 @@ class Ownership:
         if not first_time and self.side != side:
             self.borders = strips.separate(np.rint(self.borders * (self.side / side)).astype(np.int64))
         self.side = side
-        weight = 1.0
+        weight = cost
         if not (self.wanted or first_time):
-            found = self._uneven(len(cx), step, busy)
+            found = self._uneven(float(np.sum(np.broadcast_to(cost, len(cx)))), step, busy)
             if found is None:
                 return
-            weight = found
+            weight = found * cost
         first, columns = self._span(cx)
         if columns == 0:
             first, columns = 0, 1
         elif first_time and step == 0:
             self._refuse_too_many_ranks(columns, room)
-        cost = np.zeros(min(columns, MOST_COLUMNS))
-        np.add.at(cost, np.minimum(cx - first, len(cost) - 1), weight)
-        self.comm.sum_into(cost)
-        self.borders = strips.cut(self.comm.bcast(cost), first, self.comm.size)
+        total = np.zeros(min(columns, MOST_COLUMNS))
+        np.add.at(total, np.minimum(cx - first, len(total) - 1), weight)
+        self.comm.sum_into(total)
+        self.borders = strips.cut(self.comm.bcast(total), first, self.comm.size)
         self.wanted = False
         self._busy, self._step = busy, step
 
-    def _uneven(self, owned: int, step: int, busy: float) -> float | None:
-        """Relative cost of a particle of this rank if the load is uneven, else None. Collective when it is due."""
+    def _uneven(self, owned: float, step: int, busy: float) -> float | None:
+        """Relative cost of a particle of this rank if the load is uneven, else None. Collective when it is due.
+
+        owned: particles, by their cost.
+        """
         if not self.balance_on or step - self._step < balance.PATIENCE:
             return None
         measured = np.array(self.comm.allgather((busy - self._busy, owned)))

@@ -1,2 +1,2 @@
-"""What a model consists of: particles, materials, bond types, walls, settings. Data only; no MPI, no files, no
-loops."""
+"""What a model consists of: particles, materials, bond types, walls, settings. Data only; no MPI, no
+files."""

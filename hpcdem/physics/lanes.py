@@ -115,6 +115,30 @@ def _columns(count: int) -> Any:
 two_columns, four_columns = _columns(2), _columns(4)
 
 
+def _put(count: int) -> Any:
+    @intrinsic
+    def put(typingctx: Any, table: Any, i: Any, lanes: Any, at: Any) -> Any:
+        signature = types.void(table, _ROWS, lanes, types.uint64)
+
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            a = _Access(context, builder, signature, args)
+            for q, row in enumerate(_turned(builder, a.load_lanes(2, args[3]))):
+                part = row if count == GROUP else builder.shuffle_vector(row, row, _picks(*range(count)))
+                a.store(0, a.item(1, q), part)
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    put.__doc__ = (
+        f"The inverse of {'four' if count == GROUP else 'two'}_columns, one row after the other. Four lanes must be "
+        "readable."
+    )
+    return put
+
+
+put_two_columns, put_four_columns = _put(2), _put(4)
+
+
 @intrinsic
 def add_in_turn(typingctx: Any, force: Any, i: Any, j: Any, lanes: Any, at: Any) -> Any:
     """For each of four pairs, one after the other: force[i] += (a, b, c, 0), then force[j] += (-a, -b, d, 0).
@@ -153,7 +177,7 @@ class _Access:
         return value
 
     def store(self, argument: int, offset: Any, value: Any) -> None:
-        self.builder.store(value, self._pointer(argument, offset)).align = 8
+        self.builder.store(value, self._pointer(argument, offset, value.type)).align = 8
 
     def load_lanes(self, argument: int, at: Any) -> list:
         return [self.load(argument, self._lane(at, c)) for c in range(GROUP)]
@@ -165,16 +189,20 @@ class _Access:
     def _lane(self, at: Any, c: int) -> Any:
         return self.builder.add(at, ir.Constant(_INT, c * CAPACITY))
 
-    def _pointer(self, argument: int, offset: Any) -> Any:
+    def _pointer(self, argument: int, offset: Any, kind: Any = _FOUR) -> Any:
         array = self.context.make_array(self.types[argument])(self.context, self.builder, value=self.args[argument])
-        return self.builder.bitcast(self.builder.gep(array.data, [offset]), _FOUR.as_pointer())
+        return self.builder.bitcast(self.builder.gep(array.data, [offset]), kind.as_pointer())
+
+
+def _picks(*which: int) -> Any:
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(which)), list(which))
 
 
 def _turned(builder: Any, rows: list) -> list:
     """The 4 x 4 transposition of four vectors of four."""
 
     def pick(a: Any, b: Any, *which: int) -> Any:
-        return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), GROUP), list(which)))
+        return builder.shuffle_vector(a, b, _picks(*which))
 
     even = [pick(rows[k], rows[k + 1], 0, 4, 2, 6) for k in (0, 2)]
     odd = [pick(rows[k], rows[k + 1], 1, 5, 3, 7) for k in (0, 2)]

@@ -1,0 +1,44 @@
+"""Tables: piecewise linear functions of model time, constant beyond their ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.errors import CommandError
+
+
+@dataclass(frozen=True)
+class Table:
+    """times (n,) f8 [s], strictly ascending; values (n,) f8."""
+
+    times: np.ndarray
+    values: np.ndarray
+
+    @staticmethod
+    def of(pairs: Iterable[tuple[float, float]], name: str = "table") -> Table:
+        """A table from (time, value) pairs; CommandError unless finite, in ascending order, at least one."""
+        try:
+            rows = np.array(list(pairs), np.float64).reshape(-1, 2)
+        except (TypeError, ValueError):
+            raise CommandError(f"table '{name}': expected pairs (time, value)") from None
+        if not len(rows):
+            raise CommandError(f"table '{name}' has no pairs (time, value)")
+        bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+        if len(bad):
+            raise CommandError(f"table '{name}': pair {bad[0] + 1}, {tuple(rows[bad[0]].tolist())}, is not finite")
+        late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
+        if len(late):
+            t, after = rows[late[0] : late[0] + 2, 0]
+            raise CommandError(f"table '{name}': times must ascend, but {after:g} follows {t:g} (pair {late[0] + 2})")
+        return Table(rows[:, 0].copy(), rows[:, 1].copy())
+
+    def __call__(self, time: float) -> float:
+        """Value at a time [s]."""
+        return float(np.interp(time, self.times, self.values))
+
+    def pairs(self) -> list[list[float]]:
+        """(time, value) pairs as JSON values."""
+        return np.column_stack([self.times, self.values]).tolist()

@@ -1,0 +1,141 @@
+"""The energy budget where bodies break: it closes, and nothing gives more than it was given.
+
+Kinetic and elastic energy are functions of the state, work is added up over the steps: so the sum can fail.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from hpcdem.blocks import Blocks
+from hpcdem.physics.fdem.laws import SOFTENING_AREA, softening
+from tests.blocks import worker
+from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+
+E = ROCK["young"]
+
+
+def watched(sim: Blocks, until: float, act: Callable[[Blocks], None] = lambda sim: None) -> dict[str, float]:
+    """Run to this time; at every look the budget closes to 1 %. Returns the last reading."""
+    found: dict[str, float] = {}
+    while sim.clock.time < until:
+        for _ in range(200):
+            act(sim)
+            sim.step()
+        found = sim.energies()
+        assert found["relative"] < 0.01, found
+        given = found["work_gravity"] + found["work_outside"] + found["commands"]
+        size = max(abs(given), found["kinetic"], found["joints_lost"])
+        # What contact gives back is what joints that broke closed had handed to it, or what was pressed into it.
+        assert found["joints_lost"] + found["contact"] > -0.01 * size, found
+        assert found["viscous_lost"] >= 0.0
+    return found
+
+
+def test_a_plate_pulled_apart():
+    """The joints lose no less than G_f1 per length of the crack, no more than their damage says."""
+    sim = model(rectangle(4, 8, 0.04, 0.08))
+    sim.element_property(None, {"damp_factor": 0.2})
+    jointed(sim, gf1=5.0, gf2=50.0, tensile_strength=2e6)
+    y = sim.mesh.points[:, 1]
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.table("grip", [(0.0, 0.0), (5e-5, 0.05)])
+    sim.velocity_condition(np.flatnonzero(y > 0.08 - 1e-9), vy="grip")
+    sim.account_energy()
+    found = watched(sim, 8e-4)
+    events = sim.events()
+    assert len(events["joint"]) >= 4 and (events["mode"] < 1.3).mean() > 0.7
+    # Broken joints have lost G_f1 per length, damaged ones the part of it that lies under f up to their damage.
+    damage, length = sim.values("damage"), sim.values("length")
+    part = np.array([quad(softening, 0.0, d)[0] for d in damage]) / SOFTENING_AREA
+    assert 0.97 * 5.0 * events["length"].sum() < found["joints_lost"] < 1.05 * 5.0 * (part * length).sum()
+
+
+@pytest.mark.parametrize(
+    "shape, friction, penalty",
+    [("cross", 20.0, 0.0), ("cross", 0.0, 0.0), ("quad", 20.0, 0.0), ("mixed", 20.0, 0.0), ("cross", 20.0, 10.0)],
+)
+def test_a_block_that_falls_apart(shape, friction, penalty):
+    """Compressed joints break and their faces go on by contact, also at the tips of cracks that have not met: no energy
+    comes out of that, even if contact has a penalty (over E) that would make it six times stiffer than the joints were.
+    The block never gets faster than it came."""
+    sim = Blocks()
+    worker.impact(sim, shape)
+    if penalty:
+        sim.face_model(None, "contact_mohr_coulomb", {"friction": friction, "penalty_normal": penalty * E})
+    sim.joint_property(None, {"friction": friction})
+    sim.gravity(0.0, 0.0)
+    sim.account_energy()
+    start = 0.5 * ROCK["density"] * 0.96 * (0.5**2 + 2.0**2)
+    found = watched(sim, 1.6e-3)
+    assert sim.joint_counts()[2] > 30
+    total = found["kinetic"] + found["strain"] + found["joints"]
+    assert total < start
+    assert total + found["viscous_lost"] + found["joints_lost"] + found["contact"] == pytest.approx(start, rel=1e-3)
+
+
+def test_a_specimen_crushed():
+    """Two platens that move together; friction and shear failure."""
+    sim = model(shaken(rectangle(6, 12, 0.03, 0.06), 0.2))
+    sim.element_property(None, {"damp_factor": 0.3, "friction": 20.0})
+    jointed(sim, gf1=3.0, gf2=15.0, tensile_strength=2e6, cohesion=6e6)
+    y = sim.mesh.points[:, 1]
+    for speed, name, nodes in ((1.0, "up", y < 1e-9), (-1.0, "down", y > 0.06 - 1e-9)):
+        sim.table(name, [(0.0, 0.0), (2e-5, speed)])
+        sim.velocity_condition(np.flatnonzero(nodes), vy=name)
+    sim.account_energy()
+    found = watched(sim, 4e-4)
+    _, yielded, broken = sim.joint_counts()
+    assert broken > 15 and yielded > 15
+    assert (sim.events()["mode"] > 1.5).any()
+    assert found["work_outside"] > 20.0 and found["joints_lost"] > 0.0
+
+
+def test_a_beam_bent():
+    """Three points: one crack from below, opened; work of the middle one is stored or lost."""
+    sim = model(rectangle(24, 6, 0.24, 0.06))
+    sim.element_property(None, {"damp_factor": 0.3})
+    jointed(sim, gf1=10.0, gf2=100.0, tensile_strength=2e6, cohesion=20e6)
+    x, y = sim.mesh.points.T
+    sim.velocity_condition(np.flatnonzero((y < 1e-9) & ((np.abs(x - 0.02) < 1e-9) | (np.abs(x - 0.22) < 1e-9))), vy=0.0)
+    sim.table("load", [(0.0, 0.0), (1e-4, -0.1)])
+    sim.velocity_condition(np.flatnonzero((y > 0.06 - 1e-9) & (np.abs(x - 0.12) < 1e-9)), vx=0.0, vy="load")
+    sim.account_energy()
+    watched(sim, 6e-4)
+    events = sim.events()
+    assert len(events["joint"]) >= 4 and (events["mode"] < 1.5).mean() > 0.6
+    assert np.abs(events["x"] - 0.12).min() < 0.03
+
+
+def test_a_hole_blasted():
+    """After a static stage: pressure that follows a table, mass scaling, an automatic time step, other properties on
+    the way; commands change what is stored, and are told apart."""
+    sim = Blocks()
+    worker.opening(sim)
+    while sim.clock.step < 751:
+        worker.open_up(sim)
+        sim.step()
+    found = watched(sim, 2e-3, worker.open_up)
+    assert sim.joint_counts()[2] > 20 and found["commands"] != 0.0
+    assert found["work_outside"] > 1000.0
+
+
+def test_the_account_does_not_change_the_run():
+    """With and without a budget, mass scaling included: the same bits."""
+    ends = []
+    for keep in (True, False):
+        sim = Blocks()
+        worker.opening(sim)
+        while sim.clock.step < 1300:
+            worker.open_up(sim)
+            if not keep and sim.clock.step == 750:
+                sim.account_energy(False)
+            sim.step()
+        ends.append(np.concatenate([sim.values("position_x"), sim.values("velocity_y"), sim.values("damage")]))
+    assert np.array_equal(ends[0], ends[1], equal_nan=True)
+    assert math.isfinite(float(np.nansum(ends[0])))

@@ -1,0 +1,64 @@
+"""After a rehearsal nothing has to be compiled: asked of a process of its own, as kernels stay compiled."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from tests.conftest import ROOT, run
+
+PROGRAM = """
+import numpy as np
+from hpcdem.blocks import Blocks, build, memories, pairs
+from hpcdem.blocks.rehearsal import rehearse
+from hpcdem.model.blocks import connectivity
+from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem import contact, detect, elements, energy, limits, nodes, stiffness
+from tests.blocks.support import jointed, model, rectangle
+
+def compiled():
+    modules = (build, connectivity, contact, detect, elements, energy, limits, memories, nodes, pairs, stiffness)
+    found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
+    return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
+
+rehearse(1)
+before = compiled()
+for kind in ("cross", "quad", "mixed"):
+    sim = model(rectangle(4, 4, 1.0, 1.0, kind=kind))
+    sim.advance(3)
+    sim.unbalanced_ratio()
+    sim.save("x.sav")
+    Blocks().restore("x.sav")
+    sim = jointed(model(rectangle(4, 4, 1.0, 1.0, kind=kind)))
+    sim.option(dynamic=False)
+    sim.gravity(0.0, -1.0)
+    sim.advance(3)
+    sim.null([3], relax=3)
+    sim.advance(2)
+    sim.crack(sim.numbers_of_joints(None)[:3])
+    sim.option(dynamic=True)
+    sim.account_energy()
+    sim.time_step(auto=True, mass_scaling=1e-5)
+    sim.initial_stress(None, xx=-1.0)
+    sim.advance(120)
+    sim.energies(), sim.contacts(), sim.total("opening"), sim.reset_displacement(), sim.values("displacement_x")
+square = rectangle(2, 2, 1.0, 1.0)
+for kind in ("cross", "quad", "mixed"):
+    for sim in (model(rectangle(2, 2, 1.0, 1.0, kind=kind)), jointed(model(rectangle(2, 2, 1.0, 1.0, kind=kind)))):
+        sim.velocity_condition([0, 1, 2], vx=0.0, vy=0.0)
+        sim.gravity(0.0, -1.0)
+        sim.option(dynamic=False)
+        sim.solve_elastic()
+sim = model(Mesh.of(np.asfortranarray(square.points), np.asfortranarray(square.cells)))
+sim.step()
+after = compiled()
+print({k: (n, after[k]) for k, n in before.items() if after[k] != n})
+"""
+
+
+@pytest.mark.slow
+def test_a_rehearsal_leaves_nothing_to_compile(tmp_path):
+    done = run([sys.executable, "-c", PROGRAM], tmp_path, env={"PYTHONPATH": str(ROOT)})
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.strip() == "{}"

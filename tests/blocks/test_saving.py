@@ -1,0 +1,95 @@
+"""Saved and restored models of blocks go on bit for bit, whatever state they were in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcdem.blocks import Blocks
+from hpcdem.errors import CommandError
+from tests.blocks import worker
+from tests.blocks.support import jointed, model, rectangle
+
+
+def state(sim: Blocks) -> dict[str, np.ndarray]:
+    names = ("position_x", "position_y", "velocity_x", "stress_xx", "damage", "state", "reaction_x", "displacement_y")
+    out = {name: sim.values(name) for name in names}
+    out["contacts"] = np.column_stack([sim.contacts()[name] for name in ("x", "y")])
+    out["clock"] = np.array([sim.clock.step, sim.clock.time, sim.clock.dt])
+    return out
+
+
+def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
+    for name, values in a.items():
+        assert np.array_equal(values, b[name], equal_nan=True), name
+
+
+@pytest.mark.parametrize("at", [0, 100, 300, 301, 420, 750, 751, 960])
+def test_a_run_with_all_kinds_of_stages_goes_on(at, tmp_path):
+    """Before the first step, at rest, just after elements were taken out (not stepped yet), while forces fade, before
+    and after the change to motion, while it breaks."""
+    sim = Blocks()
+    worker.opening(sim)
+    while sim.clock.step < at:
+        worker.open_up(sim)
+        sim.step()
+    if at in (300, 750):
+        worker.open_up(sim)  # commands given, model open
+    sim.save(tmp_path / "a.sav", {"m_n": 3})
+    again = Blocks(threads=1)
+    assert again.restore(tmp_path / "a.sav") == {"m_n": 3}
+    if at not in (300, 750):
+        same(state(sim), state(again))
+    for _ in range(60):
+        for one in (sim, again):
+            if not (one.clock.step == at and at in (300, 750)):
+                worker.open_up(one)
+            one.step()
+    same(state(sim), state(again))
+
+
+def test_looking_and_saving_change_nothing(tmp_path):
+    """A run that is looked at and saved at every step ends like one that is not."""
+    ends = []
+    for look in (False, True):
+        sim = Blocks()
+        worker.impact(sim)
+        sim.advance(900)
+        for k in range(150):
+            sim.advance(1)
+            if look:
+                sim.values("stress_max")
+                sim.unbalanced_ratio()
+                sim.energies()
+                sim.contacts()
+                sim.events()
+                if k % 10 == 0:
+                    sim.save(tmp_path / "b.sav")
+        ends.append(state(sim))
+    assert np.nanmax(ends[0]["damage"]) == 1.0
+    same(*ends)
+
+
+def test_variables_alone_can_be_saved(tmp_path):
+    """A model without a mesh keeps what the script wants to keep."""
+    sim = Blocks()
+    sim.save(tmp_path / "v.sav", {"m_a": [1.5, "x"], "nested": {"k": None}})
+    other = jointed(model(rectangle(2, 2, 1.0, 1.0)))
+    assert other.restore(tmp_path / "v.sav") == {"m_a": [1.5, "x"], "nested": {"k": None}}
+    assert other.mesh is None
+    with pytest.raises(CommandError, match="no mesh"):
+        other.step()
+
+
+def test_what_cannot_be_restored_leaves_the_model_alone(tmp_path):
+    sim = jointed(model(rectangle(2, 2, 1.0, 1.0)))
+    sim.advance(5)
+    before = state(sim)
+    (tmp_path / "c.sav").write_bytes(b"not a checkpoint")
+    for path in (tmp_path / "c.sav", tmp_path / "missing.sav", tmp_path):
+        with pytest.raises(CommandError):
+            sim.restore(Path(path))
+        same(before, state(sim))
+    sim.advance(5)

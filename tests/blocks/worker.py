@@ -1,0 +1,183 @@
+"""Runs a model of blocks to which much happens, on any number of ranks and threads, and writes what became of it.
+
+python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from hpcdem.blocks import Blocks
+from hpcdem.halo.comm import MpiComm, SerialComm
+from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
+
+COHESIVE = "classic_intrinsic_cohesive_interface"
+WEAK = {**JOINT, "gf1": 20.0, "gf2": 100.0, "tensile_strength": 1.5e6, "cohesion": 5e6}
+
+
+def communicator():
+    from mpi4py import MPI
+
+    return MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.Get_size() > 1 else SerialComm()
+
+
+def make(kind: str, threads: int) -> Blocks:
+    """A model of one of `KINDS`."""
+    sim = empty(kind, threads)
+    KINDS[kind][0](sim)
+    return sim
+
+
+def empty(kind: str, threads: int) -> Blocks:
+    """What flies goes through borders that stay; else they follow the load."""
+    return Blocks(communicator(), threads, balance_on=kind != "flight")
+
+
+def impact(sim: Blocks, shape: str = "cross") -> None:
+    """A jointed block falls apart on a fixed plate."""
+    block = shaken(rectangle(16, 6, 1.6, 0.6, kind=shape), 0.2)
+    plate = rectangle(24, 1, 2.4, 0.1, x0=-0.4, y0=-0.101, kind=shape)
+    sim.take_mesh(joined(block, plate))
+    n = len(block.cells)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    edges = sim.mesh.edges()
+    inner = edges.faces[edges.inner & (edges.faces[:, 0] < 4 * n)]
+    if shape == "mixed":  # joints on the right half only
+        centre = sim.mesh.centroids()[inner[:, 0] // 4, 0]
+        inner = inner[centre > 0.8]
+    sim.joint_model(inner[:, 0], COHESIVE, WEAK)
+    sim.velocity_condition(np.arange(len(block.points), len(sim.mesh.points)), vx=0.0, vy=0.0)
+    sim.set_velocity(np.arange(len(block.points)), vx=0.5, vy=-2.0)
+    sim.gravity(0.0, -9.81)
+    sim.account_energy()
+
+
+def mixed(sim: Blocks) -> None:
+    """The same of quads and triangles, partly one body."""
+    impact(sim, "mixed")
+
+
+def flight(sim: Blocks) -> None:
+    """Two blocks shatter each other while both fly to the right, through the strips of all ranks."""
+    one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
+    two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13, kind="mixed"), 0.2, seed=2)
+    sim.take_mesh(joined(one, two))
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
+    sim.face_model(None, "contact_mohr_coulomb",
+                   {"friction": 25.0, "penalty_normal": 2e11, "damping_t": 2e8, "damping_b": 2.0})  # fmt: skip
+    sim.joint_model(None, COHESIVE, WEAK)
+    n = len(one.points)
+    sim.set_velocity(np.arange(n), vx=203.0, vy=0.0)
+    sim.set_velocity(np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)
+    sim.account_energy()
+
+
+def opening(sim: Blocks) -> None:
+    """A stressed bed of triangles and quads, jointed on the left, with a crack; a hole is made in it, then blasted."""
+    mesh = shaken(rectangle(16, 8, 1.6, 0.8, kind="mixed"), 0.15)
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 20.0})
+    edges = mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    centre = mesh.centroids()[inner // 4]
+    sim.joint_model(inner[centre[:, 0] < 0.8], COHESIVE, WEAK)
+    ends = mesh.points[edges.points[edges.inner]]
+    upright = np.abs(ends[:, 0, 0] - ends[:, 1, 0]) < 0.04
+    across = (np.abs(ends[:, :, 0].mean(axis=1) - 0.5) < 0.03) & upright & (ends[:, :, 1].mean(axis=1) < 0.5)
+    sim.crack(inner[across])
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero((x < 1e-9) | (x > 1.6 - 1e-9)), vx=0.0)
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    top = edges.faces[~edges.inner][:, 0]
+    top = top[mesh.points[edges.points[~edges.inner]][:, :, 1].min(axis=1) > 0.8 - 1e-9]
+    sim.stress_condition(top, normal=-2e6)
+    sim.initial_stress(None, xx=-0.5e6, yy=-1e6, gradient={"yy": (0.0, 1e4)})
+    sim.gravity(0.0, -9.81)
+    sim.option(dynamic=False)
+
+
+def open_up(sim: Blocks) -> None:
+    """What happens to the bed: the hole at rest, then motion in time with a pressure in the hole."""
+    if sim.clock.step == 300:
+        middle = sim.mesh.centroids() - [0.75, 0.45]
+        sim.null(np.flatnonzero(np.hypot(*middle.T) < 0.16), relax=250)
+    if sim.clock.step == 750:
+        sim.option(dynamic=True)
+        sim.time_step(auto=True, mass_scaling=3e-6)
+        sim.account_energy()
+        sim.table("blast", [(0.0, 0.0), (1e-4, -2e7), (3e-4, -2e6)])
+        gone = np.repeat(~sim.alive, 4) & (sim.partner >= 0)
+        rim = sim.partner[gone]
+        sim.stress_condition(rim[sim.alive[rim // 4]], normal="blast")
+        sim.reset_displacement()
+    if sim.clock.step == 1200:
+        sim.element_property(np.arange(40), {"young": 40e9})
+
+
+def report_borders(sim: Blocks) -> None:
+    """A long bed, its left third shattered and at rest: how many elements each rank has, and their cost."""
+    sim.take_mesh(rectangle(60, 4, 6.0, 0.4))
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 30.0})
+    sim.joint_model(None, COHESIVE, WEAK)
+    edges = sim.mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    sim.crack(inner[sim.mesh.centroids()[inner // 4, 0] < 2.0])
+    x, y = sim.mesh.points.T
+    sim.velocity_condition(None, vx=0.0)
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.velocity_condition(np.flatnonzero(y > 0.4 - 1e-9), vy=-0.1)
+    sim.advance(200)  # everything touches now, and remembers it
+    sim.open_model()
+    sim.ownership.wanted = True
+    sim.close_model()
+    sim.open_model()
+    # One write: ranks share a pipe, and pieces of lines would mix.
+    print(f"borders {sim.comm.rank} {len(sim.number)} {float(sim._costs().sum())}\n", end="", flush=True)
+
+
+def nothing(sim: Blocks) -> None:
+    """No commands on the way."""
+
+
+KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
+         "opening": (opening, open_up), "borders": (report_borders, nothing)}  # fmt: skip
+
+
+def main() -> None:
+    kind, threads, steps, out, *more = sys.argv[1:]
+    if more[:1] == ["resume"]:
+        sim = empty(kind, int(threads))
+        assert sim.restore(more[1]) == {"kind": kind}
+    else:
+        sim = make(kind, int(threads))
+    first = None
+    if kind == "borders":
+        return
+    while sim.clock.step < int(steps):
+        if len(more) == 2 and more[0] != "resume" and sim.clock.step == int(more[0]):
+            sim.save(more[1], {"kind": kind})
+        KINDS[kind][1](sim)
+        sim.advance(1)
+        first = set(sim.number[sim.owned].tolist()) if first is None else first
+    found = {name: sim.values(name) for name in ("position_x", "position_y", "velocity_x", "velocity_y")}
+    for name in ("stress_xx", "stress_yy", "stress_xy", "state", "damage", "mode", "reaction_y", "displacement_x"):
+        found[name] = sim.values(name)
+    found.update({f"event_{name}": values for name, values in sim.events().items()})
+    found["counts"] = np.array(sim.joint_counts())
+    found["time"] = np.array([sim.clock.time, sim.clock.dt])
+    if sim.budget is not None:
+        found.update({f"energy_{name}": np.array(value) for name, value in sim.energies().items()})
+    came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - (first or set())))
+    found["about"] = np.array([sim.rebuilds, sim.lattice.late, len(sim.local.pairs), sum(came)])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+    print(sim.comm.rank, sim.n_own, sim.rebuilds, sim.lattice.late, sim.joint_counts(), came, flush=True)
+
+
+if __name__ == "__main__":
+    main()
