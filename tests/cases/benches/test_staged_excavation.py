@@ -1,0 +1,98 @@
+"""A slope is made by taking out four benches one after the other: relaxation, the static solve, and a finite element
+program of its own (plain_fe.py) give the same displacements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hpcdem.blocks import Blocks
+from hpcdem.model.blocks.mesh import Mesh
+from tests.blocks.support import model, rectangle
+from tests.cases.benches import plain_fe
+
+RHO, YOUNG, NU, G = 2500.0, 1e9, 0.3, 9.81
+WIDTH, HEIGHT, BENCH, STAGES = 40.0, 20.0, 2.5, 4
+
+
+def box(kind: str, size: float) -> Mesh:
+    return rectangle(round(WIDTH / size), round(HEIGHT / size), WIDTH, HEIGHT, kind=kind)
+
+
+def bench(mesh: Mesh, stage: int) -> np.ndarray:
+    """Elements of a bench: 2.5 m high, beginning 2.5 m farther on the lower it lies (45 degrees on the whole)."""
+    x, y = mesh.centroids().T
+    top = HEIGHT - BENCH * stage
+    return np.flatnonzero((y < top) & (y > top - BENCH) & (x > 15.0 + BENCH * stage))
+
+
+def ground(mesh: Mesh) -> Blocks:
+    """Rollers on both sides and the floor, weight."""
+    sim = model(mesh)
+    sim.element_model(None, "mech_iso_elastic", {"density": RHO, "young": YOUNG, "poisson_ratio": NU})
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero((x < 1e-9) | (x > WIDTH - 1e-9)), vx=0.0)
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.gravity(0.0, -G)
+    sim.option(dynamic=False, collision=False)
+    return sim
+
+
+def moved(sim: Blocks) -> np.ndarray:
+    """(np, 2) displacements, NaN where nothing is left."""
+    return np.column_stack([sim.values(f"displacement_{axis}") for axis in "xy"])
+
+
+def test_staged_excavation_of_quads_by_relaxation_and_at_once():
+    """Displacements since the gravity stage after every bench, to 1 % of the largest; no element outside of the benches
+    is lost, every stage of relaxation ends at a ratio of 1e-5, and the floor carries what is left."""
+    mesh = box("quad", 1.25)
+    at_once, slowly = ground(mesh), ground(mesh)
+    at_once.solve_elastic()
+    slowly.solve(ratio=1e-6, cycles=50000)
+    floor = np.flatnonzero(mesh.points[:, 1] < 1e-9)
+    left, farthest = mesh.areas().sum(), 0.0
+    for sim in (at_once, slowly):
+        sim.reset_displacement()
+    for stage in range(STAGES):
+        out = bench(mesh, stage)
+        at_once.null(out)
+        slowly.null(out, relax=200)
+        at_once.solve_elastic()
+        slowly.advance(200)
+        found = slowly.solve(ratio=1e-5, cycles=50000)
+        assert found.reason == "ratio" and found.ratio < 1e-5
+        a, b = moved(at_once), moved(slowly)
+        assert np.array_equal(np.isnan(a), np.isnan(b))
+        largest = np.nanmax(np.abs(a))
+        assert largest > farthest  # it heaves more with every stage
+        farthest = largest
+        assert np.nanmax(np.abs(a - b)) < 0.01 * largest
+        left -= mesh.areas()[out].sum()
+        assert int(at_once.alive.sum()) == len(mesh.cells) - sum(len(bench(mesh, k)) for k in range(stage + 1))
+        assert at_once.total("reaction_y", floor) == pytest.approx(RHO * G * left, rel=1e-8)
+
+
+def test_staged_excavation_of_triangles_against_another_program():
+    """Small strains: displacements by the last stage to 1e-7 of those of plain_fe."""
+    mesh = box("cross", 1.25)
+    sim = ground(mesh)
+    sim.option(large_strain=False)
+    held = np.zeros((len(mesh.points), 2), bool)
+    x, y = mesh.points.T
+    held[(x < 1e-9) | (x > WIDTH - 1e-9), 0] = held[y < 1e-9, 1] = True
+    triangles = mesh.cells[:, :3]
+    before = plain_fe.displacement(mesh.points, triangles, YOUNG, NU, RHO, G, held)
+    sim.solve_elastic()
+    assert moved(sim) == pytest.approx(before, abs=1e-8 * np.abs(before).max())
+    sim.reset_displacement()
+    there = np.ones(len(triangles), bool)
+    for stage in range(STAGES):
+        there[bench(mesh, stage)] = False
+        sim.null(bench(mesh, stage), relax=100)
+        sim.solve_elastic()
+        after = plain_fe.displacement(mesh.points, triangles[there], YOUNG, NU, RHO, G, held) - before
+        found = moved(sim)
+        known = ~np.isnan(found[:, 0])
+        assert known.sum() == len(np.unique(triangles[there]))
+        assert found[known] == pytest.approx(after[known], abs=1e-7 * np.abs(after[known]).max())

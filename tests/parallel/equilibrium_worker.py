@@ -1,0 +1,62 @@
+"""Static solves of a model with joints, rollers, a hole and stages, on any number of ranks; writes what came out.
+
+python equilibrium_worker.py SOLVER OUT
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from hpcdem.blocks import Blocks
+from hpcdem.halo.comm import MpiComm, SerialComm
+from tests.blocks.support import JOINT, ROCK, rectangle, shaken
+
+NAMES = (
+    "stress_xx", "stress_yy", "stress_xy", "stress_zz", "displacement_x", "displacement_y", "velocity_x", "velocity_y",
+    "opening", "slip", "reaction_x", "reaction_y",
+)  # fmt: skip
+
+
+def communicator():
+    from mpi4py import MPI
+
+    return MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.Get_size() > 1 else SerialComm()
+
+
+def main(solver: str, out: str) -> None:
+    sim = Blocks(communicator())
+    mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 1e9})
+    joints = sim.numbers_of_joints(None)
+    sim.joint_model(joints[: len(joints) // 2], "classic_intrinsic_cohesive_interface",
+                    {**JOINT, "penalty_normal": 2e10, "tensile_strength": 1e8, "cohesion": 1e8})  # fmt: skip
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.move_constraint(np.flatnonzero((x < 1e-9) & (y > 1e-9)), 2, (0.1, 0.9))
+    right = np.flatnonzero((x > 2.4 - 1e-9) & (y > 1e-9))
+    sim.velocity_condition(right, vx=-2e-6)
+    sim.gravity(0.0, -9.81)
+    sim.initial_stress(None, xx=-1e4)
+    sim.option(dynamic=False, collision=False)
+    sim.move_constraint(np.flatnonzero((x < 1e-9) & (y < 1e-9)), 1)
+    first = sim.solve_elastic(cycles=3, solver=solver)
+    sim.velocity_condition(right, vx=0.0)
+    sim.null(np.flatnonzero(np.hypot(*(mesh.centroids() - [1.1, 0.4]).T) < 0.2), relax=50)
+    second = sim.solve_elastic(solver=solver)
+    found = {name: sim.values(name) for name in NAMES}
+    sim.advance(30)
+    found.update({f"later_{name}": sim.values(name) for name in NAMES})
+    found["ratios"] = np.array([first.ratio, second.ratio, sim.unbalanced_ratio()])
+    found["counts"] = np.array([first.iterations, first.factors, first.unknowns, second.iterations, sim.clock.step])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
