@@ -1,0 +1,162 @@
+"""Cracks and layers on a mesh that was made without them: which of its edges follow a line."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.model.blocks.connectivity import Edges, find_edges
+from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.pre.mesh.fractures import Fractures
+from hpcdem.pre.mesh.geometry import Curve, arc_of, distance_to_segment
+
+TOLERANCE = 1e-6
+"""An edge lies on a line if it keeps to it within this part of its own length."""
+STRAYING = 4.0
+"""How much dearer a way along edges gets with the square of its distance from the trace, in edge lengths."""
+
+
+def edges_on(mesh: Mesh, curves: Sequence[Curve], tolerance: float | None = None) -> np.ndarray:
+    """(k, 2) i8 end points of the edges that lie on curves: both ends do, and for straight segments the middle too.
+
+    tolerance [m]; None: TOLERANCE times the length of the edge. The chord of an arc lies on it if its ends do and it is
+    the chord of the short way between them.
+    """
+    edges = mesh.edges()
+    a, b = mesh.points[edges.points[:, 0]], mesh.points[edges.points[:, 1]]
+    length = np.hypot(*(b - a).T)
+    near = TOLERANCE * length if tolerance is None else np.full(len(length), tolerance)
+    on = np.zeros(len(edges), bool)
+    for curve in curves:
+        for i in range(curve.segments):
+            p, q, bulge = curve.segment(i)
+            box = _box(p, q, bulge)
+            rows = np.flatnonzero(
+                (np.minimum(a, b) >= box[0] - near[:, None]).all(axis=1)
+                & (np.maximum(a, b) <= box[1] + near[:, None]).all(axis=1)
+            )
+            far = [distance_to_segment(p, q, bulge, x[rows]) for x in (a, b, 0.5 * (a + b))]
+            allowed = near[rows].copy()
+            good = (far[0] <= allowed) & (far[1] <= allowed)
+            if bulge != 0.0:
+                radius = arc_of(p, q, bulge)[1]
+                half = np.minimum(0.5 * length[rows], radius)
+                allowed += radius - np.sqrt(radius * radius - half * half)
+            on[rows] |= good & (far[2] <= allowed * (1.0 + 1e-9))
+    return np.sort(edges.points[on], axis=1)
+
+
+def _box(p: np.ndarray, q: np.ndarray, bulge: float) -> tuple[np.ndarray, np.ndarray]:
+    if bulge == 0.0:
+        return np.minimum(p, q), np.maximum(p, q)
+    centre, radius, _, _ = arc_of(p, q, bulge)
+    return centre - radius, centre + radius
+
+
+def with_layer(mesh: Mesh, name: str, pairs: np.ndarray) -> Mesh:
+    """The mesh with these edges added to one of its layers."""
+    old = mesh.layers.get(name, np.empty((0, 2), np.int64))
+    layers = dict(mesh.layers) | {name: np.unique(np.concatenate([old, np.sort(pairs, axis=1)]), axis=0)}
+    return replace(mesh, layers=layers)
+
+
+def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
+    """The mesh with cracks on these edges (k, 2), in the fracture set `number`; edges at a surface are passed over.
+
+    An edge that has a crack already keeps its set.
+    """
+    edges = mesh.edges()
+    rows = find_edges(edges, pairs, len(mesh.points))
+    if (rows < 0).any():
+        p, q = pairs[np.flatnonzero(rows < 0)[0]]
+        raise HpcdemError(f"no element has an edge between points {p} and {q}")
+    new = edges.points[rows[edges.inner[rows]]]
+    made = Mesh.of(
+        np.empty((0, 2)),
+        np.empty((0, 4)),
+        cracks=np.concatenate([mesh.cracks, new]),
+        crack_sets=np.concatenate([mesh.crack_sets, np.full(len(new), number, np.int64)]),
+    )
+    return replace(mesh, cracks=made.cracks, crack_sets=made.crack_sets)
+
+
+def follow(mesh: Mesh, fractures: Fractures) -> Mesh:
+    """The mesh with cracks along the edges that follow traces best; points stay where they are.
+
+    A trace runs from the point of the mesh nearest to its beginning to that nearest to its end, by the way along edges
+    that costs least: the length of each edge times 1 + STRAYING (distance of its middle from the trace / its length)2.
+    Traces shorter than the edges about them leave no crack.
+    """
+    edges = mesh.edges()
+    way = _Ways(mesh, edges)
+    pairs, sets = [], []
+    for (start, end), number in zip(fractures.ends, fractures.sets):
+        path = way.along(start, end)
+        pairs.append(np.column_stack([path[:-1], path[1:]]))
+        sets.append(np.full(len(path) - 1, number, np.int64))
+    for number in np.unique(fractures.sets):
+        mine = [p for p, s in zip(pairs, sets) if len(s) and s[0] == number]
+        if mine:
+            mesh = with_cracks(mesh, np.concatenate(mine), int(number))
+    return mesh
+
+
+class _Ways:
+    """Ways along the edges of a mesh."""
+
+    def __init__(self, mesh: Mesh, edges: Edges) -> None:
+        self.points = mesh.points
+        both = np.concatenate([edges.points, edges.points[:, ::-1]])
+        order = np.lexsort((both[:, 1], both[:, 0]))
+        self.start = np.searchsorted(both[order, 0], np.arange(len(mesh.points) + 1))
+        self.other = both[order, 1]
+        self.tree = cKDTree(mesh.points)
+
+    def along(self, start: np.ndarray, end: np.ndarray) -> list[int]:
+        """Points from the one nearest to `start` to the one nearest to `end` (Dijkstra's shortest way, with costs)."""
+        source, goal = (self._nearest(p) for p in (start, end))
+        cost, before = {source: 0.0}, {source: source}
+        done: set[int] = set()
+        heap = [(0.0, source)]
+        trace = end - start
+        length2 = float(trace @ trace)
+        while heap:
+            so_far, i = heapq.heappop(heap)
+            if i in done:
+                continue
+            done.add(i)
+            if i == goal:
+                break
+            px, py = self.points[i]
+            for j in self.other[self.start[i] : self.start[i + 1]].tolist():
+                if j in done:
+                    continue
+                qx, qy = self.points[j]
+                mx, my = 0.5 * (px + qx) - start[0], 0.5 * (py + qy) - start[1]
+                t = min(max((mx * trace[0] + my * trace[1]) / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+                stray2 = (mx - t * trace[0]) ** 2 + (my - t * trace[1]) ** 2
+                length = math.hypot(qx - px, qy - py)
+                total = so_far + length + STRAYING * stray2 / length
+                if total < cost.get(j, math.inf):
+                    cost[j], before[j] = total, i
+                    heapq.heappush(heap, (total, j))
+        if goal not in done:
+            raise CommandError(
+                f"no way along edges leads from ({start[0]:g}, {start[1]:g}) to ({end[0]:g}, {end[1]:g}): "
+                "the trace begins and ends in different bodies"
+            )
+        path = [goal]
+        while path[-1] != source:
+            path.append(before[path[-1]])
+        return path[::-1]
+
+    def _nearest(self, at: np.ndarray) -> int:
+        """The lowest of equally near points, so that a tie does not hang on how a tree was built."""
+        far, _ = self.tree.query(at)
+        return min(self.tree.query_ball_point(at, far * (1.0 + 1e-12) + 1e-300))

@@ -1,0 +1,151 @@
+"""DXF drawings into geometry layers, read by ezdxf."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.pre.mesh import geometry, optional
+from hpcdem.pre.mesh.geometry import Curve
+
+NOTES = frozenset(
+    "TEXT MTEXT DIMENSION ARC_DIMENSION LEADER MULTILEADER TOLERANCE ATTDEF ATTRIB HATCH VIEWPORT IMAGE WIPEOUT".split()
+)
+"""What a drawing says about itself; left out without complaint."""
+FLATTENING = 1e-4
+"""Splines and ellipses become polylines that deviate by this part of their size at most."""
+
+
+def read_dxf(path: str | Path, only: set[str] | None = None) -> dict[str, list[Curve]]:
+    """Curves of the model space by layer of the drawing, in the units of the drawing, in its order.
+
+    LINE, LWPOLYLINE, POLYLINE (two-dimensional), CIRCLE, ARC, POINT are taken as they are, SPLINE and ELLIPSE as
+    polylines, INSERT by what its block contains. Notes (NOTES) are left out. Anything else, and what is not drawn in
+    the x-y plane, is refused with its type, handle and layer. `only`: the layers wanted; HpcdemError if one is missing.
+    """
+    ezdxf = optional.ezdxf()
+    path = Path(path)
+    try:
+        document = ezdxf.readfile(path)
+    except FileNotFoundError:
+        raise CommandError(f"{path}: there is no such file") from None
+    except (OSError, ezdxf.DXFError, UnicodeError, ValueError, KeyError, IndexError) as error:
+        raise HpcdemError(f"{path}: this is not a DXF drawing that can be read ({error})") from None
+    found: dict[str, list[Curve]] = {}
+    for entity in _flat(document.modelspace(), str(path), depth=0):
+        layer = str(entity.dxf.layer)
+        if only is not None and layer not in only:
+            continue
+        where = f"{path}: {entity.dxftype()} (handle {entity.dxf.handle}, layer '{layer}')"
+        try:
+            curve = _curve(entity, where)
+        except CommandError as error:
+            raise HpcdemError(f"{where}: {error}") from None
+        found.setdefault(layer, []).append(curve)
+    missing = sorted((only or set()) - set(found))
+    if missing:
+        known = ", ".join(f"'{n}'" for n in found) or "none"
+        raise HpcdemError(f"{path}: nothing is drawn in layer '{missing[0]}' (layers read: {known})")
+    if not found:
+        raise HpcdemError(f"{path}: the drawing contains no line, arc, circle or point")
+    return found
+
+
+def _flat(entities: Any, path: str, depth: int) -> Iterator[Any]:
+    """Entities with inserted blocks taken apart."""
+    for entity in entities:
+        kind = entity.dxftype()
+        if kind in NOTES:
+            continue
+        if kind != "INSERT":
+            yield entity
+        elif depth > 16:
+            raise HpcdemError(f"{path}: INSERT (handle {entity.dxf.handle}): blocks within blocks, deeper than 16")
+        else:
+            yield from _flat(entity.virtual_entities(), path, depth + 1)
+
+
+def _curve(entity: Any, where: str) -> Curve:
+    kind = entity.dxftype()
+    if kind not in _READERS:
+        raise HpcdemError(f"{where}: this type cannot be read; known are {', '.join(_READERS)} and INSERT")
+    if entity.dxf.hasattr("extrusion") and kind not in ("LINE", "POINT", "SPLINE"):
+        x, y, z = entity.dxf.extrusion
+        if (round(x, 9), round(y, 9), round(z, 9)) != (0.0, 0.0, 1.0):
+            raise HpcdemError(
+                f"{where}: it is drawn in a plane of its own (extrusion {x:g}, {y:g}, {z:g}), only the x-y plane counts"
+            )
+    return _READERS[kind](entity, where)
+
+
+def _xy(at: Any) -> tuple[float, float]:
+    return float(at[0]), float(at[1])
+
+
+def _line(entity: Any, where: str) -> Curve:
+    return geometry.polyline([_xy(entity.dxf.start), _xy(entity.dxf.end)])
+
+
+def _circle(entity: Any, where: str) -> Curve:
+    return geometry.circle(_xy(entity.dxf.center), entity.dxf.radius)
+
+
+def _arc(entity: Any, where: str) -> Curve:
+    return geometry.arc(_xy(entity.dxf.center), entity.dxf.radius, entity.dxf.start_angle, entity.dxf.end_angle)
+
+
+def _point(entity: Any, where: str) -> Curve:
+    return geometry.point(_xy(entity.dxf.location))
+
+
+def _light_polyline(entity: Any, where: str) -> Curve:
+    rows = np.array(entity.get_points("xyb"), np.float64).reshape(-1, 3)
+    return _with_bulges(rows, bool(entity.closed))
+
+
+def _heavy_polyline(entity: Any, where: str) -> Curve:
+    if not entity.is_2d_polyline:
+        raise HpcdemError(f"{where}: only two-dimensional polylines can be read, this is '{entity.get_mode()}'")
+    rows = [(*_xy(v.dxf.location), v.dxf.get("bulge", 0.0)) for v in entity.vertices]
+    return _with_bulges(np.array(rows, np.float64).reshape(-1, 3), bool(entity.is_closed))
+
+
+def _with_bulges(rows: np.ndarray, closed: bool) -> Curve:
+    """rows (n, 3): x, y, bulge. Doubled points, which drawings often have, are left out."""
+    if len(rows) > 1 and (rows[0, :2] == rows[-1, :2]).all():
+        rows, closed = rows[:-1], True
+    after = np.roll(rows[:, :2], -1, axis=0)
+    keep = (rows[:, :2] != after).any(axis=1)
+    keep[-1] |= not closed
+    rows = rows[keep]
+    two_arcs = closed and len(rows) == 2 and rows[:, 2].any()  # a circle is often drawn so
+    if not np.isfinite(rows).all() or len(rows) < (3 if closed and not two_arcs else 2):
+        raise CommandError(f"polyline: {len(rows)} different points are too few, or they are not finite")
+    return Curve(rows[:, :2].copy(), rows[:, 2].copy(), closed)
+
+
+def _flattened(entity: Any, where: str) -> Curve:
+    # A rough polyline first: its size says how much the fine one may deviate.
+    rough = np.array([_xy(p) for p in entity.flattening(1e300, 8)], np.float64)
+    size = float(np.ptp(rough, axis=0).max())
+    fine = [_xy(p) for p in entity.flattening(FLATTENING * size)] if size > 0.0 else []
+    if len(fine) > 2 and math.dist(fine[0], fine[-1]) < 1e-9 * size:
+        fine[-1] = fine[0]  # a whole ellipse ends where it began, but for rounding
+    return geometry.polyline([p for i, p in enumerate(fine) if i == 0 or p != fine[i - 1]])
+
+
+_READERS = {
+    "LINE": _line,
+    "LWPOLYLINE": _light_polyline,
+    "POLYLINE": _heavy_polyline,
+    "CIRCLE": _circle,
+    "ARC": _arc,
+    "POINT": _point,
+    "SPLINE": _flattened,
+    "ELLIPSE": _flattened,
+}

@@ -1,0 +1,75 @@
+"""Packages that only meshing needs, imported when used, with a sentence on what to do where one is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+
+from hpcdem.errors import HpcdemError
+
+EXTRA = "pip install 'hpcdem[mesh]'"
+GMSH_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
+
+
+def shapely() -> ModuleType:
+    """The package shapely (2.0 or newer): which lines cross, what lies inside."""
+
+    def load() -> ModuleType:
+        import shapely
+
+        return shapely
+
+    module = _wanted("shapely", "Geometry in the plane", load)
+    if int(module.__version__.split(".")[0]) < 2:
+        raise HpcdemError(f"meshing needs shapely 2.0 or newer, here is {module.__version__}: {EXTRA}")
+    return module
+
+
+def gmsh() -> ModuleType:
+    """The package gmsh."""
+
+    def load() -> ModuleType:
+        import gmsh
+
+        return gmsh
+
+    module = _wanted("gmsh", "Meshing of arbitrary outlines", load)
+    if not hasattr(getattr(module, "lib", None), "gmshInitialize"):
+        raise HpcdemError(f"the package gmsh is installed without its library libgmsh: install it anew, {EXTRA}")
+    return module
+
+
+def meshio() -> ModuleType:
+    """The package meshio."""
+
+    def load() -> ModuleType:
+        import meshio
+
+        return meshio
+
+    return _wanted("meshio", "Import of mesh files", load)
+
+
+def ezdxf() -> ModuleType:
+    """The package ezdxf."""
+
+    def load() -> ModuleType:
+        import ezdxf
+
+        return ezdxf
+
+    return _wanted("ezdxf", "Import of DXF drawings", load)
+
+
+def _wanted(name: str, what: str, load: Callable[[], ModuleType]) -> ModuleType:
+    try:
+        return load()
+    except ModuleNotFoundError as error:
+        lacks = "is not installed" if error.name == name else f"lacks {error.name}"
+        raise HpcdemError(f"{what} needs the package {name}, which {lacks}: {EXTRA}") from error
+    except (ImportError, OSError) as error:
+        # The gmsh wheel carries a program with windows and asks for libraries of the system.
+        hint = f": libraries of the system are missing (Debian, Ubuntu: apt install {GMSH_LIBRARIES})"
+        raise HpcdemError(
+            f"{what} needs the package {name}, which cannot be loaded ({error}){hint if name == 'gmsh' else ''}"
+        ) from error

@@ -1,0 +1,110 @@
+"""How long edges are to be, as a function of place: a base size, and smaller ones near layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hpcdem.errors import CommandError
+from hpcdem.pre.mesh import optional
+from hpcdem.pre.mesh.geometry import Curve, sampled
+
+GROWTH = 0.2
+"""Edges grow by this much of the distance from a refined layer, where nothing else is said: neighbours by a fifth."""
+MOST_SAMPLES = 500_000
+"""Points along a refined layer at most."""
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Edges of length `size` [m] on a layer; away from it they grow by `growth` times the distance up to the base size.
+
+    `distance` [m], if given, says instead where the base size is reached.
+    """
+
+    layer: str
+    size: float
+    growth: float = GROWTH
+    distance: float | None = None
+
+
+class SizeField:
+    """h(x): the least of a base size and of one size per refinement that grows with the distance from its layer."""
+
+    def __init__(self, base: float, refined: Sequence[tuple[Refinement, Sequence[Curve]]] = ()) -> None:
+        positive(base, "mesh size")
+        self.base = float(base)
+        self.parts: list[tuple[np.ndarray, cKDTree, float, float]] = []
+        """Points along each refined layer (n, 2), their tree, the size there [m], its growth with distance."""
+        self.named = [(wish.layer, float(wish.size)) for wish, _ in refined]
+        self.areas: list[tuple[Any, float]] = []
+        """Polygons of shapely with a size of their own [m]."""
+        for wish, curves in refined:
+            positive(wish.size, f"mesh size near layer '{wish.layer}'")
+            if wish.size >= base:
+                raise CommandError(
+                    f"mesh size near layer '{wish.layer}' is {wish.size:g}, which refines nothing where the mesh size "
+                    f"is {base:g}"
+                )
+            growth = wish.growth
+            if wish.distance is not None:
+                positive(wish.distance, f"distance of the refinement near layer '{wish.layer}'")
+                growth = (base - wish.size) / wish.distance
+            positive(growth, f"growth of the mesh size near layer '{wish.layer}'")
+            # Half an edge between samples: distances are met within 3 % of the size where they matter.
+            spacing = 0.5 * wish.size
+            if sum(c.length() for c in curves) / spacing > MOST_SAMPLES:
+                raise CommandError(f"mesh size {wish.size:g} near layer '{wish.layer}' is too small for its length")
+            points = np.concatenate([sampled(c, spacing) for c in curves])
+            self.parts.append((points, cKDTree(points), float(wish.size), float(growth)))
+
+    @property
+    def smallest(self) -> float:
+        """The least size anywhere [m]."""
+        return min([self.base, *(size for _, _, size, _ in self.parts), *(size for _, size in self.areas)])
+
+    def __call__(self, at: np.ndarray) -> np.ndarray:
+        """(n,) size at the points (n, 2) [m]."""
+        out = np.full(len(at), self.base)
+        for _, tree, size, growth in self.parts:
+            far, _ = tree.query(at)
+            np.minimum(out, size + growth * far, out=out)
+        for polygon, size in self.areas:
+            out[optional.shapely().contains_xy(polygon, at[:, 0], at[:, 1]) & (out > size)] = size
+        return out
+
+    def parts_of(self, points: np.ndarray, length: float, most: float = math.inf) -> np.ndarray:
+        """Where to cut a line: (n + 1,) fractions of its length, 0 and 1 included.
+
+        points (m, 2): the line, in equal steps; length: its true length, along arcs [m]; most: a bound of the size
+        there. It gets the least number n of edges such that none is longer than the size allows: n = ceil(integral of
+        ds / h), and equal shares of the integral.
+        """
+        inverse = np.maximum(1.0 / self(points), 1.0 / most)
+        step = length / (len(points) - 1)
+        share = np.concatenate([[0.0], np.cumsum(0.5 * (inverse[1:] + inverse[:-1]) * step)])
+        n = max(1, math.ceil(share[-1] - 1e-6))
+        cuts = np.interp(np.arange(n + 1) / n * share[-1], share, np.linspace(0.0, 1.0, len(points)))
+        cuts[0], cuts[-1] = 0.0, 1.0
+        return cuts
+
+    def on(self, layer: str) -> float:
+        """The size on a refined layer itself [m], infinite on others: samples stand a little apart from it."""
+        return min([math.inf, *(size for name, size in self.named if name == layer)])
+
+    def samples_for(self, length: float) -> np.ndarray:
+        """(m,) fractions of a line of this length [m] at which `parts_of` wants to know it."""
+        if not self.parts:
+            return np.array([0.0, 1.0])
+        return np.linspace(0.0, 1.0, int(min(max(4.0 * length / self.smallest, 2.0), 20_000.0)) + 1)
+
+
+def positive(value: float, what: str) -> None:
+    """CommandError unless the value is a positive number."""
+    if not (math.isfinite(value) and value > 0.0):
+        raise CommandError(f"{what} must be positive, not {value:g}")

@@ -1,0 +1,577 @@
+"""Meshes of arbitrary outlines by gmsh: regions, holes, inner layers and cracks, with sizes that vary.
+
+Lines are cut into edges here (`planar`), each of which becomes one edge of the mesh; gmsh fills the areas between.
+So an edge of the mesh that lies on a layer or carries a crack is known by its end points, whatever gmsh does. Input,
+scaled to edges of length 1 about the origin, goes to gmsh in one fixed order, on one thread: the same input makes the
+same mesh.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.model.blocks.mesh import Mesh, check
+from hpcdem.pre.mesh import optional
+from hpcdem.pre.mesh.fractures import Fractures, clipped, joined
+from hpcdem.pre.mesh.geometry import Layers, sampled
+from hpcdem.pre.mesh.planar import Plane
+from hpcdem.pre.mesh.quality import quality
+from hpcdem.pre.mesh.regions import GRID, edges_of_curve, faces, noded, polygon_of
+from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField
+
+MOST_ELEMENTS, MOST_EDGES = 20_000_000, 1_000_000
+"""More elements, or edges on lines, are refused at once: the size is a slip of units."""
+DELAUNAY, FRONTAL_DELAUNAY, FRONTAL_QUADS = 5, 6, 8
+"""Numbers of gmsh's algorithms: triangles in no pattern; near equilateral; those that pair up to quads."""
+BLOSSOM = 1
+"""Number of gmsh's recombination: a perfect matching of triangles, as far as there is one."""
+SHARP = 10.0
+"""Smaller angles [degrees] are worth a note."""
+FLATTEST = 165.0
+"""A quad with a greater angle [degrees] stays two triangles."""
+
+
+_OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,
+    "Mesh.RandomSeed": 1,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MeshSizeMin": 0,
+    "Mesh.MeshSizeMax": 1e22,
+    "Mesh.ElementOrder": 1,
+    "Mesh.SubdivisionAlgorithm": 0,
+    "Mesh.RecombinationAlgorithm": BLOSSOM,
+    "Mesh.Algorithm": FRONTAL_DELAUNAY,
+    "Mesh.RecombineAll": 0,
+}
+
+
+@dataclass(frozen=True)
+class Region:
+    """The area inside the closed curves of a layer; where regions lie in each other the later one counts."""
+
+    layer: str
+    group: str | None = None
+    set_name: str = "default"
+    size: float | None = None
+    """Mesh size inside [m]; None: the size of the mesh."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What to mesh. Layers are named; sizes in metres."""
+
+    regions: Sequence[Region]
+    size: float
+    kind: str = "tri"
+    """"tri" or "quad" (a few triangles remain where quads do not fit)."""
+    holes: Sequence[str] = ()
+    inside: Sequence[str] = ()
+    """Lines and points that edges and points of the mesh are to lie on."""
+    cracks: Sequence[tuple[str, int]] = ()
+    """Layers whose lines carry a crack from the beginning, with the number of the fracture set. An edge of several sets
+    belongs to the lowest."""
+    fractures: Fractures = field(default_factory=Fractures)
+    refine: Sequence[Refinement] = ()
+    irregular: bool = False
+    """Triangles in no pattern: rows of them would lead cracks."""
+
+
+@dataclass(frozen=True)
+class Meshed:
+    """A mesh, and what the user should know about how it came about."""
+
+    mesh: Mesh
+    notes: list[str]
+
+
+def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
+    """Make the mesh. CommandError for wishes that make no sense, HpcdemError where gmsh fails."""
+    optional.gmsh(), optional.shapely()
+    if wishes.kind not in ("tri", "quad"):
+        raise CommandError(f"a mesh consists of 'tri' or 'quad', not '{wishes.kind}'")
+    if wishes.irregular and wishes.kind != "tri":
+        raise CommandError("irregular is for triangles")
+    if not wishes.regions:
+        raise CommandError("a mesh needs at least one layer as outline")
+    sizes = _size_field(layers, wishes)
+    _not_too_many(layers, wishes, sizes)
+    plane = Plane(sizes)
+    areas = _outlines(plane, layers, wishes)
+    for area in areas:
+        if area.size is not None:
+            optional.shapely().prepare(area.polygon)
+            sizes.areas.append((area.polygon, area.size))
+    points, traces, notes = _lines_inside(plane, layers, wishes, areas)
+    plane.divide()
+    xy = np.column_stack([plane.x, plane.y])
+    notes += _moved(plane, xy, traces)
+    surfaces = _surfaces(plane, xy, areas)
+    mesh = _filled(plane, xy, surfaces, points, wishes, sizes)
+    check(mesh, "mesh made by gmsh")
+    found = quality(mesh)
+    if found.angle_least < SHARP:
+        x, y = found.angle_least_at
+        notes.append(
+            f"the smallest angle is {found.angle_least:.1f} degrees, in element {found.angle_least_element} at ({x:g}, "
+            f"{y:g}): lines come close to each other there, which makes the time step small"
+        )
+    return Meshed(mesh, notes)
+
+
+@dataclass(frozen=True)
+class _Area:
+    """A part of the plane with one list of regions: polygon of shapely, and group by set."""
+
+    polygon: Any
+    groups: dict[str, str]
+    size: float | None
+
+
+def _size_field(layers: Layers, wishes: Wishes) -> SizeField:
+    own = [Refinement(r.layer, r.size) for r in wishes.regions if r.size is not None and r.size < wishes.size]
+    coarser = [r for r in wishes.regions if r.size is not None and r.size > wishes.size]
+    if coarser:
+        raise CommandError(
+            f"region '{coarser[0].layer}' has the mesh size {coarser[0].size:g}, greater than {wishes.size:g}: "
+            "give the greatest size as that of the mesh"
+        )
+    return SizeField(wishes.size, [(r, layers[r.layer]) for r in [*wishes.refine, *own]])
+
+
+# --- outlines ----------------------------------------------------------------------------------------------------
+
+
+def _outlines(plane: Plane, layers: Layers, wishes: Wishes) -> list[_Area]:
+    """Put the outlines of regions and holes into the plane; returns the areas between them that are to be filled."""
+    shapely = optional.shapely()
+    names = list(dict.fromkeys([*(r.layer for r in wishes.regions), *wishes.holes]))
+    segments = {n: _segments(layers, n, plane.sizes) for n in names}
+    polygons = {n: shapely.union_all(faces(segments[n], n, plane.sizes.smallest)) for n in names}
+    pieces = noded(np.concatenate(list(segments.values())), GRID * plane.sizes.smallest)
+    middle = shapely.points(pieces.mean(axis=1))
+    hair = 4.0 * GRID * plane.sizes.smallest
+    on = {n: shapely.dwithin(shapely.multilinestrings(shapely.linestrings(segments[n])), middle, hair) for n in names}
+    for i in np.lexsort(pieces.reshape(-1, 4).T[::-1]):
+        a, b = (plane.put(x, y) for x, y in pieces[i].tolist())
+        plane.join(a, b, frozenset(n for n in names if on[n][i]), fixed=True)
+    areas = []
+    for polygon in shapely.get_parts(shapely.polygonize(_lines_of(plane))):
+        inside = polygon.representative_point()
+        if any(polygons[h].contains(inside) for h in wishes.holes):
+            continue
+        regions = [r for r in wishes.regions if polygons[r.layer].contains(inside)]
+        if regions:
+            groups = {r.set_name: r.group for r in regions if r.group is not None}
+            areas.append(_Area(polygon, groups, next((r.size for r in reversed(regions) if r.size is not None), None)))
+    if not areas:
+        raise CommandError("the holes leave nothing of the regions")
+    return areas
+
+
+def _lines_of(plane: Plane) -> Any:
+    xy = np.column_stack([plane.x, plane.y])
+    return optional.shapely().linestrings(xy[np.array(sorted(plane.fixed))])
+
+
+def _segments(layers: Layers, name: str, sizes: SizeField) -> np.ndarray:
+    return np.concatenate([np.empty((0, 2, 2)), *(edges_of_curve(c, sizes, sizes.on(name)) for c in layers[name])])
+
+
+def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
+    """Estimate, from a sample of places, before anything is cut: an equilateral triangle of edge h has 0.433 h2."""
+    shapely = optional.shapely()
+    edges = 0.0
+    every = dict.fromkeys([*(r.layer for r in wishes.regions), *wishes.holes, *wishes.inside])
+    for name in [*every, *(n for n, _ in wishes.cracks)]:
+        for curve in layers[name]:
+            if curve.segments:
+                length = curve.length()
+                edges += length * float((1.0 / sizes(sampled(curve, length / 256.0))).mean())
+    if edges > MOST_EDGES:
+        raise CommandError(
+            f"mesh size {sizes.base:g} would cut lines into some {edges:.2g} edges, more than {MOST_EDGES:.0g}"
+        )
+    elements = 0.0
+    for region in wishes.regions:
+        rough = max(c.length() for c in layers[region.layer]) / 64.0 if layers[region.layer] else 1.0
+        polygon = polygon_of(layers, [region.layer], rough or 1.0)
+        x0, y0, x1, y1 = polygon.bounds
+        at = np.array(np.meshgrid(np.linspace(x0, x1, 66)[1:-1], np.linspace(y0, y1, 66)[1:-1])).reshape(2, -1).T
+        at = at[shapely.contains_xy(polygon, at[:, 0], at[:, 1])]
+        h = np.minimum(sizes(at), region.size or math.inf)
+        elements += polygon.area * float((1.0 / (0.433 * h * h)).mean()) if len(at) else 0.0
+    if elements > MOST_ELEMENTS:
+        raise CommandError(
+            f"mesh size {sizes.base:g} would make some {elements:.2g} elements, more than {MOST_ELEMENTS:.0g}"
+        )
+
+
+# --- lines inside ------------------------------------------------------------------------------------------------
+
+
+def _lines_inside(
+    plane: Plane, layers: Layers, wishes: Wishes, areas: list[_Area]
+) -> tuple[list[int], np.ndarray, list[str]]:
+    """Put inner layers, cracks and fractures into the plane.
+
+    Returns single points to be met, the traces (n, 2, 2) as they were meant, and notes. Edges carry the names of their
+    layers, the numbers of their sets, and ("trace", row).
+    """
+    shapely = optional.shapely()
+    domain = shapely.union_all([a.polygon for a in areas])
+    notes: list[str] = []
+    points = []
+    for name in wishes.inside:
+        single = [c.points[0] for c in layers[name] if not c.segments]
+        points += [plane.add_point(float(x), float(y)) for x, y in single if domain.intersects(shapely.Point(x, y))]
+    outlines = {*(r.layer for r in wishes.regions), *wishes.holes}
+    layered = [(n, None) for n in wishes.inside] + [(n, int(k)) for n, k in wishes.cracks]
+    traces: list[Fractures] = []
+    labels: list[frozenset] = []
+    for name, number in layered:
+        if name in outlines:  # a crack between two regions: the edges are there
+            for key, known in list(plane.edges.items()):
+                if name in known and number is not None:
+                    plane.join(*key, frozenset({number}), fixed=False)
+            continue
+        rows = _segments(layers, name, plane.sizes)
+        if not len(rows) and not any(not c.segments for c in layers[name]):
+            raise CommandError(f"layer '{name}' is empty")
+        traces.append(Fractures(rows, np.zeros(len(rows), np.int64)))
+        labels += [frozenset({name} if number is None else {name, number})] * len(rows)
+    traces.append(wishes.fractures)
+    labels += [frozenset({int(k)}) for k in wishes.fractures.sets]
+    every = joined(*traces)
+    if not np.isfinite(every.ends).all():
+        raise CommandError("fracture traces must be finite")
+    ends, origin = clipped(every.ends, domain)
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    short = length < plane.ratio * plane.sizes(ends.mean(axis=1)) if len(ends) else np.zeros(0, bool)
+    for i in np.flatnonzero(~short):
+        (ax, ay), (bx, by) = ends[i].tolist()
+        plane.add_line((ax, ay), (bx, by), labels[origin[i]] | {("trace", int(i))})
+    outside = len(every) - len(np.unique(origin))
+    if outside:
+        notes.append(f"{outside} of {len(every)} traces lie outside the regions and are left out")
+    if short.any():
+        notes.append(
+            f"{int(short.sum())} traces shorter than {plane.ratio:g} of the mesh size are left out "
+            f"(together {float(length[short].sum()):g} m)"
+        )
+    return points, ends, notes
+
+
+def _moved(plane: Plane, xy: np.ndarray, traces: np.ndarray) -> list[str]:
+    """How far lines lie from where they were meant to."""
+    rows = [(*key, label[1]) for key, labels in plane.edges.items() for label in labels if isinstance(label, tuple)]
+    if not rows:
+        return []
+    a, b, trace = np.array(rows).T
+    point, trace = np.concatenate([a, b]), np.concatenate([trace, trace])
+    start, way = traces[trace, 0], traces[trace, 1] - traces[trace, 0]
+    t = np.clip(((xy[point] - start) * way).sum(axis=1) / (way * way).sum(axis=1), 0.0, 1.0)
+    far = np.hypot(*(xy[point] - start - t[:, None] * way).T)
+    if far.max() < 1e-3 * plane.sizes.smallest:
+        return []
+    i = int(far.argmax())
+    h = float(plane.sizes(xy[point[i : i + 1]])[0])
+    return [
+        f"lines that come close to each other were moved together, by {far[i]:g} m at most (near "
+        f"({xy[point[i], 0]:g}, {xy[point[i], 1]:g}), {far[i] / h:.2f} of the mesh size there)"
+    ]
+
+
+# --- gmsh --------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Surface:
+    """An area as gmsh wants it: rings of point numbers, outline first; edges and points inside."""
+
+    rings: list[list[int]]
+    area: _Area
+    edges: list[tuple[int, int]] = field(default_factory=list)
+
+
+def _surfaces(plane: Plane, xy: np.ndarray, areas: list[_Area]) -> list[_Surface]:
+    """Areas with their rings as point numbers (outlines may have got more points from cracks that end on them)."""
+    shapely = optional.shapely()
+    number = {(x, y): i for i, (x, y) in enumerate(xy.tolist())}
+    tree = shapely.STRtree([a.polygon for a in areas])
+    found = []
+    for polygon in shapely.get_parts(shapely.polygonize(_lines_of(plane))):
+        of = tree.query(polygon.representative_point(), predicate="intersects")
+        if not len(of):
+            continue
+        rings = []
+        for k, ring in enumerate([polygon.exterior, *polygon.interiors]):
+            loop = [number[p] for p in list(ring.coords)[:-1]]
+            rings.append(loop if ring.is_ccw == (k == 0) else loop[::-1])
+        found.append((polygon, _Surface(rings, areas[int(of[0])])))
+    # gmsh numbers its nodes by surface: put these in an order that rests on geometry only.
+    found.sort(key=lambda f: f[0].bounds + (f[0].area,))
+    free = [key for key in plane.edges if key not in plane.fixed]
+    if free:
+        middle = shapely.points(0.5 * (xy[[a for a, _ in free]] + xy[[b for _, b in free]]))
+        which, where = shapely.STRtree([p for p, _ in found]).query(middle, predicate="intersects")
+        for i, k in dict(zip(which[::-1].tolist(), where[::-1].tolist())).items():
+            found[k][1].edges.append(free[i])
+    surfaces = [s for _, s in found]
+    for surface in surfaces:
+        surface.edges.sort()
+    return surfaces
+
+
+def _filled(
+    plane: Plane, xy: np.ndarray, surfaces: list[_Surface], points: list[int], wishes: Wishes, sizes: SizeField
+) -> Mesh:
+    gmsh = optional.gmsh()
+    ours = not gmsh.isInitialized()  # a Python program may be using gmsh itself
+    if ours:
+        gmsh.initialize(["hpcdem"], readConfigFiles=False, interruptible=False)
+    before = {name: gmsh.option.getNumber(name) for name in _OPTIONS}
+    theirs = gmsh.model.getCurrent()
+    try:
+        for name, value in _OPTIONS.items():
+            gmsh.option.setNumber(name, value)
+        gmsh.logger.start()
+        gmsh.model.add("hpcdem")
+        centre = 0.5 * (xy.min(axis=0) + xy.max(axis=0))
+        try:
+            nodes, tags = _described(gmsh, plane, (xy - centre) / sizes.base, surfaces, points, wishes, sizes, centre)
+            gmsh.model.mesh.generate(2)
+            return _taken_out(gmsh, plane, xy, surfaces, nodes, tags, wishes, sizes.base, centre)
+        except HpcdemError:
+            raise
+        except Exception as error:  # gmsh raises nothing more special
+            said = [line for line in gmsh.logger.get() if line.startswith(("Error", "Warning"))]
+            raise HpcdemError(f"gmsh could not make the mesh: {'; '.join(said[:3]) or error}") from error
+        finally:
+            gmsh.logger.stop()
+            gmsh.model.remove()
+    finally:
+        if ours:
+            gmsh.finalize()
+        else:
+            for name, value in before.items():
+                gmsh.option.setNumber(name, value)
+            gmsh.model.setCurrent(theirs)
+
+
+def _described(
+    gmsh: Any,
+    plane: Plane,
+    scaled: np.ndarray,
+    surfaces: list[_Surface],
+    points: list[int],
+    wishes: Wishes,
+    sizes: SizeField,
+    centre: np.ndarray,
+) -> tuple[dict[int, int], list[int]]:
+    """Tell gmsh the geometry; returns its tag of each point used, and of each surface."""
+    of_triangles = DELAUNAY if wishes.irregular else FRONTAL_DELAUNAY
+    gmsh.option.setNumber("Mesh.Algorithm", of_triangles if wishes.kind == "tri" else FRONTAL_QUADS)
+    gmsh.option.setNumber("Mesh.RecombineAll", 0 if wishes.kind == "tri" else 1)
+    geo = gmsh.model.geo
+    nodes: dict[int, int] = {}
+    lines: dict[tuple[int, int], int] = {}
+
+    def node(i: int) -> int:
+        if i not in nodes:
+            nodes[i] = geo.addPoint(float(scaled[i, 0]), float(scaled[i, 1]), 0.0)
+        return nodes[i]
+
+    def line(i: int, j: int) -> int:
+        """The tag, negative if the line runs from j to i."""
+        key = (min(i, j), max(i, j))
+        if key not in lines:
+            lines[key] = geo.addLine(node(key[0]), node(key[1]))
+        return lines[key] if i < j else -lines[key]
+
+    tags = []
+    for surface in surfaces:
+        loops = [geo.addCurveLoop([line(i, j) for i, j in zip(r, r[1:] + r[:1])]) for r in surface.rings]
+        tags.append(geo.addPlaneSurface(loops))
+    embedded = [[line(i, j) for i, j in s.edges] for s in surfaces]
+    single = [(node(i), _surface_at(surfaces, plane, i)) for i in points if i not in nodes]
+    fields = _fields(gmsh, surfaces, tags, sizes, centre)
+    geo.synchronize()
+    for tag in lines.values():
+        gmsh.model.mesh.setTransfiniteCurve(tag, 2)
+    for tag, inner in zip(tags, embedded):
+        if inner:
+            gmsh.model.mesh.embed(1, inner, 2, tag)
+    for tag, k in single:
+        if k >= 0:
+            gmsh.model.mesh.embed(0, [tag], 2, tags[k])
+    gmsh.model.mesh.field.setAsBackgroundMesh(fields)
+    return nodes, tags
+
+
+def _surface_at(surfaces: list[_Surface], plane: Plane, i: int) -> int:
+    """Which surface a point lies in; -1 if in none."""
+    shapely = optional.shapely()
+    at = shapely.Point(plane.x[i], plane.y[i])
+    return next((k for k, s in enumerate(surfaces) if s.area.polygon.contains(at)), -1)
+
+
+def _fields(gmsh: Any, surfaces: list[_Surface], tags: list[int], sizes: SizeField, centre: np.ndarray) -> int:
+    """The size field of `sizes` in gmsh's words, in units of the base size; returns its tag."""
+    f = gmsh.model.mesh.field
+    parts = []
+
+    def add(kind: str, numbers: dict[str, float], lists: dict[str, Any] | None = None) -> int:
+        tag = f.add(kind)
+        for name, value in numbers.items():
+            f.setNumber(tag, name, value)
+        for name, values in (lists or {}).items():
+            f.setNumbers(tag, name, values)
+        return tag
+
+    parts.append(add("MathEval", {}))
+    f.setString(parts[0], "F", "1")
+    for points, _, size, growth in sizes.parts:
+        near = [gmsh.model.geo.addPoint(float(x), float(y), 0.0) for x, y in (points - centre) / sizes.base]
+        distance = add("Distance", {}, {"PointsList": near})
+        least = size / sizes.base
+        parts.append(
+            add(
+                "Threshold",
+                {
+                    "InField": distance,
+                    "SizeMin": least,
+                    "SizeMax": 1.0,
+                    "DistMin": 0.0,
+                    "DistMax": (1.0 - least) / growth,
+                },
+            )
+        )
+    for surface, tag in zip(surfaces, tags):
+        if surface.area.size is not None:
+            parts.append(add("Constant", {"VIn": surface.area.size / sizes.base, "VOut": 1.0}, {"SurfacesList": [tag]}))
+    return add("Min", {}, {"FieldsList": parts})
+
+
+def _taken_out(
+    gmsh: Any,
+    plane: Plane,
+    xy: np.ndarray,
+    surfaces: list[_Surface],
+    nodes: dict[int, int],
+    tags: list[int],
+    wishes: Wishes,
+    scale: float,
+    centre: np.ndarray,
+) -> Mesh:
+    """The mesh with our numbers: points in gmsh's order, elements by surface."""
+    node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(node_tags, kind="stable")
+    node_tags = node_tags[order].astype(np.int64)
+    points = coordinates.reshape(-1, 3)[order, :2] * scale + centre
+    row = np.full(int(node_tags[-1]) + 1, -1, np.int64)
+    row[node_tags] = np.arange(len(node_tags))
+    mine = {i: row[int(gmsh.model.mesh.getNodes(0, tag)[0][0])] for i, tag in nodes.items()}
+    numbers = np.fromiter(mine.keys(), np.int64, len(mine))
+    points[np.fromiter(mine.values(), np.int64, len(mine))] = xy[numbers]  # exact, not through the scaling
+    cells, start = [], 0
+    # Groups come in the order of the regions, not of the areas.
+    groups: dict[str, dict[str, list[np.ndarray]]] = {}
+    for region in wishes.regions:
+        if region.group is not None:
+            groups.setdefault(region.set_name, {})[region.group] = []
+    for surface, tag in zip(surfaces, tags):
+        some = []
+        for kind, n in ((2, 3), (3, 4)):
+            corners = gmsh.model.mesh.getElementsByType(kind, tag)[1].astype(np.int64).reshape(-1, n)
+            some.append(np.column_stack([row[corners], np.full((len(corners), 4 - n), -1, np.int64)]))
+        here = _halved_where_flat(points, np.concatenate(some))
+        if not len(here):
+            x, y = surface.area.polygon.representative_point().coords[0]
+            raise HpcdemError(f"gmsh made no element in the area about ({x:g}, {y:g})")
+        for set_name, group in surface.area.groups.items():
+            groups[set_name][group].append(np.arange(start, start + len(here)))
+        cells.append(here)
+        start += len(here)
+    return _compact(
+        points,
+        np.concatenate(cells),
+        {s: {g: np.concatenate(rows) for g, rows in of.items() if rows} for s, of in groups.items()},
+        mine,
+        plane,
+        wishes,
+    )
+
+
+def _halved_where_flat(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Quads with an angle above FLATTEST (or concave) become two triangles, cut at their greatest angle."""
+    quads = np.flatnonzero(cells[:, 3] >= 0)
+    xy = points[cells[quads]]
+    ahead, back = np.roll(xy, -1, axis=1) - xy, np.roll(xy, 1, axis=1) - xy
+    cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
+    angle = np.degrees(np.arctan2(cross, (ahead * back).sum(axis=2))) % 360.0
+    bad = np.flatnonzero((angle > FLATTEST).any(axis=1))
+    if not len(bad):
+        return cells
+    turned = np.stack([np.roll(cells[quads[i]], -int(angle[i].argmax())) for i in bad])
+    none = np.full((len(bad), 1), -1, np.int64)
+    halves = [np.column_stack([turned[:, c], none]) for c in ([0, 1, 2], [0, 2, 3])]
+    return np.concatenate([np.delete(cells, quads[bad], axis=0), *halves])
+
+
+def _compact(
+    points: np.ndarray,
+    cells: np.ndarray,
+    groups: dict[str, dict[str, np.ndarray]],
+    mine: dict[int, int],
+    plane: Plane,
+    wishes: Wishes,
+) -> Mesh:
+    """Leave points out that no element uses, and name the edges on layers and cracks."""
+    used = np.zeros(len(points), bool)
+    used[cells[cells >= 0]] = True
+    number = np.cumsum(used) - 1
+    cells = np.where(cells >= 0, number[cells], -1)
+    layers: dict[str, list] = {n: [] for n in [*(r.layer for r in wishes.regions), *wishes.holes, *wishes.inside]}
+    layers |= {n: [] for n, _ in wishes.cracks}
+    cracks, crack_sets = [], []
+    for key, labels in plane.edges.items():
+        a, b = (mine.get(i, -1) for i in key)
+        if min(a, b) < 0 or not (used[a] and used[b]):
+            continue
+        pair = (int(number[a]), int(number[b]))
+        for label in labels:
+            if isinstance(label, str):
+                layers[label].append(pair)
+        sets = [label for label in labels if isinstance(label, int)]
+        if sets:
+            cracks.append(pair)
+            crack_sets.append(min(sets))
+    edges = Mesh.of(points[used], cells).edges()
+    return _only_existing(Mesh.of(points[used], cells, groups, layers, cracks, crack_sets), edges)
+
+
+def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
+    """Cracks that were moved onto the rim are no cracks; a line inside that gmsh has not kept is its failure."""
+    from hpcdem.model.blocks.mesh import crack_rows, find_edges
+
+    for name, pairs in mesh.layers.items():
+        if (find_edges(edges, pairs, len(mesh.points)) < 0).any():
+            raise HpcdemError(f"gmsh did not keep a line of layer '{name}' as edges of the mesh")
+    rows = crack_rows(mesh, edges)
+    if (rows < 0).any():
+        raise HpcdemError("gmsh did not keep a crack as edges of the mesh")
+    inner = edges.inner[rows]
+    return Mesh.of(mesh.points, mesh.cells, mesh.groups, mesh.layers, mesh.cracks[inner], mesh.crack_sets[inner])
+
+
+__all__ = ["GROWTH", "Meshed", "Refinement", "Region", "Wishes", "triangulate"]

@@ -1,0 +1,59 @@
+"""What is said where a package for meshing is missing or cannot be loaded."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+
+import pytest
+
+from hpcdem.errors import HpcdemError
+from hpcdem.pre.mesh import geometry, optional
+from hpcdem.pre.mesh.dxf import read_dxf
+from hpcdem.pre.mesh.imported import import_mesh
+from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
+
+
+@pytest.mark.parametrize("name", ["shapely", "gmsh", "meshio", "ezdxf"])
+def test_a_missing_package_is_named_with_the_way_to_get_it(monkeypatch, name):
+    monkeypatch.setitem(sys.modules, name, None)  # what Python itself does to forbid an import
+    with pytest.raises(HpcdemError, match=rf"needs the package {name}, which .*hpcdem\[mesh\]"):
+        getattr(optional, name)()
+
+
+def test_missing_libraries_of_the_system_are_named(monkeypatch, tmp_path):
+    """What loading the gmsh wheel does on a bare machine."""
+    said = "libGLU.so.1: cannot open shared object file: No such file or directory"
+    (tmp_path / "gmsh.py").write_text(f"raise OSError({said!r})\n")
+    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(HpcdemError, match=r"libGLU\.so\.1: cannot open .*apt install libglu1-mesa libxrender1"):
+        optional.gmsh()
+    monkeypatch.delitem(sys.modules, "gmsh", raising=False)
+
+
+def test_a_wheel_without_its_library(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gmsh", ModuleType("gmsh"))
+    with pytest.raises(HpcdemError, match="without its library libgmsh"):
+        optional.gmsh()
+
+
+def test_an_old_shapely(monkeypatch):
+    old = ModuleType("shapely")
+    old.__version__ = "1.8.5"
+    monkeypatch.setitem(sys.modules, "shapely", old)
+    with pytest.raises(HpcdemError, match=r"shapely 2\.0 or newer, here is 1\.8\.5"):
+        optional.shapely()
+
+
+def test_those_who_need_one_say_so(monkeypatch, tmp_path):
+    for name in ("gmsh", "meshio", "ezdxf"):
+        monkeypatch.setitem(sys.modules, name, None)
+    layers = geometry.Layers()
+    layers.add("o", geometry.rectangle((0, 0), (1, 1)))
+    with pytest.raises(HpcdemError, match="Meshing of arbitrary outlines needs the package gmsh"):
+        triangulate(layers, Wishes([Region("o")], 0.5))
+    with pytest.raises(HpcdemError, match="Import of mesh files needs the package meshio"):
+        import_mesh(tmp_path / "m.msh")
+    with pytest.raises(HpcdemError, match="Import of DXF drawings needs the package ezdxf"):
+        read_dxf(tmp_path / "m.dxf")
