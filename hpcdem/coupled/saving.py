@@ -1,0 +1,95 @@
+"""Both models in one file, bit for bit, on any number of ranks and threads.
+
+The file is a checkpoint of blocks to which the tables of the particles were added, under their names with `PREFIX`
+before them, and what the contacts between the two remember. One file: the two cannot be of different steps.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hpcdem import saving as of_particles
+from hpcdem.blocks import saving as of_blocks
+from hpcdem.coupled.links import Touching
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io import checkpoint
+from hpcdem.io.slabs import to_slabs
+
+if TYPE_CHECKING:
+    from hpcdem.blocks import Blocks
+    from hpcdem.coupled import Coupled
+
+KIND = "coupled"
+PREFIX = "discs_"
+CONTACTS = "disc_contacts"
+
+
+def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
+    """Write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    particles, blocks = both.particles, both.blocks
+    with blocks.timers("checkpoint"):
+        state = of_blocks.state_of(blocks, extra)
+        state.update(kind=KIND, particles=of_particles.state_of(particles), coupled=both.state())
+        tables = dict(of_blocks.tables(blocks))
+        tables.update({PREFIX + name: table for name, table in of_particles.tables_of(particles).items()})
+        known = both.known()
+        columns = {"gid": known.gid, "face": known.face, "friction": known.friction}
+        tables[CONTACTS] = to_slabs(both.comm, ("gid", "face"), columns)
+        checkpoint.write(path, state, tables, both.comm)
+
+
+def restore_blocks(blocks: Blocks, path: Path | str) -> dict[str, Any] | None:
+    """Take that of the blocks alone; returns `extra`, or None if the file is none of both. Collective."""
+    found = None
+    if blocks.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+        except HpcdemError:
+            found = None
+        if found is not None and found[0].get("kind") != KIND:
+            found = None
+    text = blocks.comm.bcast(None if found is None else json.dumps(found[0]))
+    if text is None:
+        return None
+    state = json.loads(text)
+    of_blocks.put(blocks, state, _without_discs(found[1]) if found is not None else None)
+    return state["extra"]
+
+
+def _without_discs(tables: dict[str, Any]) -> dict[str, Any]:
+    return {n: t for n, t in tables.items() if not n.startswith(PREFIX) and n != CONTACTS}
+
+
+def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
+    """Take the state of a file written by `save`; returns `extra`. Collective. CommandError if the file is missing,
+    foreign or damaged; both models are then as they were."""
+    found, error = None, None
+    if both.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+            if found[0].get("kind") != KIND:
+                raise HpcdemError(f"{path} is a checkpoint, but not one of particles and blocks together")
+        except HpcdemError as problem:
+            error = str(problem)
+    try:
+        both.comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    state = json.loads(both.comm.bcast(None if found is None else json.dumps(found[0])))
+    tables = found[1] if found is not None else None
+    of_the_discs = None
+    if tables is not None:
+        of_the_discs = {name.removeprefix(PREFIX): t for name, t in tables.items() if name.startswith(PREFIX)}
+    both.begin_restore()
+    known = Touching.nothing()
+    if tables is not None:
+        rows = tables[CONTACTS]
+        known = Touching(rows["gid"], rows["face"], rows["friction"])
+        tables = _without_discs(tables)
+    of_blocks.put(both.blocks, state, tables)
+    of_particles.apply_state(both.particles, state["particles"], of_the_discs)
+    both.end_restore(state["coupled"], known)
+    return state["extra"]

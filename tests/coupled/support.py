@@ -1,0 +1,72 @@
+"""Models of discs and blocks for the tests of both together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.blocks import Blocks
+from hpcdem.commands import particles, properties, running, settings
+from hpcdem.coupled import Coupled
+from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.simulation import Simulation
+
+ROCK = {"density": 2500.0, "young": 1e9, "poisson_ratio": 0.25}
+STIFF = {"density": 2500.0, "young": 50e9, "poisson_ratio": 0.25}
+
+
+def discs(places: Sequence[tuple[float, float, float]], folder: Path, dt: float = 0.0, **options) -> Simulation:
+    """Discs (x, y, radius), density 2500."""
+    sim = Simulation(outdir=folder)
+    particles.start(sim)
+    settings.set_option(sim, "disk", "on")
+    if dt > 0.0:
+        settings.set_option(sim, "dt", dt)
+    for name, value in options.items():
+        settings.set_option(sim, name, value)
+    for k, (x, y, r) in enumerate(places):
+        particles.ball(sim, k, x, y, r)
+    properties.prop(sim, density=2500.0, kn=1e7, ks=5e6, fric=0.5)
+    return sim
+
+
+def body(mesh: Mesh, rock: dict[str, float] = ROCK, fixed: bool = False, gravity: float = 0.0) -> Blocks:
+    """A model of blocks; fixed: no corner moves."""
+    sim = Blocks()
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", rock)
+    sim.gravity(0.0, -gravity)
+    if fixed:
+        sim.velocity_condition(None, vx=0.0, vy=0.0)
+    return sim
+
+
+def together(sim: Simulation, blocks: Blocks, **options) -> Coupled:
+    """Both, ready to step."""
+    running.prepare(sim, dt_known=sim.settings.dt == 0.0)
+    both = Coupled(sim, blocks, **options)
+    both.settle_time_step()
+    return both
+
+
+def of_disc(both: Coupled, name: str, gid: int = 0) -> float:
+    """A field of one disc."""
+    p = both.particles.particles
+    return float(p[name][p["gid"] == gid][0])
+
+
+def momentum(both: Coupled) -> np.ndarray:
+    """Momentum in x and y, and about the origin, of all there is (on one rank)."""
+    blocks, p = both.blocks, both.particles.particles
+    blocks.close_model()
+    both.particles.close()
+    m, inertia = both.particles.body[:, 0], both.particles.body[:, 1]
+    rows = [np.column_stack([m * p["vx"], m * p["vy"],
+                             m * (p["x"] * p["vy"] - p["y"] * p["vx"]) + inertia * p["spin"]])]  # fmt: skip
+    mass, x, v = blocks.local.true_mass[blocks.owned], blocks.x[blocks.owned], blocks.v[blocks.owned]
+    for k in range(3 if v.shape[1] == 6 else 4):
+        mk, xk, yk, uk, vk = mass[:, k], x[:, 2 * k], x[:, 2 * k + 1], v[:, 2 * k], v[:, 2 * k + 1]
+        rows.append(np.column_stack([mk * uk, mk * vk, mk * (xk * vk - yk * uk)]))
+    return np.concatenate(rows).sum(axis=0)

@@ -1,0 +1,77 @@
+"""hpcdem.couple and what the commands of a script then do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hpcdem.blocks import Blocks
+from hpcdem.commands import properties, running, settings
+from hpcdem.commands.blocks import assigning, coupling, meshing, saving
+from hpcdem.commands.blocks import running as stepping
+from hpcdem.commands.blocks.project import Project
+from hpcdem.errors import CommandError
+from tests.coupled.support import ROCK, discs
+
+
+def scene(folder) -> tuple[Project, object]:
+    """A block beside a disc that falls on it, not yet coupled."""
+    project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
+    meshing.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
+    assigning.element_model(project, "mech_iso_elastic", ROCK)
+    sim = discs([(0.5, 0.6995, 0.1), (0.5, 0.8998, 0.1)], folder / "sand", dt=5e-6)
+    properties.prop(sim, yv=-1.0, xv=0.3)
+    settings.set_option(sim, "print", 100)
+    settings.set_option(sim, "energy", 50)
+    return project, sim
+
+
+def state(project):
+    both = project.coupled
+    p = both.particles.particles
+    return np.concatenate([project.blocks.values("position_y"), p["x"], p["y"], p["spin"], both.contacts()["fs"],
+                           [both.energies()["lost"]]])  # fmt: skip
+
+
+def test_both_are_stepped_saved_and_restored(tmp_path):
+    project, sim = scene(tmp_path)
+    coupling.couple(project, sim)
+    stepping.step(project, 130)
+    assert sim.clock.step == project.step == 130
+    saving.save(project, "middle.sav")
+    stepping.step(project, 170)
+    whole = state(project)
+    names = sorted(path.name for path in (tmp_path / "sand").glob("*.vtkhdf"))
+    assert [name[-10:-7] for name in names][-2:] == ["200", "300"]
+    rows = np.genfromtxt(tmp_path / "sand" / "energy.csv", delimiter=",", names=True)
+    assert rows["step"][-1] == 300 and rows["work_blocks"][-1] != 0.0 and abs(rows["relative"][-1]) < 1e-2
+
+    saving.restore(project, str(tmp_path / "middle.sav"))
+    assert sim.clock.step == project.step == 130
+    stepping.step(project, 170)
+    assert np.array_equal(state(project), whole)
+
+    # As a run does that goes on: blocks first, particles when the script has coupled them again.
+    again, other = scene(tmp_path)
+    saving._restored(again, tmp_path / "middle.sav", begins=True)
+    coupling.couple(again, other)
+    stepping.step(again, 170)
+    assert other.clock.step == again.step == 300 and np.array_equal(state(again), whole)
+
+
+def test_refusals(tmp_path):
+    project, sim = scene(tmp_path)
+    with pytest.raises(CommandError, match="would both write into"):
+        coupling.couple(project, discs([(0.5, 0.9, 0.1)], tmp_path / "data", dt=5e-6))
+    with pytest.raises(CommandError, match="time step must be positive"):
+        coupling.couple(project, sim, dt=-1.0)
+    inside = discs([(0.5, 0.31, 0.1)], tmp_path / "sand", dt=5e-6)
+    with pytest.raises(CommandError, match="inside element"):
+        coupling.couple(project, inside)
+    coupling.couple(project, sim)  # nothing is left of the failed ones
+    with pytest.raises(CommandError, match="coupled to particles already"):
+        coupling.couple(project, sim)
+    with pytest.raises(CommandError, match="CYC would leave the blocks behind"):
+        running.cycle(sim, 1)
+    project.clear()
+    running.cycle(sim, 1)

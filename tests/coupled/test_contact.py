@@ -1,0 +1,212 @@
+"""One disc and one body against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.commands import properties
+from hpcdem.model.blocks.mesh import Mesh
+from tests.blocks.support import JOINT, joined, rectangle, shaken
+from tests.coupled.support import ROCK, STIFF, body, discs, momentum, of_disc, together
+
+R = 0.1
+MASS = 2500.0 * math.pi * R * R
+G = 9.81
+
+
+def test_momentum_of_an_oblique_hit(tmp_path):
+    """A spinning disc hits a free elastic body off its centre: momentum and its moment stay, to rounding."""
+    both = together(discs([(0.93, 0.6 + R + 1e-4, R)], tmp_path, dt=5e-6), body(shaken(rectangle(6, 3, 1.2, 0.6), 0.2)))
+    properties.prop(both.particles, xv=1.0, yv=-2.0, spin=3.0)
+    both.prepare()
+    before = momentum(both)
+    touched = 0
+    for _ in range(20):
+        both.advance(100)
+        touched += len(both.contacts()["id"]) > 0
+        assert np.abs(momentum(both) - before).max() <= 1e-12 * np.abs(before).max()
+    assert 10 < touched < 20 and of_disc(both, "vy") > 1.0
+    assert abs(of_disc(both, "spin") - 3.0) > 1.0  # the friction turned it
+
+
+def test_momentum_of_a_hit_on_a_corner_of_quads(tmp_path):
+    both = together(discs([(-0.03, 0.65, R)], tmp_path, dt=5e-6), body(rectangle(4, 2, 1.2, 0.6, kind="quad")))
+    properties.prop(both.particles, xv=0.5, yv=-1.0)
+    both.prepare()
+    before = momentum(both)
+    both.advance(100)
+    found = both.contacts()
+    assert list(found["face"]) == sorted(found["face"]) and len(found["face"]) == 2
+    assert found["x"] == pytest.approx(0.0, abs=1e-3) and found["y"] == pytest.approx(0.6, abs=1e-3)
+    both.advance(900)
+    assert np.abs(momentum(both) - before).max() <= 1e-12 * np.abs(before).max()
+
+
+def test_rebound_of_a_linear_disc(tmp_path):
+    """Against a held body it is the half sine of the spring kn: U_max = v sqrt(m/k), t_c = pi sqrt(m/k), v' = -v."""
+    v, k, dt = 1.0, 1e7, 2e-6
+    both = together(discs([(0.55, 0.6 + R, R)], tmp_path, dt=dt), body(rectangle(6, 3, 1.2, 0.6), fixed=True))
+    properties.prop(both.particles, yv=-v)
+    deepest, steps = 0.0, 0
+    while steps == 0 or len(both.contacts()["id"]):
+        both.advance(1)
+        deepest = max(deepest, *both.contacts()["overlap"], 0.0)
+        steps += 1
+    assert deepest == pytest.approx(v * math.sqrt(MASS / k), rel=1e-5)
+    assert steps * dt == pytest.approx(math.pi * math.sqrt(MASS / k), abs=3 * dt)
+    assert of_disc(both, "vy") == pytest.approx(v, rel=1e-6) and of_disc(both, "vx") == 0.0
+
+
+def test_rebound_of_a_hertz_disc(tmp_path):
+    """F = 4/3 E* sqrt(R) U^1.5 with both moduli: U_max = (15 m v^2 / (16 E* sqrt(R)))^(2/5) (Johnson 1985, 11.14)."""
+    v, g, nu, dt = 0.5, 3e8, 0.2, 5e-6
+    sim = discs([(0.55, 0.6 + R, R)], tmp_path, dt=dt)
+    properties.prop(sim, shear=g, poiss=nu, hertz=True, yv=-v)
+    both = together(sim, body(rectangle(6, 3, 1.2, 0.6), fixed=True))
+    modulus = 1.0 / ((1.0 - nu**2) / (2.0 * g * (1.0 + nu)) + (1.0 - 0.25**2) / 1e9)
+    deepest = 0.0
+    for _ in range(4000):
+        both.advance(1)
+        if not len(both.contacts()["id"]) and deepest:
+            break
+        deepest = max(deepest, *both.contacts()["overlap"], 0.0)
+    assert deepest == pytest.approx((15.0 * MASS * v * v / (16.0 * modulus * math.sqrt(R))) ** 0.4, rel=1e-4)
+    assert of_disc(both, "vy") == pytest.approx(v, rel=1e-5)
+
+
+def test_disc_at_rest(tmp_path):
+    """U = m g / k on an elastic body that stands on its base, which carries both weights."""
+    blocks = body(rectangle(3, 2, 0.6, 0.4), {**ROCK, "damp_factor": 0.5}, gravity=G)
+    base = np.flatnonzero(blocks.mesh.points[:, 1] < 1e-9)
+    blocks.velocity_condition(base, vx=0.0, vy=0.0)
+    sim = discs([(0.31, 0.4 + R, R)], tmp_path, gravity=(0.0, -G))
+    properties.prop(sim, damp=0.7)
+    both = together(sim, blocks)
+    both.advance(15000)
+    found = both.contacts()
+    assert found["overlap"].sum() / len(found["id"]) == pytest.approx(MASS * G / 1e7, rel=1e-4)
+    assert both.force_on_blocks()[1] == pytest.approx(-MASS * G, rel=1e-4)
+    held = blocks.total("reaction_y", base)
+    assert held == pytest.approx((MASS + 2500.0 * 0.24) * G, rel=1e-3)
+
+
+@pytest.mark.parametrize("friction, mu", [(None, 0.5), (0.2, 0.2)])
+def test_sliding(tmp_path, friction, mu):
+    """A disc that cannot turn slides over 20 faces: F_t = -mu N and m (g + dv_y/dt) = N at any moment, so the change
+    of v_x is -mu (g t + change of v_y), however it bounces."""
+    dt, v = 1e-5, 1.0
+    sim = discs([(0.3, 0.4 + R - MASS * G / 1e7, R)], tmp_path, dt=dt, gravity=(0.0, -G))
+    properties.prop(sim, xv=v)
+    properties.fix(sim, ("spin",))
+    both = together(sim, body(rectangle(20, 2, 2.0, 0.4), fixed=True), friction=friction)
+    both.advance(2)  # friction is built up from nothing
+    both.advance(100)
+    vx, vy = of_disc(both, "vx"), of_disc(both, "vy")
+    both.advance(5000)
+    fall = G * 5000 * dt + of_disc(both, "vy") - vy
+    assert of_disc(both, "vx") - vx == pytest.approx(-mu * fall, rel=1e-9)
+    assert fall == pytest.approx(G * 5000 * dt, rel=1e-3)
+
+
+def run_along(tmp_path, mesh, steps=6000):
+    """A disc that is thrown forward with a spin, along the upper side of a held body at y = 0.4, at every 50th step."""
+    sim = discs([(0.15, 0.4 + R - MASS * G / 1e7, R)], tmp_path, dt=2e-5, gravity=(0.0, -G))
+    properties.prop(sim, xv=6.0, spin=-20.0)
+    both = together(sim, body(mesh, fixed=True))
+    seen = []
+    for _ in range(steps // 50):
+        both.advance(50)
+        fn, fs = both.contacts()["fn"].sum(), both.contacts()["fs"].sum()
+        seen.append([of_disc(both, name) for name in ("x", "y", "vx", "spin")] + [fn, fs])
+    return np.array(seen)
+
+
+def test_no_bump_between_faces(tmp_path):
+    """Along 37 faces as along one: also in the steps in which it passes from one to the next."""
+    one = run_along(tmp_path, rectangle(1, 1, 3.0, 0.4))
+    many = run_along(tmp_path, rectangle(37, 1, 3.0, 0.4, kind="mixed"))
+    assert one[-1, 0] > 0.8 and np.ptp(one[:, 3]) > 5.0  # it slid first, then it rolled
+    scale = np.abs(one).max(axis=0)
+    assert np.abs(many - one).max(axis=0) == pytest.approx(0.0, abs=1e-9 * scale.max())
+    assert (np.abs(many - one) / scale).max() < 1e-9
+
+
+def test_no_bump_between_jointed_elements(tmp_path):
+    """Corners of neighbours are nodes of their own there, yet the surface is one."""
+    mesh = rectangle(15, 1, 1.5, 0.4)
+
+    def force(jointed):
+        sim = discs([(0.3, 0.4 + R - MASS * G / 1e7, R)], tmp_path, dt=2e-6, gravity=(0.0, -G))
+        properties.prop(sim, xv=3.0, fric=0.0)
+        blocks = body(mesh, {**STIFF, "damp_factor": 0.3})
+        if jointed:
+            blocks.joint_model(None, "classic_intrinsic_cohesive_interface", {**JOINT, "penalty_normal": 5e12})
+        low = np.flatnonzero(mesh.points[:, 1] < 1e-9)
+        blocks.velocity_condition(low, vx=0.0, vy=0.0)
+        both = together(sim, blocks)
+        seen = []
+        for _ in range(100):
+            both.advance(300)
+            seen.append(both.contacts()["fn"].sum())
+        return np.array(seen)
+
+    plain, tied = force(False), force(True)
+    assert plain[20:] == pytest.approx(MASS * G, rel=0.02)
+    assert tied[20:] == pytest.approx(MASS * G, rel=0.03)
+
+
+def test_one_contact_at_a_convex_corner_and_two_in_a_groove(tmp_path):
+    """At a corner the force is that of one spring; a groove of 90 degrees carries a disc with two."""
+    k, u = 1e7, 1e-4
+    s = math.sqrt(0.5)
+    both = together(
+        discs([(0.6 + (R - u) * s, 0.4 + (R - u) * s, R)], tmp_path, dt=1e-6),
+        body(rectangle(3, 2, 0.6, 0.4), fixed=True),
+    )
+    both.advance(1)
+    found = both.contacts()
+    assert len(found["id"]) == 2 and found["fn"].sum() == pytest.approx(k * u, rel=1e-6)
+    assert both.force_on_blocks() == pytest.approx((-k * u * s, -k * u * s), rel=1e-6)
+
+    groove = Mesh.of([(0, 0), (1, 0), (1, 0.5), (0.5, 0), (0, 0.5)], [(0, 3, 4, -1), (3, 1, 2, -1)])
+    both = together(discs([(0.5, (R - u) / s, R)], tmp_path, dt=1e-6), body(groove, fixed=True))
+    both.advance(1)
+    found = both.contacts()
+    assert len(found["id"]) == 2 and found["overlap"] == pytest.approx(u, rel=1e-6)
+    assert found["fn"] == pytest.approx(k * u, rel=1e-6)
+
+
+def test_disc_between_two_flush_blocks(tmp_path):
+    """Over the gap between two bodies of one height it has the force of one contact, not of two (or four)."""
+    k, u = 1e7, 1e-4
+    mesh = joined(rectangle(2, 1, 0.4, 0.4), rectangle(2, 1, 0.4, 0.4, x0=0.4 + 1e-7))
+    both = together(discs([(0.4 + 0.5e-7, 0.4 + R - u, R)], tmp_path, dt=1e-6), body(mesh, fixed=True))
+    both.advance(1)
+    assert both.contacts()["fn"].sum() == pytest.approx(k * u, rel=1e-4)
+    assert both.force_on_blocks()[1] == pytest.approx(-k * u, rel=1e-4)
+
+
+def test_energy_across_the_contact(tmp_path):
+    """Without friction what one side loses the other gets; the account of both closes."""
+    blocks = body(rectangle(6, 3, 1.2, 0.6), ROCK)
+    blocks.account_energy()
+    sim = discs([(0.55, 0.6 + R, R)], tmp_path, dt=2e-6)
+    properties.prop(sim, yv=-2.0, fric=0.0)
+    both = together(sim, blocks)
+    from hpcdem.budget import Budget
+
+    sim.energy = Budget()
+    sim.energy.begin(sim)
+    both.advance(400)
+    middle = both.energies()
+    assert middle["stored"] > 10.0 and abs(middle["lost"]) < 1e-4 * middle["stored"]
+    both.advance(6000)
+    found = both.energies()
+    assert found["stored"] == 0.0 and found["work_on_blocks"] > 1.0
+    assert abs(found["lost"]) < 1e-4 * found["work_on_blocks"]
+    assert found["relative"] < 1e-6
+    gone = 0.5 * MASS * (2.0**2 - of_disc(both, "vx") ** 2 - of_disc(both, "vy") ** 2)
+    assert -found["work_on_particles"] == pytest.approx(gone, rel=1e-9)
