@@ -17,7 +17,12 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-_NAMES = {"Simulation": "hpcdem.api", "HpcdemError": "hpcdem.errors", "version": "hpcdem.runtime.launch"}
+_NAMES = {
+    "Simulation": "hpcdem.api",
+    "couple": "hpcdem.api",
+    "HpcdemError": "hpcdem.errors",
+    "version": "hpcdem.runtime.launch",
+}
 __all__ = list(_NAMES)
 
 

@@ -639,6 +639,62 @@ class Simulation:
         return found
 
 
+class Coupling:
+    """Particles and the blocks of a PCDC script that are stepped together, see `couple`."""
+
+    def __init__(self, project: Any, engine: Any) -> None:
+        self._project, self.engine = project, engine
+
+    @property
+    def dt(self) -> float:
+        """Time step of both [s]."""
+        return self.engine.particles.clock.dt
+
+    def contacts(self) -> dict[str, np.ndarray]:
+        """Contacts of particles with faces of elements, on every rank, in the order of ids and faces: id, face (element
+        * 4 + edge), fn, fs [N], x, y [m], overlap [m], energy [J]."""
+        return self.engine.contacts()
+
+    def force(self) -> tuple[float, float]:
+        """Sum of the forces of all particles on the blocks [N]."""
+        return self.engine.force_on_blocks()
+
+    def energies(self) -> dict[str, float]:
+        """Energy that went from one to the other [J], see docs/blocks.md; counts while either has an account."""
+        return self.engine.energies()
+
+    def end(self) -> None:
+        """Part them: each may go on alone."""
+        from hpcdem.commands.blocks import coupling
+
+        coupling.release(self._project)
+
+
+def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupling:
+    """In a PCDC script: let these particles touch the blocks. From here on `pcdc model step` and `pcdc model solve`
+    step both with one time step, `pcdc model save` writes both into one file, and `cycle` of the particles is refused.
+
+    The blocks must have their mesh and element models. friction: of the contacts between the two the smaller of this
+    and that of the particle counts. dt [s]: the time step; left out, that of `set(dt=...)` or `pcdc model time-step`,
+    else the smaller of the stable ones.
+    """
+    from hpcdem.commands.blocks import coupling
+
+    place = _place()
+    try:
+        if not isinstance(particles, Simulation):
+            raise CommandError(f"expected an hpcdem.Simulation, got {particles!r}")
+        projects = session.current().projects
+        if not projects:
+            raise CommandError("there are no blocks: it belongs into a PCDC script")
+        session.current().prepare_coupling()
+        return Coupling(projects[-1], coupling.couple(projects[-1], particles.engine, friction, dt))
+    except CommandError as error:
+        raise ScriptError(*place, f"couple: {error}") from error
+    except TypeError as error:
+        raise ScriptError(*place, f"couple: {error}; see help(hpcdem.couple)") from error
+
+
 def _point(values: Any) -> Point:
     return float(values[0]), float(values[1])
 

@@ -17,6 +17,7 @@ from hpcdem.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import doctor, ending, launch, run_folder, speed
 
 if TYPE_CHECKING:
+    from hpcdem.commands.blocks import Project
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducing import Reproduction
@@ -30,7 +31,7 @@ class Session:
     script, where its relative file names begin; figure: draw the last state of each simulation; draws: DRAW makes
     pictures; text: of the script; job: the same in a few words, for run.json; keep: numbered checkpoints that are kept,
     0: all; ends_with_frame: write the last state of each simulation, too, if no command has; reproduction: of
-    --check-reproducible.
+    --check-reproducible; interpreter: what carries out the PCDC commands of this process, if it has any.
     """
 
     comm: SerialComm
@@ -48,7 +49,11 @@ class Session:
     ends_with_frame: bool = False
     reproduction: Reproduction | None = None
     kernels_ready: bool = False
+    blocks_ready: bool = False
+    coupling_ready: bool = False
     unfinished: list[Simulation] = field(default_factory=list)
+    projects: list[Project] = field(default_factory=list)
+    interpreter: Any = None
 
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
@@ -68,6 +73,33 @@ class Session:
             watch_states(sim, self.reproduction)
         self.unfinished.append(sim)
         return sim
+
+    def project(self, outdir: Path | None = None) -> Project:
+        """Collective: an empty model of blocks; the first one waits for the kernels."""
+        if not self.blocks_ready:
+            from hpcdem.runtime.warmup import prepare_kernels
+
+            prepare_kernels(self.comm, self.log, lambda: rehearse_blocks(self.threads), "blocks")
+            self.blocks_ready = True
+            self.stop.install(self.comm.rank)
+        from hpcdem.blocks import Blocks
+        from hpcdem.commands.blocks import Project
+
+        outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
+        run_folder.claim(outdir, self.comm, self.job)
+        blocks = Blocks(self.comm, self.threads, outdir, self.log, self.stop, balance_on=self.balance)
+        project = Project(blocks, self.directory, outdir)
+        project.job, project.keep = self.job, self.keep
+        self.projects.append(project)
+        return project
+
+    def prepare_coupling(self) -> None:
+        """Collective: wait for the kernels of particles and blocks in one run."""
+        if not self.coupling_ready:
+            from hpcdem.runtime.warmup import prepare_kernels
+
+            prepare_kernels(self.comm, self.log, lambda: rehearse_coupling(self.threads), "coupled")
+            self.coupling_ready = True
 
     def finish(self, sim: Simulation) -> None:
         """Collective: the table of stages, the figure of the last frame; MPI forgets the simulation."""
@@ -99,10 +131,31 @@ class Session:
                 self._note(sim, "stopped" if isinstance(failure, StoppedWithCheckpoint) else "failed")
                 sim.release()
         self.unfinished.clear()
+        for project in self.projects:
+            self._leave(project, failure)
+        self.projects.clear()
+        self.interpreter = None
         self.stop.uninstall()
         if self.reproduction is not None and failure is None:
             self.reproduction.close()
         run_folder.release_all()
+
+    def leave(self, project: Project) -> None:
+        """Collective: the good end of a model of blocks before that of the program."""
+        self.projects.remove(project)
+        self._leave(project, None)
+
+    def _leave(self, project: Project, failure: BaseException | None) -> None:
+        """A model of blocks at the end of the program. Collective, unless it is the end by a failure."""
+        stopped = isinstance(failure, StoppedWithCheckpoint)  # on all ranks at the same step
+        if failure is None or stopped:
+            from hpcdem.commands.blocks import closing
+
+            closing.close(project, self.figure and not stopped)
+        if project.folder_made:
+            state = "done" if failure is None else "stopped" if stopped else "failed"
+            run_folder.leave(project.outdir, self.comm, state, project.step)
+        project.blocks.release()
 
     def _note(self, sim: Simulation, state: str) -> None:
         """Write into run.json how it ended."""
@@ -118,6 +171,22 @@ def rehearse(*threads: int) -> None:
     for n in threads:
         rehearsal.rehearse(n)
     textnum.warm_up()
+
+
+def rehearse_blocks(*threads: int) -> None:
+    """The same for the kernels of blocks."""
+    from hpcdem.commands.blocks import rehearsal
+
+    for n in threads:
+        rehearsal.rehearse(n)
+
+
+def rehearse_coupling(*threads: int) -> None:
+    """The same for the kernels of particles and blocks in one run; those of either are there."""
+    from hpcdem.coupled import rehearsal
+
+    for n in threads:
+        rehearsal.rehearse(n)
 
 
 def watch_states(sim: Simulation, reproduction: Reproduction) -> None:

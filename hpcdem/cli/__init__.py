@@ -7,6 +7,7 @@ thousands of processes should not load what only the last picture needs.
 from __future__ import annotations
 
 import importlib
+import subprocess
 import sys
 from typing import NoReturn
 
@@ -17,7 +18,7 @@ from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run
 from hpcdem.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
-from hpcdem.session import Session, greet, rehearse
+from hpcdem.session import Session, greet, rehearse, rehearse_blocks, rehearse_coupling
 
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
@@ -30,6 +31,9 @@ STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 
 @click.command(context_settings=HELP)
 @click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the later runs [1].")
+@click.option(
+    "--of", "kind", type=click.Choice(["particles", "blocks", "coupled", "all"]), default="all", help="Kernels [all]."
+)
 def warmup(**options: object) -> None:
     """Compile all kernels now, for example on a login node, so that no job waits for it."""
 
@@ -41,6 +45,10 @@ def main() -> NoReturn:
         start(words[0], words[1:])
     if words[:1] == ["grade"]:
         importlib.import_module("hpcdem.cli.grade_page").start(words[1:])
+    if words[:1] == ["case"]:
+        importlib.import_module("hpcdem.cli.case").start(words[1:])
+    if words[:1] == ["console"]:
+        importlib.import_module("hpcdem.cli.console").start(words[1:])
     if words[:1] == ["doctor"]:
         importlib.import_module("hpcdem.cli.doctor").start(words[1:], cores_before)
     if any(word.split("=")[0] in STRESS_AND_STRAIN for word in words):
@@ -75,13 +83,23 @@ def main() -> NoReturn:
 
 def run_warmup(words: list[str]) -> NoReturn:
     """`hpcdem warmup`: on the first process; others, if any, have nothing to do."""
-    threads = read_command_line(warmup, "hpcdem warmup", words)["threads"]
+    given = read_command_line(warmup, "hpcdem warmup", words)
+    threads, kind = given["threads"], given["kind"]
     if launch.speaks_for_all():
+        if kind == "all":  # each kind in a process of its own, see runtime/warmup.py
+            again = [sys.executable, "-m", "hpcdem", "warmup", "-j", str(threads), "--of"]
+            kinds = ("particles", "blocks", "coupled")
+            sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in kinds))
         launch.prepare_environment(threads)
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.warmup import warmup as compile_all
 
-        compile_all(Log(), lambda: rehearse(*{1, threads}))
+        if kind in ("blocks", "coupled"):
+            compile_all(Log(), lambda: rehearse_blocks(*{1, threads}), "blocks")
+        if kind in ("particles", "coupled"):
+            compile_all(Log(), lambda: rehearse(*{1, threads}))
+        if kind == "coupled":
+            compile_all(Log(), lambda: rehearse_coupling(*{1, threads}), "coupled")
     sys.exit(EXIT_OK)
 
 

@@ -85,7 +85,7 @@ def _text(value: Any) -> str:
 def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
     """Facts about the run that wrote into a folder. every: look into all files, not only the last two checkpoints and
     the last frame."""
-    from hpcdem.io.frames import list_frames
+    from hpcdem.io.frames import list_frames, list_mesh_frames
     from hpcdem.post import inventory
 
     facts: dict[str, Any] = {"kind": "folder", "whole": True, "why": ""}
@@ -104,7 +104,7 @@ def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
     if holder is not None:
         facts["state"] = f"running: process {holder.get('pid', '?')} on {holder.get('host', '?')}"
     saved = sorted(folder.glob("*.sav"), key=lambda path: (_step(path.name), path.name))
-    frames = list_frames(folder)
+    frames = [*list_frames(folder), *list_mesh_frames(folder)]
     facts["checkpoints"] = _range(saved, [_step(p.name) for p in saved])
     facts["frames"] = _range(frames, [f.step for f in frames])
     facts["unfinished"] = sorted(p.name for p in folder.glob("*.tmp"))

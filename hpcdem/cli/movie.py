@@ -16,6 +16,7 @@ from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
+    from hpcdem.post.series import Job
     from hpcdem.runtime.progress import Log
 
 PAGE = 17.0
@@ -30,10 +31,13 @@ PAGE = 17.0
 @click.option("--size", type=click.IntRange(64, 16384), default=1200, metavar="PX", help="Width in pixels [1200].")
 @click.option("--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 where ffmpeg is].")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
+@click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
+@click.option("--show", type=click.Choice(["cracks", "stress", "both"]), default="both", help="Of blocks: cracks by "
+              "the way they broke, compressive stress [both].")  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @looks
 def movie(**options: Any) -> None:
-    """Make a film of all frames in DIR, drawn at one view so that nothing jumps.
+    """Make a film of all frames in DIR, of particles or of blocks, drawn at one view so that nothing jumps.
 
     An animated GIF, and MP4 where ffmpeg is found (in the PATH, or of the package imageio-ffmpeg). --showlable=true
     writes the step into each frame; in a text of your own, {step} and {time} (s) are filled in.
@@ -44,6 +48,8 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: make the film. Raises HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
     from hpcdem.post import movie as films
+
+    options["lines"] = False
 
     def begin() -> tuple[list[tuple[str, Path]], list[Path]]:
         goals = targets(options)
@@ -59,13 +65,23 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
             scratch = on_first(comm, lambda: Path(tempfile.mkdtemp(prefix=".movie_", dir=goals[0][1].parent)))
             pictures = draw(comm, log, options, scratch)
         for kind, path in goals:
-            write = films.write_gif if kind == "gif" else films.write_mp4
-            on_first(comm, lambda: write(pictures, path, options["fps"], options["size"]))  # noqa: B023
+            on_first(comm, lambda: write(kind, pictures, path, options))  # noqa: B023
             seconds = len(pictures) / options["fps"]
             log.info(f"{path}: {len(pictures)} frames, {seconds:.3g} s")
     finally:
         if scratch is not None and comm.rank == 0:
             shutil.rmtree(scratch, ignore_errors=True)
+
+
+def write(kind: str, pictures: list[Path], path: Path, options: dict[str, Any]) -> None:
+    """The film of pictures. Raises HpcdemError."""
+    from hpcdem.post import blocks
+    from hpcdem.post import movie as films
+
+    if kind == "gif":
+        films.write_gif(pictures, path, options["fps"], options["size"], blocks.LINES if options["lines"] else ())
+    else:
+        films.write_mp4(pictures, path, options["fps"], options["size"])
 
 
 def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
@@ -97,14 +113,18 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
     """Collective: the pictures of all frames, at one view."""
     from hpcdem.errors import HpcdemError
     from hpcdem.io.agreed import on_first
-    from hpcdem.io.frames import list_frames
+    from hpcdem.io.frames import list_frames, list_mesh_frames
     from hpcdem.post.series import Job, draw_all
 
     def plan() -> list[Job]:
         folder: Path = options["folder"]
-        files = [file.path for file in list_frames(folder)]
+        files = [] if options["name"] else [file.path for file in list_frames(folder)]
         if not files:
-            raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {folder}")
+            of_blocks = [file.path for file in list_mesh_frames(folder, options["name"])]
+            if of_blocks:
+                options["lines"] = True  # thin, and coloured
+                return jobs_of_blocks(of_blocks, options, scratch)
+            raise HpcdemError(f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {folder}")
         # Twice the size, made small afterwards: smooth lines at the few pixels of a film.
         style = style_of(options, folder, PAGE, 2.0 * options["size"] * 2.54 / PAGE)
         seen = common_view(files, style)
@@ -115,3 +135,30 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
     workers = launch.cores() if options["max_workers"] is None else max(1, int(options["max_workers"]))
     draw_all(jobs, comm, workers, log.info)
     return [job.picture for job in jobs]
+
+
+def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) -> list[Job]:
+    """What is to be drawn of frames of blocks: one view and one range of stress for all."""
+    from hpcdem.io.axes import View
+    from hpcdem.io.vtkhdf_mesh import read_mesh_frame
+    from hpcdem.post import blocks
+    from hpcdem.post.series import Job
+
+    views, spans = [], []
+    for file in files:
+        state = read_mesh_frame(file)
+        views.append(blocks.view(state))
+        spans.append(blocks.stress_range(state))
+    limits = [
+        bound if options[name] is None else options[name]
+        for name, bound in (
+            ("xmin", min(v.left for v in views)), ("xmax", max(v.right for v in views)),
+            ("ymin", min(v.bottom for v in views)), ("ymax", max(v.top for v in views)),
+        )
+    ]  # fmt: skip
+    looks = blocks.Looks(
+        blocks.PANELS if options["show"] == "both" else (options["show"],), PAGE, options["fontsize"],
+        2.0 * options["size"] * 2.54 / PAGE, style_of(options, options["folder"], PAGE, 1.0).title,
+        (min(span[0] for span in spans), max(span[1] for span in spans)),
+    )  # fmt: skip
+    return [Job(file, scratch / f"{k:06d}.png", looks, View(*limits)) for k, file in enumerate(files)]

@@ -51,6 +51,7 @@ def resumed_options(given: dict[str, Any]) -> Options:
     if record is not None and record.language == "python":
         words = " ".join(["hpcdem", record.script, *record.arguments])
         raise UsageError(f"{folder} was written by a Python program, which goes on by Simulation.resume(): {words}")
+    given["arguments"] = tuple(record.arguments) if record is not None else ()
     recorded = Path(record.script) if record is not None and record.script else None
     for script in [recorded, folder.parent / recorded.name] if recorded is not None else []:
         if script is not None and script.is_file():

@@ -64,7 +64,7 @@ def run(session: Session, options: Options) -> None:
     elif kind == "zdem":
         run_zdem(session, options, source)
     else:
-        raise UsageError(f"{name}: this is a PCDC script; this version runs ZDEM scripts and Python, PCDC comes later")
+        run_pcdc(session, options, source)
 
 
 def run_zdem(session: Session, options: Options, source: bytes) -> None:
@@ -103,7 +103,9 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
     name = str(options.script)
     for given, option in ((options.check, "--check"), (options.resume, "--resume")):
         if given:
-            raise UsageError(f"{name}: {option} is for ZDEM scripts; a Python program uses Simulation.resume() itself")
+            raise UsageError(
+                f"{name}: {option} is for ZDEM and PCDC scripts; a Python program uses Simulation.resume() itself"
+            )
     session.text = source.decode("utf-8", errors="replace")
     session.job = Job(name, "python", options.arguments, session.threads)
     session.ends_with_frame = True
@@ -122,6 +124,50 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
         if isinstance(error, (HpcdemError, KeyboardInterrupt)):
             raise
         raise HpcdemError(f"{name} ended with an error\n{own_traceback(error, name)}") from None
+    session.close()
+
+
+def run_pcdc(session: Session, options: Options, source: bytes) -> None:
+    """Collective: read a script of PCDC commands and Python, and run it on every rank."""
+    from hpcdem.lang.pcdc import check
+    from hpcdem.lang.pcdc.execute import Interpreter, Verbs
+    from hpcdem.lang.pcdc.source import decode
+
+    name, log = str(options.script), session.log
+    if options.saved_in is not None:
+        raise UsageError(
+            f"{name}: there is no such script; a PCDC script is Python, which is not taken out of a checkpoint. Give "
+            "the script itself: hpcdem SCRIPT --resume"
+        )
+    if session.reproduction is not None:
+        raise UsageError(
+            f"{name}: --check-reproducible is for models of particles; of a PCDC script compare model save"
+        )
+    text = decode(source, name)
+    if options.check:
+        log.info(check.summary(text, name))
+        return
+    check.read(text, name)
+    session.text = text
+    session.job = Job(name, "pcdc", options.arguments, session.threads)
+    enter_session(session)  # particles that the script makes belong to it
+    try:
+        project = session.project()
+        interpreter = session.interpreter = Interpreter(project)
+        enter_session(session)
+        past = Verbs().saving.take_up(project) if options.resume else None
+        log.script_started(name, 0)
+        sys.argv = [name, *options.arguments]
+        sys.path.insert(0, str(options.script.resolve().parent))
+        interpreter.run(interpreter.read(text, name), past or ())
+        interpreter.at_the_end()
+    except SystemExit as leaving:
+        if leaving.code not in (None, EXIT_OK):
+            session.close(leaving)
+            raise
+    except BaseException as error:
+        session.close(error)
+        raise
     session.close()
 
 
@@ -235,13 +281,14 @@ def saved_script(comm: SerialComm, folder: Path) -> bytes:
     """Collective: the text of the script that the newest checkpoint of a folder holds."""
     from hpcdem.io import checkpoint
     from hpcdem.io.agreed import on_first
-    from hpcdem.saving import checkpoints
+    from hpcdem.runtime.checkpoints import newest_first
 
     def text() -> bytes:
-        found, damaged = checkpoints([folder])
+        found, damaged = newest_first([folder])
         if not found:
             raise UsageError("; ".join([f"{folder}: no checkpoint to go on from", *damaged]))
-        return str(checkpoint.read_state(found[0])["script"]).encode()
+        state = checkpoint.read_state(found[0])
+        return str(state["script"] if "script" in state else state["extra"]["run"]["script"]).encode()
 
     return on_first(comm, text)
 
@@ -264,7 +311,9 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
     no_args_is_help=True,
     epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s DIR --help), `hpcdem "
     "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem grade FILE` makes grains from a grading curve, "
+    "`hpcdem case` writes scripts of ready-made models, "
     "`hpcdem warmup` compiles all kernels for later runs, "
+    "`hpcdem console` takes PCDC commands and Python line by line, "
     "`hpcdem doctor` says what is wrong with this machine or job. "
     "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a "
     "checkpoint (go on with --resume).",
@@ -292,7 +341,7 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
 @click.option("--against", type=PATH, metavar="LOG", help="Compare the fingerprints with those of an earlier log.")
 @click.version_option(launch.version(), "-v", "--version", prog_name="hpcdem", message="%(prog)s %(version)s")
 def hpcdem(**options: Any) -> None:
-    """Run a discrete-element SCRIPT (ZDEM commands, or Python that uses hpcdem), alone or under mpiexec or srun.
+    """Run a SCRIPT (ZDEM commands, PCDC commands, or Python that uses hpcdem), alone or under mpiexec or srun.
 
-    ARGUMENTS are for a Python script, in sys.argv.
+    ARGUMENTS are for Python, in sys.argv.
     """

@@ -173,6 +173,10 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
         raise CommandError(
             f"{name} cannot be used by a function that is called in the middle of {sim.progress['name']}"
         )
+    if sim.coupled:
+        raise CommandError(
+            f"{name} would leave the blocks behind that these particles touch: `pcdc model step` steps both"
+        )
     prepare(sim)
     if sim.settings.energy > 0 and sim.energy is None:
         sim.energy = Budget()

@@ -1,4 +1,4 @@
-"""What kind of script is it? All kinds end in .py, so the content decides."""
+"""What kind of script is it? All kinds end in .py, so the content decides; .sc is always PCDC."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ _PYTHON_LINE = re.compile(
 
 
 def kind(source: bytes | str, file: str = "script") -> str:
-    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python) or "python" (Python that imports something).
+    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python) or "python" (Python that imports something; in a
+    file *.sc it is a PCDC script that leaves its commands to others).
 
     ScriptError, with the line that gave it away, for what is none of these. That a script is of a kind does not mean
     that it is correct.
@@ -33,7 +34,7 @@ def kind(source: bytes | str, file: str = "script") -> str:
     source = source.removeprefix(b"\xef\xbb\xbf")
     tree, trouble = _python(source)
     if tree is not None and any(isinstance(node, (ast.Import, ast.ImportFrom)) for node in ast.walk(tree)):
-        return "python"
+        return "pcdc" if file.lower().endswith(".sc") else "python"  # PCDC may leave all commands to functions
     if _PCDC_LINE.search(source):
         return "pcdc"
     firsts = _first_words(source)

@@ -1,0 +1,107 @@
+"""`hpcdem case NAME`: the script of a ready-made model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from hpcdem.cli.common import HELP, PATH, run_program
+
+if TYPE_CHECKING:
+    from hpcdem.cases.base import Case
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
+
+PROGRAM = "hpcdem case"
+OWN = ("output", "force")
+"""Options that are no parameters."""
+
+
+def start(words: list[str]) -> NoReturn:
+    """The program, to its end."""
+    from hpcdem.cases import CASES, find
+
+    if words[:1] and words[0] in CASES:
+        kind = find(words[0])
+        run_program(command(kind), f"{PROGRAM} {kind.name}", words[1:], lambda comm, log, o: work(kind, comm, log, o))
+    run_program(listing(words), PROGRAM, words, show)
+
+
+def listing(words: list[str]) -> click.Command:
+    """`hpcdem case` without a name that it knows."""
+    from hpcdem.cases import CASES, find
+
+    titles = "\n\n".join(f"\b\n{name:12s} {find(name).title}" for name in CASES)
+    return click.Command(
+        PROGRAM, context_settings=HELP, help=f"Write the script of a ready-made model.\n\n{titles}",
+        params=[click.Argument(["name"], required=False, callback=_known)],
+        epilog="hpcdem case NAME --help lists its parameters. From Python: docs/cases.md.",
+    )  # fmt: skip
+
+
+def _known(context: click.Context, argument: click.Parameter, value: str | None) -> str | None:
+    from hpcdem.cases import CASES
+
+    if value is not None:
+        raise click.UsageError(f"there is no case '{value}'; there is {', '.join(CASES)}")
+    return value
+
+
+def show(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """The list of cases."""
+    from hpcdem.cases import CASES, find
+
+    if comm.rank == 0:
+        for name in CASES:
+            click.echo(f"{name:12s} {find(name).title}")
+
+
+def command(kind: type[Case]) -> click.Command:
+    """The command line of a case: an option per parameter."""
+    from hpcdem.cases.base import chooses, number, unit_of
+
+    options: list[click.Parameter] = []
+    for name, field in kind.model_fields.items():
+        word, unit = name.replace("_", "-"), unit_of(field)
+        doc = f"{str(field.description)[:1].upper()}{str(field.description)[1:]}"
+        if isinstance(field.default, bool):
+            default = "yes" if field.default else "no"
+            options.append(click.Option([f"--{word}/--no-{word}", name], default=None, help=f"{doc} [{default}]."))
+            continue
+        shown = field.default if chooses(field) else number(field.default)
+        measured = f" {unit}" if unit not in ("", "1") else ""
+        options.append(click.Option([f"--{word}", name], metavar="X", help=f"{doc} [{shown}{measured}]."))
+    options += [
+        click.Option(["-o", "--output"], type=PATH, metavar="FILE", help=f"The script; - prints it [{kind.name}.sc]."),
+        click.Option(["--force"], is_flag=True, help="Replace the file if it is there."),
+    ]
+    return click.Command(kind.name, context_settings=HELP, params=options, help=f"{kind.title}: write its script.")
+
+
+def work(kind: type[Case], comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
+    """Collective: write the script, on rank 0. UsageError on all ranks."""
+    from hpcdem.errors import ScriptError, UsageError
+    from hpcdem.io.agreed import atomic_path, on_first
+
+    given = {name: value for name, value in options.items() if name not in OWN and value is not None}
+    try:
+        case = kind(**given)
+    except ScriptError as error:
+        raise UsageError(error.message) from None
+    path: Path = options["output"] or Path(f"{kind.name}.sc")
+
+    def write() -> None:
+        if str(path) == "-":
+            click.echo(case.script(), nl=False)
+            return
+        if path.exists() and not options["force"]:
+            raise UsageError(f"{path} is there already; --force replaces it, -o names another file")
+        if not path.parent.is_dir():
+            raise UsageError(f"cannot write {path}: there is no folder {path.parent}")
+        with atomic_path(path) as temporary:
+            Path(temporary).write_text(case.script(), encoding="utf-8")
+        click.echo(f"{path}: {case.title}; run it with hpcdem {path}")
+
+    on_first(comm, write)

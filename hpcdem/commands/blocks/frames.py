@@ -1,0 +1,109 @@
+"""output vtk: frames of the model for ParaView."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.blocks import QUANTITIES, Blocks
+from hpcdem.commands.blocks.project import Project
+from hpcdem.errors import CommandError
+from hpcdem.io import vtkhdf_mesh
+from hpcdem.io.slabs import to_slabs
+from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
+from hpcdem.model.blocks.connectivity import face_points
+from hpcdem.model.blocks.groups import ELEMENT
+
+
+def vtk(project: Project, name: str, every: int | None = None) -> None:
+    """Write `<name>_<step>.vtkhdf` into the folder of the results: now, or every so many steps. Collective."""
+    if "/" in name:
+        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
+    if every is None:
+        project.ready(use=False)
+        _write(project, name)
+    else:
+        project.frames[name] = every
+
+
+def stop(project: Project, name: str) -> None:
+    """No more frames of this name."""
+    if name not in project.frames:
+        known = ", ".join(f"'{other}'" for other in project.frames) or "none"
+        raise CommandError(f"there are no frames '{name}' to stop; there is {known}")
+    del project.frames[name]
+
+
+def write_due(project: Project) -> None:
+    """The frames that are due at this step, once each. Collective."""
+    for name, every in project.frames.items():
+        if project.step % every == 0 and project.framed.get(name) != project.step:
+            _write(project, name)
+
+
+def write_last(project: Project) -> None:
+    """A frame of each name of a state that makes no sense any more, for the user to look at. Collective."""
+    with np.errstate(all="ignore"):
+        for name in project.frames:
+            _write(project, name)
+
+
+def _write(project: Project, name: str) -> None:
+    path = project.folder() / f"{name}_{project.step:010d}.vtkhdf"
+    with project.blocks.timers.around("output"):
+        write_mesh_frame(path, frame(project), project.comm)
+    project.framed[name] = project.step
+
+
+def whole(project: Project) -> MeshState | None:
+    """The present state as a frame, on rank 0. Collective."""
+    return vtkhdf_mesh.whole(frame(project), project.comm)
+
+
+def _names(kind: str) -> list[str]:
+    """What is written of elements and joints: all but where they are, which the points say."""
+    names = [name for name, quantity in QUANTITIES.items() if quantity.on == kind]
+    return [name for name in names if not name.startswith(f"{kind}_")]
+
+
+def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
+    """Every corner of this rank's elements by itself: those of broken joints part."""
+    vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
+    columns = blocks.owned_values("corner", vectors)
+    return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
+
+
+def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Joints, and the open edges beside this rank's elements that have no cohesive model: cracks from the beginning, of
+    state 0."""
+    mesh = blocks.the_mesh()
+    faces = (4 * elements[:, None] + np.arange(4)).reshape(-1)
+    beside = blocks.partner[faces]
+    cracks = faces[(beside > faces) & blocks.open[faces] & (blocks.joint_row[faces] == 0) & blocks.alive[beside // 4]]
+    ends = mesh.points[face_points(mesh.cells, cracks)]
+    known = {"number": cracks, "state": np.zeros(len(cracks)), "mode": np.zeros(len(cracks)),
+             "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
+    nothing = np.full(len(cracks), np.nan)
+    return {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
+
+
+def frame(project: Project) -> MeshFrame:
+    """What is written at this moment. Collective."""
+    blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
+    corners = _corners(blocks)
+    elements = blocks.owned_values("element", _names("element"))
+    joints = _with_cracks(blocks, elements["number"], blocks.owned_values("joint", _names("joint")))
+    elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
+    names: dict[str, list[str]] = {}
+    for set_name, groups in project.groups[ELEMENT].sets.items():
+        column = f"group_{set_name}"
+        code = np.full(len(mesh.cells), -1, np.int32)
+        for k, members in enumerate(groups.values()):
+            code[members] = k
+        elements[column] = code[elements["number"]]
+        names[column] = list(groups)
+    element, edge = np.divmod(joints["number"], 4)
+    count = np.where(mesh.cells[element, 3] >= 0, 4, 3)
+    joints["first"], joints["last"] = joints["number"], 4 * element + (edge + 1) % count
+    of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
+    clock = blocks.clock
+    return MeshFrame(int(clock.step), float(clock.time), float(clock.dt), of_corners, of_elements, of_joints, names)

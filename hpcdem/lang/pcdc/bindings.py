@@ -1,0 +1,283 @@
+"""Which verb a command is: one function per row of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.errors import CommandError
+from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.statement import Statement
+from hpcdem.model.blocks import groups as g
+
+if TYPE_CHECKING:
+    from hpcdem.lang.pcdc.execute import Interpreter
+
+Terms = tuple[tuple[str, Any], ...]
+
+
+class Call:
+    """A command on its way to its verb: arguments with all expressions evaluated, by name; where: its range."""
+
+    def __init__(
+        self, interpreter: Interpreter, statement: Statement, arguments: Mapping[str, Any], terms: Terms | None
+    ) -> None:
+        self.interpreter, self.statement = interpreter, statement
+        self.project: Any = interpreter.project
+        self.verbs: Any = interpreter.verbs
+        self.arguments: Mapping[str, Any] = arguments
+        self.where: g.Range | None = where(terms)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.arguments[name]
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """An argument, or the default if it was not given."""
+        return self.arguments.get(name, default)
+
+    def given(self, *left_out: str) -> dict[str, Any]:
+        """The arguments as keyword arguments of Python."""
+        return {python(name): value for name, value in self.arguments.items() if name not in left_out}
+
+    def properties(self) -> dict[str, Any]:
+        """Those of a model, tables by their name."""
+        return {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
+
+    def group(self) -> dict[str, str]:
+        """`group 'g' set 's'` of a mesh."""
+        given = self.arguments.get("group")
+        if given is None:
+            return {}
+        return {"group": given["value"], "set_name": given.get("set", g.DEFAULT)}
+
+
+def python(name: str) -> str:
+    """`poisson-ratio` as a name of Python."""
+    return name.replace("-", "_")
+
+
+def _plain(value: Any) -> Any:
+    return value.name if isinstance(value, TableName) else value
+
+
+def where(terms: Terms | None) -> g.Range | None:
+    """RANGE as the verbs take it."""
+    return None if terms is None else tuple(_TERMS[name](value) for name, value in terms)
+
+
+_TERMS: dict[str, Callable[[Any], g.Term]] = {
+    "group": lambda v: g.InGroup(v["value"], v.get("set", g.DEFAULT)),
+    "set": g.InSet,
+    "id": lambda v: g.Ids(v[0], v[-1]),
+    "x": lambda v: g.Span(0, *v),
+    "y": lambda v: g.Span(1, *v),
+    "geometry": g.OnLayer,
+    "boundary": lambda v: g.OnBoundary(),
+    "face-of": lambda v: g.OfElements(v["value"], v.get("set", g.DEFAULT)),
+    "between": lambda v: g.Between(v["value"][0], v["value"][1], v.get("set", g.DEFAULT)),
+    "crack": lambda v: g.OnCrack(),
+}
+
+# ---- model ---------------------------------------------------------------------------------------------------------
+
+
+def _restore(call: Call) -> None:
+    found = call.verbs.saving.restore(call.project, call["file"])
+    call.interpreter.restore_names(found, call["file"])
+
+
+# ---- geometry and mesh ---------------------------------------------------------------------------------------------
+
+
+def _shape(verb: str, *names: str) -> Callable[[Call], None]:
+    def carry_out(call: Call) -> None:
+        getattr(call.verbs.geometry, verb)(call.project, call["as-layer"], *(call[name] for name in names))
+
+    return carry_out
+
+
+def _fractures(call: Call) -> None:
+    densities = [name for name in ("p10", "p20", "p21") if name in call.arguments]
+    if len(densities) != 1:
+        raise CommandError("fractures need one density: p10, p20 or p21")
+    orientation, length = call["orientation"], call["length"]
+    call.verbs.meshing.fracture_network(
+        call.project, call["as-layer"], call["inside"],
+        orientation=(*orientation["value"], orientation.get("spread", 0.0)),
+        length=(*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
+        density=(densities[0], call[densities[0]]), seed=call["seed"], holes=call.get("hole", []),
+        scanline=call.get("scan-line", 0.0), ends_at=call.get("ends-at", 0.0), reached=call.get("reached", False),
+        least=call.get("shortest", 0.0),
+    )  # fmt: skip
+
+
+def _mesh_create(call: Call) -> None:
+    group = call.group()
+    call.verbs.meshing.create(
+        call.project, call["from-layer"], call["size"], call.get("type", "tri"), **group,
+        refine=[(r["value"], r["size"], r.get("distance")) for r in call.get("refine-layer", [])],
+        holes=call.get("hole", []),
+        regions=[(r["value"], r.get("group", r["value"])) for r in call.get("region", [])],
+        embedded=call.get("embed", []), cracks=call.get("crack", []), irregular=call.get("irregular", False),
+    )  # fmt: skip
+
+
+def _mesh_structured(call: Call) -> None:
+    options = {"ratio": call["ratio"]} if "ratio" in call.arguments else {}
+    call.verbs.meshing.rectangle(
+        call.project, call["first"], call["second"], call["cells"], call.get("type", "tri"),
+        call.get("diagonal", "alternate"), **call.group(), **options,
+    )  # fmt: skip
+
+
+# ---- elements, faces, joints, nodes --------------------------------------------------------------------------------
+
+
+def _group(kind: str) -> Callable[[Call], None]:
+    def carry_out(call: Call) -> None:
+        call.verbs.assigning.group(call.project, kind, call["group"], call.get("set", g.DEFAULT), call.where)
+
+    return carry_out
+
+
+def _element_model(call: Call) -> None:
+    if call["model"] == "null":
+        call.verbs.assigning.null(call.project, **call.properties(), where=call.where)
+    else:
+        name = _MODELS[call["model"]]
+        call.verbs.assigning.element_model(call.project, name, call.properties(), call.where)
+
+
+def _face_model(call: Call) -> None:
+    call.verbs.assigning.face_model(call.project, _MODELS[call["model"]], call.properties(), call.where)
+
+
+def _joint_model(call: Call) -> None:
+    properties = call.properties()
+    if properties.pop("np", 3) != 3:
+        raise CommandError("np is 3 in two dimensions")
+    call.verbs.assigning.joint_model(call.project, _MODELS[call["model"]], properties, call.where)
+
+
+_MODELS = {
+    "mechanical-iso-elastic": "mech_iso_elastic",
+    "contact-mohr-coulomb": "contact_mohr_coulomb",
+    "classic-intrinsic-cohesive-interface": "classic_intrinsic_cohesive_interface",
+}
+"""Names of the language and of `model.blocks.properties`."""
+
+
+def _initial_stress(call: Call) -> None:
+    stress = {name.removeprefix("stress-"): given["value"] for name, given in call.arguments.items()}
+    gradient = {
+        name.removeprefix("stress-"): given["gradient"] for name, given in call.arguments.items() if "gradient" in given
+    }
+    call.verbs.assigning.initial_stress(call.project, stress, gradient, call.where)
+
+
+def _node_condition(call: Call) -> None:
+    given, verbs = call.properties(), call.verbs.assigning
+    match call["model"]:
+        case "mechanical-velocity-boundary-condition":
+            verbs.velocity(call.project, **_short(given), where=call.where)
+        case "mechanical-force-boundary-condition":
+            verbs.force(call.project, **_short(given), where=call.where)
+        case "mechanical-move-boundary-constraint":
+            verbs.move(call.project, *given["type"], where=call.where)
+
+
+def _short(given: Mapping[str, Any]) -> dict[str, Any]:
+    """`velocity_x` becomes `vx`."""
+    return {name[0] + name[-1]: value for name, value in given.items()}
+
+
+def _face_condition(call: Call) -> None:
+    given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
+    call.verbs.assigning.stress(call.project, **given, where=call.where)
+
+
+# ---- records -------------------------------------------------------------------------------------------------------
+
+
+def _history(call: Call) -> None:
+    how = next((word for word in ("sum", "mean", "minimum", "maximum") if word in call.arguments), "")
+    kind = {"joint": g.JOINT}.get(call["object"], call["object"])
+    call.verbs.histories.create(
+        call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
+        call.get("every", 1), call.where,
+    )  # fmt: skip
+
+
+def _solve(call: Call) -> None:
+    if "elastic" in call.arguments:
+        call.verbs.running.solve_elastic(call.project, **call.given("elastic"))
+    else:
+        call.verbs.running.solve(call.project, **call.given())
+
+
+def _output(call: Call) -> None:
+    if "off" in call.arguments:
+        call.verbs.frames.stop(call.project, call["file"])
+    else:
+        call.verbs.frames.vtk(call.project, call["file"], call.get("every"))
+
+
+VERBS: dict[str, Callable[[Call], None]] = {
+    "model new": lambda c: c.verbs.modelling.new(c.project),
+    "model save": lambda c: c.verbs.saving.save(c.project, c["file"]),
+    "model restore": _restore,
+    "model gravity": lambda c: c.verbs.modelling.gravity(c.project, c["gravity"]),
+    "model option": lambda c: c.verbs.modelling.option(c.project, **c.given()),
+    "model time-step": lambda c: c.verbs.modelling.time_step(c.project, **c.given()),
+    "model step": lambda c: c.verbs.running.step(c.project, c["steps"]),
+    "model solve": _solve,
+    "geometry create polyline": _shape("polyline", "points"),
+    "geometry create polygon": _shape("polygon", "points"),
+    "geometry create rectangle": _shape("rectangle", "first", "second"),
+    "geometry create circle": _shape("circle", "centre", "radius"),
+    "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
+    "geometry create point": _shape("points", "points"),
+    "geometry create fractures": _fractures,
+    "geometry import": lambda c: c.verbs.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
+    "geometry transform": lambda c: c.verbs.geometry.transform(c.project, **c.given()),
+    "geometry delete": lambda c: c.verbs.geometry.delete(c.project, c["layer"]),
+    "mesh create": _mesh_create,
+    "mesh structured": _mesh_structured,
+    "mesh equilateral": lambda c: c.verbs.meshing.equilateral(
+        c.project, c["first"], c["second"], c["size"], **c.group()
+    ),
+    "mesh import": lambda c: c.verbs.meshing.import_file(
+        c.project, c["file"], **c.group(), **{n: c[n] for n in ("merge", "scale") if n in c.arguments}
+    ),
+    "mesh intersect": lambda c: c.verbs.meshing.intersect(c.project, c["layer"], c.get("follow", False)),
+    "mesh quality": lambda c: c.verbs.meshing.tell_quality(c.project),
+    "element group": _group(g.ELEMENT),
+    "element c-model": _element_model,
+    "element property": lambda c: c.verbs.assigning.element_property(c.project, c.given(), c.where),
+    "element initial": _initial_stress,
+    "element reset state": lambda c: c.verbs.modelling.reset_elements(c.project, c.where),
+    "element-face group": _group(g.FACE),
+    "element-face c-model": _face_model,
+    "element-face property": lambda c: c.verbs.assigning.face_property(c.project, c.given(), c.where),
+    "element-face boundary": _face_condition,
+    "element-face boundary remove": lambda c: c.verbs.assigning.remove_face_conditions(c.project, c.where),
+    "face-joint group": _group(g.JOINT),
+    "face-joint c-model": _joint_model,
+    "face-joint property": lambda c: c.verbs.assigning.joint_property(c.project, c.given(), c.where),
+    "face-joint reset state": lambda c: c.verbs.modelling.reset_joints(c.project, c.where),
+    "node group": _group(g.NODE),
+    "node boundary": _node_condition,
+    "node boundary remove": lambda c: c.verbs.assigning.remove_node_conditions(c.project, c.where),
+    "node initial": lambda c: c.verbs.assigning.initial_velocity(c.project, c["velocity"], c.where),
+    "node reset velocity": lambda c: c.verbs.modelling.reset_velocity(c.project),
+    "node reset displacement": lambda c: c.verbs.modelling.reset_displacement(c.project),
+    "table create": lambda c: c.verbs.assigning.table(c.project, c["name"], c["values"]),
+    "table delete": lambda c: c.verbs.assigning.remove_table(c.project, c["name"]),
+    "history create": _history,
+    "history delete": lambda c: c.verbs.histories.delete(c.project, c["name"]),
+    "history export": lambda c: c.verbs.histories.export(c.project, c["file"], c.get("names", ())),
+    "chart create": lambda c: c.verbs.charts.create(c.project, **c.given()),
+    "chart add": lambda c: c.verbs.charts.add(c.project, **c.given()),
+    "chart export": lambda c: c.verbs.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
+    "output vtk": _output,
+}

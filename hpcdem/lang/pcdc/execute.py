@@ -1,0 +1,349 @@
+"""Carries out a script: runs its Python, and binds every command to the verb of `hpcdem.commands.blocks` that does it.
+
+The Python of a script runs on every rank; its commands are collective. Before one is carried out the ranks compare
+what they were told, so that a rank that took another way is found at once.
+"""
+
+from __future__ import annotations
+
+import importlib
+import linecache
+import math
+import random
+import sys
+import traceback
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.lang.pcdc import names, source
+from hpcdem.lang.pcdc.bindings import VERBS, Call
+from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal
+from hpcdem.lang.pcdc.source import CALL, Source
+from hpcdem.lang.pcdc.statement import Statement, shown
+from hpcdem.lang.pcdc.vector import Vector
+from hpcdem.lang.pcdc.views import Model
+
+SEED = 0
+"""Of the random numbers of Python and numpy, so that all ranks draw the same."""
+
+
+class Verbs:
+    """The modules of `hpcdem.commands.blocks` by name, each imported when it is first needed."""
+
+    def __getattr__(self, name: str) -> Any:
+        return importlib.import_module(f"hpcdem.commands.blocks.{name}")
+
+
+class Interpreter:
+    """Runs scripts and single lines in one namespace, on a project (hpcdem.commands.blocks).
+
+    namespace: the global names of the script. `verbs` replaces the modules of hpcdem.commands.blocks in tests. journal:
+    of a script that runs, None in a conversation.
+    """
+
+    def __init__(self, project: Any, verbs: Any = None) -> None:
+        self.project: Any = project
+        self.verbs = verbs if verbs is not None else Verbs()
+        self.sources: dict[str, Source] = {}
+        self.statements: list[Statement] = []
+        self.journal: Journal | None = None
+        self._own_names: dict[str, Any] = {
+            "__name__": "__main__", "__builtins__": __builtins__, "math": math, "Vector": Vector, "print": self._print,
+            "pcdc": Model(project, self.verbs, self._look), CALL: self._carry_out,
+        }  # fmt: skip
+        self.namespace = dict(self._own_names)
+        self._included_at: int | None = None
+        project.names = self._names
+        project.place = self._place_in_script
+
+    # ---- scripts and lines ---------------------------------------------------------------------------------------
+
+    def read(self, text: str, file: str) -> Source:
+        """Read a script; ScriptError at its first wrong line."""
+        return source.read(text, file, len(self.statements))
+
+    def run(self, script: Source, past: Sequence[list[Any]] = ()) -> None:
+        """Run a script that was read last, to its end. ScriptError names the line of a command, HpcdemError that of the
+        Python around it.
+
+        past: the journal of a checkpoint that the project was restored from; the script is brought back to the command
+        in which it was written, and goes on there. UsageError if that is not possible.
+        """
+        self.journal = Journal(self._warn_of_lost_journal)
+        if past:
+            self.journal.replay(list(past))
+        random.seed(SEED)
+        np.random.seed(SEED)  # noqa: NPY002 - what scripts use
+        self.namespace["__file__"] = script.file
+        self._execute(script, "exec")
+
+    def line(self, script: Source) -> None:
+        """The same for what was typed: the value of an expression is shown."""
+        self._execute(script, "single")
+
+    def include(self, text: str, file: str, names: dict[str, Any]) -> None:
+        """Carry out a text from within a script or program, with variables of its own: those in `names`, which holds
+        all of them afterwards. The log, checkpoints and --resume know it by the line of the script that called.
+
+        file: as messages show it. ScriptError names the line of the text, and that of the script.
+        """
+        script = source.read(text, file, len(self.statements))
+        for name, value in self._own_names.items():
+            names.setdefault(name, value)
+        around = self._included_at
+        self._included_at = around if around is not None else self._line_of_caller()
+        try:
+            self._execute(script, "exec", names)
+        finally:
+            self._included_at = around
+
+    def _line_of_caller(self) -> int:
+        """The line of the script that is being carried out; 0 in a Python program."""
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None and frame.f_code.co_filename not in self.sources:
+            frame = frame.f_back
+        return frame.f_lineno if frame is not None else 0
+
+    def _execute(self, script: Source, mode: str, names: dict[str, Any] | None = None) -> None:
+        assert script.first == len(self.statements)
+        self.sources[script.file] = script
+        self.statements += script.statements
+        linecache.cache[script.file] = len(script.python), None, [line + "\n" for line in script.lines], script.file
+        try:
+            exec(compile(script.python, script.file, mode), self.namespace if names is None else names)
+        except (SystemExit, KeyboardInterrupt):
+            raise
+        except BaseException as error:
+            if isinstance(error, HpcdemError) and not isinstance(error, CommandError):
+                raise
+            if not isinstance(error, HpcdemError) and _in_a_command(error):
+                raise  # not the script's fault: the whole traceback is told
+            raise self._explained(error, script) from None
+        if self.journal is not None and self.journal.failure is not None:
+            raise self.journal.failure
+
+    def _explained(self, error: BaseException, script: Source) -> HpcdemError:
+        """An error of Python: of an expression in a command with the line of it, any other with its way through the
+        script."""
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename in self.sources]
+        if frames:
+            last = frames[-1]
+            statement = self.sources[last.filename].statement_at(last.lineno or 0)
+            way = _way([(f.filename, f.lineno or 0) for f in frames[:-1]])
+            if isinstance(error, CommandError):
+                text = self.sources[last.filename].line(last.lineno or 0)
+                return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {error}{way}")
+            if statement is not None:
+                return statement.error(f"{type(error).__name__}: {error}{way}")
+        trace = error.__traceback__
+        while trace is not None and trace.tb_frame.f_code.co_filename not in self.sources:
+            trace = trace.tb_next
+        text = "".join(traceback.format_exception(type(error), error, trace or error.__traceback__)).rstrip()
+        return HpcdemError(f"{script.file} ended with an error\n{text}")
+
+    # ---- one command ---------------------------------------------------------------------------------------------
+
+    def _carry_out(self, index: int, *values: Any) -> None:
+        """What a command of the script is in its Python text."""
+        statement = self.statements[index]
+        try:
+            arguments, terms = statement.resolve(values)
+        except ScriptError as error:
+            self._agree(index, repr(error))
+            raise self._on_the_way(error) from None
+        told = repr((arguments, terms))
+        self._agree(index, told)
+        self.project.line = statement.line if self._included_at is None else self._included_at
+        if self._passed_over(statement, told):
+            return
+        try:
+            VERBS[statement.command.name](Call(self, statement, arguments, terms))
+        except HpcdemError as error:
+            known = self._told_with_line(error, statement)
+            if self.journal is not None:
+                self.journal.note_error(known)
+            if known is error:
+                raise
+            raise known from error
+
+    def _told_with_line(self, error: HpcdemError, statement: Statement) -> HpcdemError:
+        """An error of a verb, with the line."""
+        if isinstance(error, (CommandError, ScriptError)):
+            return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(str(error)))
+        if type(error) is HpcdemError:
+            # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
+            return HpcdemError(str(self._on_the_way(statement.error(str(error)))))
+        return error
+
+    # ---- going on from a checkpoint ------------------------------------------------------------------------------
+
+    def _passed_over(self, statement: Statement, told: str) -> bool:
+        """Note a command, or, on the way back to a checkpoint, pass over it if it was done before that was written."""
+        journal = self.journal
+        if journal is None:
+            return False
+        checksum = zlib.crc32(f"{statement.command.name} {told}".encode("utf-8", "backslashreplace"))
+        if not journal.replays:
+            journal.note(COMMAND, checksum)
+            return False
+        try:
+            if journal.meet(checksum):
+                return False
+            given = journal.names()
+        except UsageError as error:
+            raise self._took_another_way(error, f"{statement.file}:{statement.line}: {shown(statement.text)}") from None
+        if given is not None:
+            self._take_names(given, statement.arguments["file"])
+        return True
+
+    def _warn_of_lost_journal(self) -> None:
+        if self.project.log is not None:
+            self.project.log.warn_once(
+                "journal",
+                f"the script has looked at more than {MOST >> 20} MiB of values: from here on --resume cannot find the "
+                "way back to a checkpoint; restart files can still be read with pcdc model restore",
+            )
+
+    def _look(self, make: Callable[[], Any]) -> Any:
+        """What the script asks of the model."""
+        if self.journal is None:
+            return make()
+        try:
+            return self.journal.look(make)
+        except UsageError as error:
+            frame: FrameType | None = sys._getframe(1)
+            while frame is not None and frame.f_code.co_filename not in self.sources:
+                frame = frame.f_back
+            place = f"{frame.f_code.co_filename}:{frame.f_lineno}" if frame is not None else "the script"
+            raise self._took_another_way(error, place) from None
+
+    def _took_another_way(self, error: UsageError, place: str) -> UsageError:
+        """The error with its line, the first time that it is met."""
+        if (
+            self.journal is not None
+            and error is self.journal.failure
+            and not str(error).startswith(tuple(self.sources))
+        ):
+            self.journal.failure = error = UsageError(f"{place}: {error}")
+        return error
+
+    def _place_in_script(self) -> dict[str, Any] | None:
+        """What a checkpoint shall hold so that `run` can go on from it; None in a conversation."""
+        if self.journal is None:
+            return None
+        source = next(iter(self.sources.values()))
+        line = self.project.line
+        return {
+            "script": "\n".join(source.lines), "journal": None if self.journal.lost else self.journal.entries,
+            "at": f"line {line}: {source.line(line)}",
+        }  # fmt: skip
+
+    def _agree(self, index: int, told: str) -> None:
+        """Collective: all ranks are at this command with these values, or all raise ScriptError."""
+        comm = self.project.comm
+        if comm.size == 1:
+            return
+        mark = (index << 32) | zlib.crc32(told.encode("utf-8", "backslashreplace"))
+        found = comm.max_into(np.array([mark, -mark], np.int64))
+        if found[0] == -found[1]:
+            return
+        everyone = comm.allgather((index, told))
+        statement = self.statements[min(i for i, _ in everyone)]
+        other = next(rank for rank, one in enumerate(everyone) if one != everyone[0])
+        if everyone[other][0] != everyone[0][0]:
+            places = " and ".join(self._place(everyone[rank][0]) for rank in (0, other))
+            why = f"rank 0 and rank {other} are at different commands ({places})"
+        else:
+            shown = _difference(everyone[0][1], everyone[other][1])
+            why = f"its values differ between rank 0 and rank {other}: {shown}"
+        raise statement.error(f"{why}; all ranks must come to the same commands with the same values")
+
+    def _place(self, index: int) -> str:
+        if index >= len(self.statements):
+            return "the end of the script"
+        return f"{self.statements[index].file}:{self.statements[index].line}"
+
+    def at_the_end(self) -> None:
+        """Collective: the script is done on all ranks, or ScriptError on all of them."""
+        if self.statements:
+            self._agree(len(self.statements), "")
+
+    def _on_the_way(self, error: ScriptError) -> ScriptError:
+        """The error with the calls that led to its line, if it stands in a function."""
+        places: list[tuple[str, int]] = []
+        frame: FrameType | None = sys._getframe(1)
+        while frame is not None:
+            if frame.f_code.co_filename in self.sources:
+                places.append((frame.f_code.co_filename, frame.f_lineno))
+            frame = frame.f_back
+        return ScriptError(error.file, error.line, error.message + _way(places[:0:-1]))
+
+    # ---- names ---------------------------------------------------------------------------------------------------
+
+    def _names(self) -> dict[str, Any]:
+        """What a checkpoint holds of the script's names."""
+        found, left_out = names.collected(self.namespace, self.sources)
+        for why in left_out:
+            if self.project.log is not None:
+                self.project.log.warn_once(why, why)
+        return found
+
+    def restore_names(self, given: Mapping[str, Any], file: str) -> None:
+        """Put the variables and functions of a checkpoint into the namespace."""
+        if self.journal is not None:
+            self.journal.note(NAMES, dict(given))
+        self._take_names(given, file)
+
+    def _take_names(self, given: Mapping[str, Any], file: str) -> None:
+        variables = names.restored_variables(given)
+        functions = names.restored_functions(given)
+        scripts: list[Source] = []
+        first = len(self.statements)
+        for name, text in functions.items():
+            script = source.read(text, f"{file}:{name}", first)
+            first += len(script.statements)
+            names.plain_def(name, script)
+            scripts.append(script)
+        for script in scripts:
+            self._execute(script, "exec")
+        self.namespace.update(variables)
+
+    # ---- the log -------------------------------------------------------------------------------------------------
+
+    def _print(self, *values: Any, file: Any = None, **how: Any) -> None:
+        """print of the script: rank 0 speaks for all."""
+        if file is not None and file is not sys.stdout:
+            print(*values, file=file, **how)
+        elif self.project.comm.rank == 0 and not (self.journal is not None and self.journal.replays):
+            print(*values, **{**how, "flush": True})
+
+
+def _in_a_command(error: BaseException) -> bool:
+    """Did it happen while a command was carried out, not in the Python of the script?"""
+    trace = error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code is Interpreter._carry_out.__code__:
+            return True
+        trace = trace.tb_next
+    return False
+
+
+def _way(places: list[tuple[str, int]]) -> str:
+    """`, called from lines 30, 44`: the outermost call last."""
+    if not places:
+        return ""
+    numbers = [str(line) for _, line in reversed(places)]
+    shown = numbers if len(numbers) <= 6 else [*numbers[:3], "...", *numbers[-2:]]
+    return f" (called from line{'s' * (len(numbers) > 1)} {', '.join(shown)})"
+
+
+def _difference(one: str, other: str) -> str:
+    """The two texts from a little before the first place where they differ."""
+    at = next((i for i, (a, b) in enumerate(zip(one, other)) if a != b), min(len(one), len(other)))
+    first = max(at - 20, 0)
+    return f"...{one[first : at + 30]}... and ...{other[first : at + 30]}..."

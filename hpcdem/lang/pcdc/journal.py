@@ -1,0 +1,166 @@
+"""What a running script was told, so that it can be brought back to where it was.
+
+A script is Python, and where Python is cannot be saved. So a run that goes on from a checkpoint runs its script anew,
+up to the command in which the checkpoint was written: commands are passed over, and what the script looks at is
+answered with what it saw the first time, so that its loops and decisions are the same. The journal is the list of
+these commands and answers; it is part of every numbered checkpoint.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import CommandError, HpcdemError, PhysicsError, ScriptError, UsageError
+
+MOST = 64 << 20
+"""Bytes of answers that are kept; of a script that looked at more no run can go on from a checkpoint."""
+ENTRY = 32
+"""Bytes that an entry counts for at least."""
+
+COMMAND, LOOK, NAMES, ERROR = "command", "look", "names", "error"
+_ERRORS: dict[str, type[HpcdemError]] = {
+    kind.__name__: kind for kind in (HpcdemError, CommandError, PhysicsError, UsageError)
+}
+
+
+class Journal:
+    """entries: [COMMAND, checksum], [LOOK, answer], [NAMES, variables and functions] of a restored file, [ERROR, kind,
+    file, line, message] of a command or look that failed, in order. lost: there was too much to keep, `when_lost` was
+    called. failure: the script took another way than before; it cannot get past this by catching the error."""
+
+    def __init__(self, when_lost: Callable[[], None] = lambda: None) -> None:
+        self.entries: list[list[Any]] = []
+        self.lost = False
+        self.when_lost = when_lost
+        self.failure: UsageError | None = None
+        self._bytes = 0
+        self._past: list[list[Any]] = []
+        self._at = 0
+
+    # ---- while a script runs -------------------------------------------------------------------------------------
+
+    def note(self, *entry: Any) -> None:
+        """One more entry."""
+        self._bytes += ENTRY + sum(len(part) for part in entry[1:2] if isinstance(part, str))
+        if not self.lost and self._bytes > MOST:
+            self.lost = True
+            self.entries.clear()
+            self.when_lost()
+        if not self.lost:
+            self.entries.append(list(entry))
+
+    def note_error(self, error: HpcdemError) -> None:
+        """A command or look failed; the script may catch it and go on."""
+        if isinstance(error, ScriptError):
+            self.note(ERROR, "ScriptError", error.file, error.line, error.message)
+        elif type(error).__name__ in _ERRORS:
+            self.note(ERROR, type(error).__name__, "", 0, str(error))
+
+    def look(self, make: Callable[[], Any]) -> Any:
+        """What `make` returns, or returned the first time."""
+        if self.replays:
+            self._fail_again()
+            if self._past[self._at][0] != LOOK:
+                raise self._other_way("the script asks what the model is like, which it did not do there before")
+            return decoded(self._next()[1])
+        try:
+            value = make()
+        except HpcdemError as error:
+            self.note_error(error)
+            raise
+        self.note(LOOK, encoded(value))
+        return value
+
+    # ---- bringing it back ----------------------------------------------------------------------------------------
+
+    def replay(self, entries: list[list[Any]]) -> None:
+        """Answer with these entries from now on, until they are used up. The last one is the command in which the
+        checkpoint was written."""
+        if not entries or entries[-1][0] != COMMAND:
+            raise UsageError("the checkpoint is damaged: its journal does not end with a command")
+        self._past, self._at = entries, 0
+
+    @property
+    def replays(self) -> bool:
+        """What happens now has happened before."""
+        if self.failure is not None:
+            raise self.failure
+        return self._at < len(self._past)
+
+    def meet(self, checksum: int) -> bool:
+        """The script comes to a command that it came to before. True if it is the one to go on with, False if it is to
+        be passed over. UsageError if it is another one; the error that it met is raised again."""
+        if self._past[self._at] != [COMMAND, checksum]:
+            raise self._other_way("this line is not what was carried out there before, or its values are others")
+        self._next()
+        if not self.replays:
+            return True
+        self._fail_again()
+        return False
+
+    def names(self) -> dict[str, Any] | None:
+        """What the command that was just passed over brought, if it was `model restore`."""
+        return self._next()[1] if self.replays and self._past[self._at][0] == NAMES else None
+
+    def _fail_again(self) -> None:
+        if self._past[self._at][0] == ERROR:
+            _, kind, file, line, message = self._next()
+            raise ScriptError(file, line, message) if kind == "ScriptError" else _ERRORS[kind](message)
+
+    def _next(self) -> list[Any]:
+        entry = self._past[self._at]
+        self._at += 1
+        self.note(*entry)
+        return entry
+
+    def _other_way(self, why: str) -> UsageError:
+        self.failure = UsageError(
+            f"{why}: the script was changed, or takes another way each time it runs (the clock, files that others "
+            "write). Begin anew, or go on with a script of your own that begins with pcdc model restore"
+        )
+        return self.failure
+
+
+def encoded(value: Any) -> str:
+    """A value as JSON text, to the last bit: numbers, truth values, texts, dicts of them, and arrays of numpy."""
+    return json.dumps(_encoded(value))
+
+
+def _encoded(value: Any) -> list[Any]:
+    if isinstance(value, np.ndarray):
+        packed = zlib.compress(np.ascontiguousarray(value).tobytes(), 1)
+        return ["array", value.dtype.str, list(value.shape), base64.b64encode(packed).decode("ascii")]
+    if isinstance(value, dict):
+        return ["dict", {name: _encoded(item) for name, item in value.items()}]
+    if isinstance(value, float):
+        return ["float", value.hex()]
+    return ["plain", value]
+
+
+def decoded(text: str) -> Any:
+    """Inverse of `encoded`. UsageError for what it cannot have made."""
+    try:
+        return _decoded(json.loads(text))
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, zlib.error) as problem:
+        raise UsageError(f"the checkpoint is damaged: an answer in its journal: {problem!r}") from None
+
+
+def _decoded(given: list[Any]) -> Any:
+    kind, *rest = given
+    if kind == "array":
+        dtype = np.dtype(rest[0])
+        if dtype.kind not in "biuf":
+            raise ValueError(f"an array of {rest[0]}")
+        size = dtype.itemsize * math.prod(rest[1])
+        data = zlib.decompressobj().decompress(base64.b64decode(rest[2], validate=True), size + 1)
+        return np.frombuffer(data, dtype).reshape(rest[1]).copy()
+    if kind == "dict":
+        return {name: _decoded(item) for name, item in rest[0].items()}
+    return float.fromhex(rest[0]) if kind == "float" else {"plain": rest[0]}[kind]

@@ -1,0 +1,250 @@
+"""Kinds of values: how many words, of which sort, and what may stand for them.
+
+A value in the script is a token; a value of the language is a number, text, tuple or one of the few classes below. What
+is written in square brackets is known only when the line is carried out, and is then checked by the same functions.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
+from hpcdem.lang.pcdc.statement import Pending
+from hpcdem.lang.zdem.nearest import hint
+
+
+@dataclass(frozen=True)
+class TableName:
+    """``table 'name'`` in the place of a number: a function of time."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class Kind:
+    """pattern: as the reference shows it; meaning: as messages say it; check: of a value of Python, ValueError (the
+    message is not shown) if it is not of this kind."""
+
+    pattern: str
+    meaning: str
+    check: Callable[[Any], Any]
+    many: bool = False
+    """Takes all values that follow, at least one; or one [expression] that is a list of them."""
+    optional: bool = False
+    """May be left out; it is the last one then."""
+    tabled: bool = False
+    """``table 'name'`` may stand for it."""
+    words: tuple[str, ...] = ()
+    """Words that are values."""
+
+
+class Unfit(ValueError):
+    """A value is not of the kind it should be."""
+
+
+def number(low: float = -math.inf, high: float = math.inf, above: bool = False) -> Callable[[Any], float]:
+    """A check for a finite number in [low, high]; `above`: low itself is excluded."""
+
+    def check(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+            raise Unfit
+        value = float(value)
+        if not math.isfinite(value) or not low <= value <= high or (above and value == low):
+            raise Unfit
+        return value
+
+    return check
+
+
+def whole(low: float = -math.inf, high: float = 2**53) -> Callable[[Any], int]:
+    """A check for a whole number in [low, high]; 100000.0 is one."""
+    real = number(low, high)
+
+    def check(value: Any) -> int:
+        value = real(value) if not isinstance(value, numbers.Integral) or isinstance(value, bool) else int(value)
+        if value != int(value) or not low <= value <= high:
+            raise Unfit
+        return int(value)
+
+    return check
+
+
+def _string(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise Unfit
+    return value
+
+
+def _file(value: Any) -> str:
+    text = _string(value).replace("\\", "/")
+    if len(text.rpartition("/")[2].encode()) > 255 or text.endswith("/"):
+        raise Unfit
+    return text
+
+
+def _boolean(value: Any) -> bool:
+    if isinstance(value, str) and value.lower() in ("on", "true", "off", "false"):
+        return value.lower() in ("on", "true")
+    if type(value).__name__ not in ("bool", "bool_"):
+        raise Unfit
+    return bool(value)
+
+
+_coordinate = number()
+
+
+def _vector(value: Any) -> tuple[float, float]:
+    if isinstance(value, str):
+        raise Unfit
+    try:
+        items = [_coordinate(v) for v in value]
+    except TypeError:
+        raise Unfit from None
+    if len(items) != 2:
+        raise Unfit
+    return items[0], items[1]
+
+
+def _listed(check: Callable[[Any], Any]) -> Callable[[Any], list]:
+    """A check for a list of such values."""
+
+    def check_all(value: Any) -> list:
+        if isinstance(value, str) or not isinstance(value, Iterable):
+            raise Unfit
+        return [check(v) for v in value]
+
+    return check_all
+
+
+FLOAT = Kind("<f>", "a number", number())
+POSITIVE = Kind("<f>", "a number above 0", number(0.0, above=True))
+NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
+POISSON = Kind("<f>", "a number above -1 and below 0.5", number(-1.0 + 1e-12, 0.5 - 1e-12))
+ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 1e-9))
+TABLED = Kind("<f>|table <s>", "a number or table 'name'", number(), tabled=True)
+COUNT = Kind("<i>", "a whole number above 0", whole(1))
+ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
+INTEGER = Kind("<i>", "a whole number", whole())
+LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
+STRING = Kind("<s>", "a text in quotes", _string)
+FILE = Kind("<s>", "the name of a file in quotes", _file)
+BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"))
+VECTOR = Kind("<v>", "a vector (x,y)", _vector)
+OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector, optional=True)
+VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector, many=True)
+STRINGS = Kind("<s> ...", "texts in quotes", _string, many=True)
+
+
+def choice(*words: str) -> Kind:
+    """One of these words, bare or in quotes."""
+
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value.lower() not in words:
+            raise Unfit
+        return value.lower()
+
+    return Kind("|".join(words), "one of " + ", ".join(words), check, words=words)
+
+
+# ---- from tokens to values -----------------------------------------------------------------------------------------
+
+
+class Expressions:
+    """Collects the Python expressions of a line; their numbers stand in the pending values."""
+
+    def __init__(self) -> None:
+        self.codes: list[str] = []
+
+    def add(self, escape: Escape) -> int:
+        self.codes.append(escape.code)
+        return len(self.codes) - 1
+
+
+def read_value(kind: Kind, token: Token, what: str, expressions: Expressions) -> Any:
+    """The value of a token, perhaps pending. ValueError says what was read and what was expected."""
+    if isinstance(token, Word):
+        if token.text.lower() not in kind.words:
+            _fail(kind, str(token), what, _advice(kind, token))
+        return kind.check(token.text.lower())
+    raw = _raw(token, expressions)
+    if isinstance(raw, Pending):
+        return Pending(
+            lambda values: _checked(kind, raw.make(values), f"{_shown(raw.make(values))} from {token}", what)
+        )
+    return _checked(kind, raw, str(token), what)
+
+
+def read_list(kind: Kind, token: Escape, what: str, expressions: Expressions) -> Pending:
+    """A list of values of this kind from one expression."""
+    raw = _raw(token, expressions)
+    every = Kind(kind.pattern, f"a list of {kind.meaning}", _listed(kind.check))
+
+    def make(values: tuple[Any, ...]) -> list:
+        given = raw.make(values)
+        given = given if isinstance(given, str) or not isinstance(given, Iterable) else list(given)
+        try:
+            return [kind.check(given)]
+        except (Unfit, TypeError):
+            return _checked(every, given, f"{_shown(given)} from {token}", what)
+
+    return Pending(make)
+
+
+def _raw(token: Token, expressions: Expressions) -> Any:
+    """Number, text or tuple of a token, or Pending. Never a word."""
+    if isinstance(token, Number):
+        return token.value
+    if isinstance(token, Escape):
+        return _pending(token, expressions)
+    if isinstance(token, Text):
+        if token.plain is not None:
+            return token.plain
+        parts = [part if isinstance(part, str) else _pending(part, expressions) for part in token.parts]
+        return Pending(lambda values: "".join(str(p.make(values)) if isinstance(p, Pending) else p for p in parts))
+    assert isinstance(token, Vector)
+    items = [_raw(item, expressions) for item in token.items]
+    if any(isinstance(item, Pending) for item in items):
+        return Pending(lambda values: tuple(i.make(values) if isinstance(i, Pending) else i for i in items))
+    return tuple(items)
+
+
+def _pending(escape: Escape, expressions: Expressions) -> Pending:
+    index = expressions.add(escape)
+    if escape.sign > 0:
+        return Pending(lambda values: values[index])
+
+    def negative(values: tuple[Any, ...]) -> Any:
+        try:
+            return -values[index]
+        except TypeError:
+            raise ValueError(f"read {_shown(values[index])} from {escape}, which has no negative") from None
+
+    return Pending(negative)
+
+
+def _checked(kind: Kind, value: Any, shown: str, what: str) -> Any:
+    try:
+        return kind.check(value)
+    except (Unfit, OverflowError, TypeError):
+        pass
+    _fail(kind, shown, what)
+
+
+def _fail(kind: Kind, shown: str, what: str, advice: str = "") -> NoReturn:
+    raise ValueError(f"read {shown}, expected {kind.meaning} for {what}{advice}")
+
+
+def _advice(kind: Kind, word: Word) -> str:
+    if kind.words:
+        return hint(word.text, kind.words)
+    if "quotes" in kind.meaning:
+        return f"; write {word}, or [{short(word.text)}] for a variable of Python"
+    return f"; a variable of Python stands in brackets: [{short(word.text)}]"
+
+
+def _shown(value: Any) -> str:
+    return short(repr(value))

@@ -1,0 +1,280 @@
+"""From the words of a ``pcdc`` line to a statement. What may be written comes from `table`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from hpcdem.errors import ScriptError
+from hpcdem.lang.pcdc import kinds, lexer, rules
+from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
+from hpcdem.lang.pcdc.lexer import Escape, Token, Word
+from hpcdem.lang.pcdc.statement import Statement, shown
+from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
+from hpcdem.lang.zdem.nearest import hint
+
+
+def parse(words: str, file: str, line: int, text: str, table: Table, last_line: int = 0) -> Statement:
+    """The statement of a line; words: what follows ``pcdc``; text: the line as messages show it. ScriptError."""
+    try:
+        return _Line(words, table).statement(file, line, text, last_line or line)
+    except ValueError as error:
+        raise ScriptError(file, line, f"{shown(text)}: {error}") from None
+
+
+def expected(words: str, table: Table) -> Sequence[Any]:
+    """Rows of the keywords that may follow on the words of a begun line; none where a value is due, or after an
+    error."""
+    line: _Line | None = None
+    try:
+        line = _Line(words, table)
+        line.statement("", 0, "", 0)
+    except ValueError:
+        pass
+    return line.wanted if line is not None and line.at >= len(line.tokens) else ()
+
+
+class _Line:
+    """Reads one line, word by word, against the table. Errors are ValueErrors. wanted: the rows of keywords
+    that may stand where the line ends."""
+
+    def __init__(self, words: str, table: Table) -> None:
+        self.tokens = lexer.tokens(words)
+        self.table = table
+        self.at = 0
+        self.expressions = kinds.Expressions()
+        self.context = "pcdc"
+        self.wanted: Sequence[Any] = ()
+
+    # ---- words
+
+    def peek(self) -> Token | None:
+        return self.tokens[self.at] if self.at < len(self.tokens) else None
+
+    def next(self, expected: str) -> Token:
+        token = self.peek()
+        if token is None:
+            raise ValueError(f"the line ends where {expected} is expected; a line that goes on ends with \\")
+        self.at += 1
+        return token
+
+    def take(self, rows: Sequence[Row]) -> Row | None:
+        """The row that the next word means, and past it; None if it means none of them."""
+        token = self.peek()
+        if token is None:
+            self.wanted = [*self.wanted, *rows]
+        if not isinstance(token, Word):
+            return None
+        found = matching(token.text, rows)
+        if len(found) > 1:
+            names = ", ".join(f"'{row.keyword}'" for row in found)
+            raise ValueError(f"{token} is ambiguous after '{self.context}': it may mean {names}")
+        if not found:
+            return None
+        self.at += 1
+        return found[0]
+
+    def unknown(self, token: Token, rows: Sequence[Row]) -> NoReturn:
+        """Candidates: words that begin like it (too few letters), else similar ones, else all there are."""
+        names = [row.keyword.name for row in rows]
+        if not names:
+            raise ValueError(f"read {token}, expected the end of the line")
+        if not isinstance(token, Word):
+            raise ValueError(f"read {token}, expected a keyword after '{self.context}': {_joined(names)}")
+        short = beginning(token.text, rows)
+        if short:
+            least = _joined(f"{row.keyword.name} (at least '{row.keyword.shortest()}')" for row in short)
+            raise ValueError(f"{token} is too short after '{self.context}'; it may mean {least}")
+        near = hint(token.text, names)
+        raise ValueError(f"read {token} after '{self.context}', expected one of {_joined(names)}{near}")
+
+    # ---- the statement
+
+    def statement(self, file: str, line: int, text: str, last_line: int) -> Statement:
+        command = self.command()
+        arguments: dict[str, Any] = {}
+        for leading in command.leading:
+            self.leading(leading, arguments)
+        options: Sequence[Option] = command.options
+        if command.models:
+            model = self.model(command)
+            arguments["model"] = model.keyword.name
+            self.take([PROPERTY])
+            given: dict[str, Any] = {}
+            terms = self.options(command, model.options, given)
+            self.require(model.options, given)
+            self.complete(model, given)
+            arguments["properties"] = given
+        else:
+            if command.properties:
+                self.take([PROPERTY])
+            terms = self.options(command, options, arguments)
+            self.require(options, arguments)
+            if command.needs_option and not any(option.name in arguments for option in options):
+                raise ValueError(f"'{self.context}' needs at least one of {_joined(o.name for o in options)}")
+            rules.check(command, arguments, terms)
+        return Statement(file, line, command, arguments, terms, text, tuple(self.expressions.codes), last_line)
+
+    def command(self) -> Command:
+        """The words of a command, one after the other."""
+        rows: Sequence[Command] = self.table.commands
+        depth = 0
+        while True:
+            level = distinct(rows, depth)
+            ended = next((c for c in rows if len(c.words) == depth), None)
+            found = self.take(level)
+            if found is None:
+                if ended is not None:
+                    return self._allowed(ended)
+                token = self.next("a command: " + _joined(row.keyword.name for row in level))
+                self.unknown(token, level)
+            rows = [c for c in rows if len(c.words) > depth and c.words[depth] == found.keyword]
+            depth += 1
+            self.context = f"{self.context} {found.keyword}" if depth > 1 else found.keyword.name
+            if len(rows) == 1 and len(rows[0].words) == depth:
+                return self._allowed(rows[0])
+
+    def _allowed(self, command: Command) -> Command:
+        if command.later:
+            raise ValueError(f"'{command.name}' is not there yet: {command.later}")
+        return command
+
+    def leading(self, option: Option, arguments: dict[str, Any]) -> None:
+        if not option.required and self.peek() is None:
+            return
+        if not option.required and isinstance(self.peek(), Word) and not option.values[0].words:
+            return
+        arguments[option.name] = self.values(option)
+
+    def model(self, command: Command) -> Model:
+        found = self.take(command.models)
+        if found is None:
+            token = self.next("the name of a model: " + _joined(m.keyword.name for m in command.models))
+            self.unknown(token, command.models)
+        self.context = f"{self.context} {found.keyword}"
+        if found.later:
+            raise ValueError(f"'{found.keyword}' is not there yet: {found.later}")
+        return found
+
+    def options(
+        self, command: Command, options: Sequence[Option], arguments: dict[str, Any]
+    ) -> tuple[tuple[str, Any], ...] | None:
+        """Keywords in any order, then RANGE."""
+        rows = [*options, RANGE] if command.ranged else options
+        while (token := self.peek()) is not None:
+            option = self.take(rows)
+            if option is RANGE:
+                return self.range(command)
+            if option is None:
+                self._no_keyword(token, command, options)
+            value = self.values(option)
+            if option.repeated:
+                arguments.setdefault(option.name, []).append(value)
+            elif option.name in arguments:
+                raise ValueError(f"'{option.keyword}' is given twice")
+            else:
+                arguments[option.name] = value
+        self.wanted = [*self.wanted, *rows]
+        return None
+
+    def _no_keyword(self, token: Token, command: Command, options: Sequence[Option]) -> NoReturn:
+        if isinstance(token, Word) and matching(token.text, [RANGE]) and not command.ranged:
+            raise ValueError(f"'{self.context}' takes no range")
+        self.unknown(token, [*options, RANGE] if command.ranged else options)
+
+    def require(self, options: Sequence[Option], given: dict[str, Any]) -> None:
+        missing = [option.keyword.notation for option in options if option.required and option.name not in given]
+        if missing:
+            raise ValueError(f"'{self.context}' lacks {_joined(missing)}")
+
+    def complete(self, model: Model, given: dict[str, Any]) -> None:
+        """One of the sets of properties that can stand for each other, or any property at all, must be there."""
+        if model.any_of and not given:
+            raise ValueError(f"'{self.context}' needs at least one of {_joined(o.name for o in model.options)}")
+        if model.one_of and not any(all(name in given for name in names) for names in model.one_of):
+            sets = " or ".join(" and ".join(names) for names in model.one_of)
+            raise ValueError(f"'{self.context}' needs {sets}")
+
+    # ---- values
+
+    def values(self, option: Option) -> Any:
+        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow."""
+        if option.later:
+            raise ValueError(f"'{option.keyword}' is not there yet: {option.later}")
+        read = []
+        for kind in option.values:
+            if kind.optional and not self._value_follows():
+                break
+            read.append(self.one(kind, option))
+        value = read[0] if len(option.values) == 1 and read else tuple(read) if option.values else True
+        if not option.more:
+            return value
+        given = {"value": value}
+        outer, self.context = self.context, f"{self.context} {option.keyword}"
+        while (inner := self.take(option.more)) is not None:
+            if inner.name in given:
+                raise ValueError(f"'{inner.keyword}' is given twice after '{option.keyword}'")
+            given[inner.name] = self.values(inner)
+        self.require(option.more, given)
+        self.context = outer
+        return given
+
+    def one(self, kind: kinds.Kind, option: Option) -> Any:
+        what = f"'{option.keyword}'"
+        if self.peek() is None:
+            self.wanted = [Level(Keyword(word)) for word in kind.words]
+        if kind.many:
+            token = self.peek()
+            if isinstance(token, Escape) and not self._value_follows(1):
+                self.at += 1
+                return kinds.read_list(kind, token, what, self.expressions)
+            found = []
+            while self._value_follows():
+                found.append(kinds.read_value(kind, self.next(""), what, self.expressions))
+            if not found:
+                token = self.next(f"{kind.meaning} for {what}")
+                raise ValueError(f"read {token}, expected {kind.meaning} for {what}")
+            return found
+        token = self.next(f"{kind.meaning} for {what}")
+        if kind.tabled and isinstance(token, Word) and matching(token.text, [_TABLE]):
+            name = kinds.read_value(
+                kinds.STRING, self.next("the name of a table in quotes"), "'table'", self.expressions
+            )
+            return _table_name(name)
+        return kinds.read_value(kind, token, what, self.expressions)
+
+    def _value_follows(self, ahead: int = 0) -> bool:
+        at = self.at + ahead
+        return at < len(self.tokens) and not isinstance(self.tokens[at], Word)
+
+    # ---- RANGE
+
+    def range(self, command: Command) -> tuple[tuple[str, Any], ...]:
+        rows = [term for term in self.table.range_terms if not term.only or command.ranged in (*term.only, "any")]
+        outer, self.context = self.context, f"{self.context} range"
+        terms: list[tuple[str, Any]] = []
+        while (token := self.peek()) is not None:
+            term = self.take(rows)
+            if term is None:
+                self.unknown(token, rows)
+            terms.append((term.name, self.values(term)))
+        self.wanted = [*self.wanted, *rows]
+        if not terms:
+            self.next("a term: " + _joined(row.keyword.name for row in rows))
+        self.context = outer
+        return tuple(terms)
+
+
+_TABLE = Option("tab{le}", ())
+
+
+def _table_name(name: Any) -> Any:
+    from hpcdem.lang.pcdc.statement import Pending
+
+    if isinstance(name, Pending):
+        return Pending(lambda values: kinds.TableName(name.make(values)))
+    return kinds.TableName(name)
+
+
+def _joined(names: Any) -> str:
+    return ", ".join(names)

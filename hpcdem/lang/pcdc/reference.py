@@ -1,0 +1,185 @@
+"""The reference page of the PCDC language, made from the table: ``python -m hpcdem.lang.pcdc.reference``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from hpcdem.lang.pcdc.table import PCDC, RECORDED, Command, Model, Option, Table
+
+_TOP = """\
+# PCDC commands
+
+This page is made from the table in `hpcdem/lang/pcdc/table.py`; do not edit it
+(`python -m hpcdem.lang.pcdc.reference > docs/pcdc_reference.md`).
+
+## How a script is read
+
+- A script is Python in which lines whose first word is `pcdc` are commands, in loops and functions too. `pcdc` is no
+  name for a variable. A command that goes on in the next line ends with a backslash; `#` begins a comment.
+- All commands, and the Python between them, are read before anything runs; the first wrong line is reported with file,
+  line and text. `hpcdem --check script.sc` stops there.
+- Words may be shortened: what stands in braces may be left out, from the right, in each part of a word:
+  `a{s}-l{ayer}` is read in `as-layer`, `a-l` and `as-lay`. Upper and lower case are the same. A word that may mean
+  several is refused with the candidates.
+- Values are numbers, texts in quotes, `on` and `off`, vectors `(x,y)`. Where a value, or a part of one, is an
+  expression of Python it stands in square brackets: `[m_R/12]`, `([i],0)`, `'layer [i]'`. In a text `[[` and `]]` are
+  brackets.
+- `<f>` a number, `<i>` a whole number, `<s>` a text, `<v>` a vector; where `table <s>` may stand the value is a
+  function of time.
+- Units: any consistent set; those in the tables are SI. Numbers of objects begin at 0, as in the output. Tension is
+  positive.
+- File names are relative to the folder of the script; frames and histories go to the folder of the results (`data`
+  beside the script, or `--outdir`).
+- A run that was stopped, by `--time-limit` or a signal, goes on with `--resume` where it was, also in a loop or a
+  function ([how](running.md#stopping-and-going-on)); there is a checkpoint every half hour (`--autosave`).
+- The Python of a script runs on every rank; commands are carried out by all ranks together, which must come to the same
+  commands with the same values. `print` prints once. `math` and `Vector` are there without an import; the random
+  numbers of Python and of numpy begin with the same seed on all ranks.
+
+## Python
+
+`pcdc` is also an object: `pcdc.time`, `pcdc.cycle`, `pcdc.ratio`, `pcdc.energies`, `pcdc.rank`;
+`pcdc.node(7).displacement.X`, `pcdc.element(3).stress_yy`, `pcdc.joint(12).opening`;
+`pcdc.numbers('element', group='rock', set='domain')`, `pcdc.values('node', 'velocity-x', geometry='rim')`,
+`pcdc.total('node', 'reaction-y', group='top', set='bc')`, `pcdc.history('load')` (rows of step, time, value). Every
+look is made by all ranks together.
+
+`model save` also keeps the global variables whose names begin with `m_` (whole and other numbers, texts, truth values,
+Vectors) and the functions `def m_...`, as the text of their `def`. `model restore` brings them back: the functions are
+then part of the script like any other, so restore files only from where you would take a script from. Restoring itself
+runs nothing of them: only a plain `def` is accepted, without decorator or annotations, and with plain values as
+defaults.
+"""
+
+_RANGE = """\
+## range
+
+Stands last on the line and limits a command to some objects; without it the command acts on all. All terms must hold.
+A range that chooses nothing is an error.
+"""
+
+
+def page(table: Table = PCDC) -> str:
+    """The whole page, in Markdown."""
+    parts = [_TOP, _overview(table)]
+    parts += [_command(command) for command in table.commands if not command.later]
+    parts += [_RANGE, _options(table.range_terms), "", *_models(table), _recorded(), _later(table)]
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def _overview(table: Table) -> str:
+    rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
+    for command in table.commands:
+        if not command.later:
+            first = command.doc.split(". ")[0].rstrip(".")
+            rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {_cell(first)} |")
+    return "\n".join([*rows, ""])
+
+
+def _command(command: Command) -> str:
+    origin = "in the manual" if command.manual else "hpcdem's own"
+    lines = [f"## {command.name}", "", f"`pcdc {command.notation}` ({origin})", "", command.doc, "", "```"]
+    lines += [*_syntax(command), "```", ""]
+    if command.leading or command.options:
+        lines += [_options(command.options, command.leading), ""]
+    if command.models:
+        names = ", ".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models if not m.later)
+        lines += [f"Models: {names}.", ""]
+    lines += ["Example:" if len(command.example) == 1 else "Examples:", "", "```", *command.example, "```", ""]
+    return "\n".join(lines)
+
+
+def _syntax(command: Command) -> list[str]:
+    words = ["pcdc", command.notation]
+    words += [_pattern(option) if option.required else f"[{_pattern(option)}]" for option in command.leading]
+    if command.models:
+        words.append("<model> [prop{erty}] <keyword> <value> ...")
+    elif command.properties or (len(command.options) > 4 and not any(o.required for o in command.options)):
+        words.append("<keyword> <value> ...")
+    else:
+        for option in command.options:
+            word = f"{option.notation} {_pattern(option)}".strip()
+            words.append(word if option.required else f"[{word}]")
+    if command.ranged:
+        words.append("[ran{ge} ...]")
+    lines, line = [], ""
+    for word in words:
+        if line and len(line) + len(word) > 100:
+            lines.append(line)
+            line = "   "
+        line = f"{line} {word}" if line else word
+    return [*lines, line]
+
+
+def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
+    """A table of values that stand alone, and of keywords with those that may follow them."""
+    rows = ["| keyword | value | unit | default | meaning |", "|---|---|---|---|---|"]
+    for option in values:
+        rows.append(_row(option, "", named=True))
+    for option in options:
+        if option.later:
+            continue
+        rows.append(_row(option, f"`{option.notation}`"))
+        rows += [_row(inner, f"... `{inner.notation}`") for inner in option.more]
+    return "\n".join(rows)
+
+
+def _row(option: Option, word: str, named: bool = False) -> str:
+    pattern = _pattern(option)
+    also = f"; also read: {', '.join(f'`{w}`' for w in option.also)}" if option.also else ""
+    several = "; may be repeated" if option.repeated else ""
+    default = "required" if option.required and not named else option.default
+    cells = [word, f"`{pattern}`" if pattern else "", option.unit, default, option.doc + several + also]
+    return "| " + " | ".join(_cell(cell) for cell in cells) + " |"
+
+
+def _pattern(option: Option) -> str:
+    patterns = ["<what>" if len(kind.words) > 8 else kind.pattern for kind in option.values]
+    return " ".join(patterns)
+
+
+def _models(table: Table) -> list[str]:
+    lines = ["## Models and conditions", ""]
+    for command in table.commands:
+        for model in command.models:
+            if not model.later:
+                lines += _model(model, command)
+    return lines
+
+
+def _model(model: Model, command: Command) -> list[str]:
+    origin = f"table {model.number} of the manual; " if model.number else ""
+    also = f"; also read: {', '.join(f'`{w}`' for w in model.also)}" if model.also else ""
+    title = f"`{model.notation}` ({origin}`pcdc {command.name}`{also})"
+    lines = [f"### {model.keyword.name}", "", title, "", model.doc]
+    if model.one_of:
+        lines[-1] += " Needed: " + " or ".join(" and ".join(names) for names in model.one_of) + "."
+    return [*lines, "", *([_options(model.options), ""] if model.options else [])]
+
+
+def _recorded() -> str:
+    rows = ["## What histories record", "", "| object | value | unit |", "|---|---|---|"]
+    rows += [f"| {kind} | `{name}` | {unit} |" for kind, of in RECORDED.items() for name, unit in of.items()]
+    return "\n".join([*rows, ""])
+
+
+def _later(table: Table) -> str:
+    """What is known and refused."""
+    rows = ["## Not there yet", "", "These are refused by name, before anything runs.", ""]
+    rows += ["| words | why |", "|---|---|"]
+    for command in table.commands:
+        if command.later:
+            rows.append(f"| `{command.notation}` | {_cell(command.later)} |")
+        rows += [f"| `{command.notation} {m.notation}` | {_cell(m.later)} |" for m in command.models if m.later]
+        rows += [f"| `{command.notation} ... {o.notation}` | {_cell(o.later)} |" for o in command.options if o.later]
+    rows += [f"| `ran{{ge}} ... {term.notation}` | {_cell(term.later)} |" for term in table.range_terms if term.later]
+    return "\n".join([*rows, ""])
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())

@@ -1,0 +1,73 @@
+"""One command of a script, as read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.errors import ScriptError
+
+if TYPE_CHECKING:
+    from hpcdem.lang.pcdc.table import Command
+
+
+@dataclass(frozen=True)
+class Pending:
+    """A value that depends on expressions: `make` takes the values of all expressions of the line and returns it, or
+    raises ValueError with what was read and what was expected."""
+
+    make: Callable[[tuple[Any, ...]], Any]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """command: row of the table; arguments: values by name, in the order written, some of them `Pending`; range: terms
+    (name, value) of RANGE in the order written, None without one; text: the line as written, in one piece, without
+    superfluous blanks; expressions: Python code of the values in square brackets.
+    """
+
+    file: str
+    line: int
+    command: Command
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    range: tuple[tuple[str, Any], ...] | None = None
+    text: str = ""
+    expressions: tuple[str, ...] = ()
+    last_line: int = 0
+
+    def error(self, message: str) -> ScriptError:
+        """An error that names this line and shows it."""
+        return ScriptError(self.file, self.line, f"{shown(self.text)}: {message}")
+
+    def resolve(self, values: tuple[Any, ...]) -> tuple[dict[str, Any], tuple[tuple[str, Any], ...] | None]:
+        """Arguments and range with the values of the expressions put in. ScriptError if one of them is of the wrong
+        kind."""
+        try:
+            arguments = {name: resolved(value, values) for name, value in self.arguments.items()}
+            terms = None if self.range is None else tuple((name, resolved(v, values)) for name, v in self.range)
+        except ValueError as error:
+            raise self.error(str(error)) from None
+        return arguments, terms
+
+
+LONGEST_TEXT = 200
+"""Characters of a line in a message."""
+
+
+def shown(text: str) -> str:
+    """A line as messages show it."""
+    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 3] + "..."
+
+
+def resolved(value: Any, values: tuple[Any, ...]) -> Any:
+    """`value` with everything pending in it made."""
+    if isinstance(value, Pending):
+        return value.make(values)
+    if isinstance(value, tuple):
+        return tuple(resolved(item, values) for item in value)
+    if isinstance(value, list):
+        return [resolved(item, values) for item in value]
+    if isinstance(value, dict):
+        return {name: resolved(item, values) for name, item in value.items()}
+    return value

@@ -1,0 +1,639 @@
+"""Every command, model and keyword of the PCDC language, in one table.
+
+Parsing, abbreviations, candidates in messages, completion in the console and the page docs/pcdc_reference.md are all
+made from the rows below; a new keyword is one new row. Words are in the manual's notation (`keywords`). A row with
+`later` is known, and refused with that sentence before anything runs.
+
+`manual` marks what the manual itself prints; the other commands are hpcdem's, since the manual refers to an online
+help for them. Spellings of the manual that are slips stand first where scripts may use them, the right ones beside
+them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from hpcdem.lang.pcdc.keywords import Keyword
+from hpcdem.lang.pcdc.kinds import (
+    ANGLE,
+    BOOL,
+    COUNT,
+    FILE,
+    FLOAT,
+    INTEGER,
+    LAST_ID,
+    NOT_NEGATIVE,
+    OPTIONAL_VECTOR,
+    POISSON,
+    POSITIVE,
+    STRING,
+    STRINGS,
+    TABLED,
+    VECTOR,
+    VECTORS,
+    ZERO_OR_MORE,
+    Kind,
+    choice,
+)  # fmt: skip
+
+THREE_D = "this version computes in two dimensions"
+FLOW = "fluid in fractures comes later; this version computes mechanics"
+HEAT = "heat comes later; this version computes mechanics"
+PROPPANT = "proppant comes later; this version computes mechanics"
+BOLTS = "rock bolts come later"
+PLASTIC = "plasticity comes later; this version has the elastic model mech-iso-elastic, and joints that break"
+CREEP = "creep comes later; this version has the elastic model mech-iso-elastic"
+
+
+@dataclass(frozen=True)
+class Option:
+    """A keyword with its values.
+
+    notation and also: see `Keyword`; values: their kinds, in order; more: keywords that may follow right after the
+    values and belong to this one; only: where a term of RANGE makes sense (objects), () for everywhere.
+    """
+
+    notation: str
+    values: tuple[Kind, ...]
+    doc: str = ""
+    unit: str = ""
+    default: str = ""
+    required: bool = False
+    repeated: bool = False
+    more: tuple[Option, ...] = ()
+    later: str = ""
+    also: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+
+    @cached_property
+    def keyword(self) -> Keyword:
+        return Keyword(self.notation, self.also)
+
+    @property
+    def name(self) -> str:
+        """The key of its value in a statement."""
+        return self.keyword.name
+
+
+@dataclass(frozen=True)
+class Model:
+    """A constitutive model or boundary condition with its properties. number: of the manual's table; one_of: sets of
+    properties of which one must be complete; any_of: at least one property must be given."""
+
+    notation: str
+    number: str
+    doc: str
+    options: tuple[Option, ...] = ()
+    one_of: tuple[tuple[str, ...], ...] = ()
+    any_of: bool = False
+    later: str = ""
+    also: tuple[str, ...] = ()
+
+    @cached_property
+    def keyword(self) -> Keyword:
+        return Keyword(self.notation, self.also)
+
+
+@dataclass(frozen=True)
+class Command:
+    """notation: its words; leading: values (and words in the place of values) that come first; models: one of them is
+    named after the words; ranged: the objects that RANGE chooses among, "" if it takes none; needs_option: at least one
+    option must be given; properties: the word ``property`` may stand before the options; manual: printed there."""
+
+    notation: str
+    doc: str
+    example: tuple[str, ...] = ()
+    leading: tuple[Option, ...] = ()
+    options: tuple[Option, ...] = ()
+    models: tuple[Model, ...] = ()
+    ranged: str = ""
+    needs_option: bool = False
+    properties: bool = False
+    manual: bool = False
+    later: str = ""
+
+    @cached_property
+    def words(self) -> tuple[Keyword, ...]:
+        return tuple(Keyword(word) for word in self.notation.split())
+
+    @cached_property
+    def name(self) -> str:
+        """Its words in full."""
+        return " ".join(word.name for word in self.words)
+
+
+@dataclass(frozen=True)
+class Level:
+    """A word that a command may go on with."""
+
+    keyword: Keyword
+
+
+def distinct(commands: Iterable[Command], depth: int) -> list[Level]:
+    """The words at this place of the commands, each once."""
+    return [Level(word) for word in dict.fromkeys(c.words[depth] for c in commands if len(c.words) > depth)]
+
+
+@dataclass(frozen=True)
+class Table:
+    """All rows of a language."""
+
+    commands: tuple[Command, ...]
+    range_terms: tuple[Option, ...] = field(default=())
+
+    def command(self, name: str) -> Command:
+        """The row of a command by its words in full."""
+        return next(c for c in self.commands if c.name == name)
+
+
+PROPERTY = Option("prop{erty}", ())
+RANGE = Option("ran{ge}", ())
+SET = Option("set", (STRING,), "the set of the group", default="'default'")
+
+# ---- models of solids (tables 1 to 3, 12) --------------------------------------------------------------------------
+
+_DENSITY = Option("den{sity}", (POSITIVE,), "density", "kg/m3", required=True)
+_YOUNG = Option("y{oung}", (POSITIVE,), "Young's modulus E", "Pa")
+_POISSON = Option("p{oisson}-r{atio}", (POISSON,), "Poisson's ratio", "1")
+_SHEAR = Option("s{hear}", (POSITIVE,), "shear modulus, with bulk in the place of young and poisson-ratio", "Pa")
+_BULK = Option("b{ulk}", (POSITIVE,), "bulk modulus, with shear in the place of young and poisson-ratio", "Pa")
+_DAMP = Option("d{amp}-f{actor}", (NOT_NEGATIVE,), "viscous damping, part of the critical; without effect in static "
+               "runs", "1", "0")  # fmt: skip
+_FRICTION = Option("fri{ction}", (ANGLE,), "friction of its surfaces where they have no contact model", "degrees", "0")
+_PENALTY = Option("pen{alty}", (POSITIVE,), "contact penalty of its surfaces where they have no contact model", "Pa",
+                  "10 E")  # fmt: skip
+_PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
+
+ISO_ELASTIC = Model(
+    "mech{anical}-iso-e{lastic}", "1", "Isotropic, linear elastic, for large rotations.",
+    (_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP, _FRICTION, _PENALTY), one_of=_PAIRS,
+)  # fmt: skip
+NULL = Model(
+    "null", "", "The elements are taken out: excavated. Faces beside them become free.",
+    (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
+            "s", "at once"),),
+)  # fmt: skip
+MOHR_COULOMB = Model(
+    "mech{anical}-m{ohr}-c{oulomb}", "2", "Elastic and plastic after Mohr and Coulomb, with a tension cut-off.",
+    (_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _FRICTION,
+     Option("coh{esion}", (NOT_NEGATIVE,), "cohesion", "Pa"),
+     Option("ten{sile}", (NOT_NEGATIVE,), "tensile strength", "Pa"),
+     Option("di{lation}", (ANGLE,), "dilation angle", "degrees", "0"), _DAMP),
+    later=PLASTIC,
+)  # fmt: skip
+BURGERS = Model(
+    "mech{anical}-bur{gers}", "3", "Creep after Burgers.",
+    (_DENSITY, _YOUNG, _POISSON, _BULK,
+     Option("k{elvin}-s{hear}", (NOT_NEGATIVE,), "shear modulus of the Kelvin part", "Pa"),
+     Option("k{elvin}-v{iscosity}", (NOT_NEGATIVE,), "viscosity of the Kelvin part", "Pa s"),
+     Option("m{axwell}-s{hear}", (POSITIVE,), "shear modulus of the Maxwell part", "Pa"),
+     Option("m{axwell}-v{iscosity}", (NOT_NEGATIVE,), "viscosity of the Maxwell part", "Pa s"),
+     *(Option(f"k{{elvin}}-s{{train}}-{c}", (FLOAT,), "initial strain of the Kelvin part", "1", "0")
+       for c in ("xx", "yy", "xy")), _DAMP),
+    later=CREEP,
+)  # fmt: skip
+_HEAT_OF = (
+    Option("con{ductivity}", (POSITIVE,), "thermal conductivity", "W/(m K)"),
+    Option("cap{acity}", (POSITIVE,), "heat capacity", "J/(kg K)"),
+    Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer", "W/(m2 K)", also=("t{ransfer}-c{oefficient}",)),
+)
+ISO_HEAT = Model(
+    "therm{al}-iso-h{eat}", "12", "Heat conduction and thermal expansion.",
+    (*_HEAT_OF,
+     Option("e{xpansion}-c{oeficient}", (FLOAT,), "thermal expansion", "1/K", also=("e{xpansion}-c{oefficient}",))),
+    later=HEAT,
+)  # fmt: skip
+
+# ---- boundary conditions of nodes and faces (tables 4 to 7, 11, 14 to 16, 18) --------------------------------------
+
+VELOCITY = Model(
+    "mech{anical}-vel{ocity}-b{oundary}-c{ondition}", "4",
+    "Velocity or acceleration of nodes. Components that are not given stay free; an acceleration begins at the present "
+    "velocity.",
+    (Option("v{elocity}-x", (TABLED,), "velocity along x", "m/s"),
+     Option("v{elocity}-y", (TABLED,), "velocity along y", "m/s"),
+     Option("a{cceleration}-x", (TABLED,), "acceleration along x", "m/s2"),
+     Option("a{cceleration}-y", (TABLED,), "acceleration along y", "m/s2")),
+    any_of=True,
+)  # fmt: skip
+FORCE = Model(
+    "mech{anical}-f{orce}-b{oundary}-c{ondition}", "5", "Force on each node.",
+    (Option("f{orce}-x", (TABLED,), "force along x", "N"), Option("f{orce}-y", (TABLED,), "force along y", "N")),
+    any_of=True,
+)  # fmt: skip
+MOVE = Model(
+    "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7", "Freedom of nodes.",
+    (Option("t{ype}", (INTEGER, OPTIONAL_VECTOR),
+            "0 free, 1 held, 2 moves along the vector only (type 0 and 1 take a vector and do not use it)",
+            required=True),),
+)  # fmt: skip
+STRESS = Model(
+    "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
+    "Traction on surfaces: stress times the present normal. Tension is positive.",
+    (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa"), Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa"),
+     Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
+            "pressure", "Pa")),
+    any_of=True, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
+)  # fmt: skip
+_LATER_NODE = (
+    Model("hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11", "Fluid at nodes.",
+          (Option("p{ressure}", (FLOAT,), "", "Pa"), Option("f{low}-s{urface}", (FLOAT,), "", "m"),
+           Option("f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=FLOW,
+          also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",)),
+    Model("therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes.",
+          (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
+    Model("therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of fluid.",
+          (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
+    Model("hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that is injected.",
+          (Option("p{roppant}-v{olumetric}-c{oncentration}", (FLOAT,), "", "1"),
+           Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=PROPPANT),
+)  # fmt: skip
+CONST_HEAT = Model(
+    "therm{al}-c{onst}-h{eat}", "16", "Heat through surfaces.",
+    (Option("h{eat}-f{lux}", (FLOAT,), "", "W/m2"), _HEAT_OF[2],
+     Option("e{nvironment}-t{emperature}", (FLOAT,), "", "degrees C")), later=HEAT,
+)  # fmt: skip
+
+# ---- contact and joints (tables 8, 9, 10, 13, 17) ------------------------------------------------------------------
+
+CONTACT = Model(
+    "c{ontact}-m{ohr}-c{oulomb}", "8",
+    "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
+    (Option("f{riction}", (ANGLE,), "friction angle", "degrees", "0"),
+     Option("p{enalty}-n{ormal}", (POSITIVE,), "normal penalty; 10 to 100 E is usual", "Pa", "10 E"),
+     Option("p{enalty}-s{hear}", (POSITIVE,), "shear penalty", "Pa", "10 E"),
+     Option("d{amping}-t", (POSITIVE,), "stress from which contacts lose energy", "Pa", "never"),
+     Option("d{amping}-b", (POSITIVE,), "exponent of that loss", "1", "1")),
+)  # fmt: skip
+COHESIVE = Model(
+    "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
+    "Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then on.",
+    (Option("f{riction}", (ANGLE,), "friction angle", "degrees", "0"),
+     Option("c{ohesion}", (NOT_NEGATIVE,), "cohesion", "Pa", required=True),
+     Option("t{ensile}-s{trength}", (NOT_NEGATIVE,), "tensile strength", "Pa", required=True),
+     Option("gf1", (NOT_NEGATIVE,), "fracture energy, mode I", "N/m", required=True),
+     Option("gf2", (NOT_NEGATIVE,), "fracture energy, mode II", "N/m", required=True),
+     Option("p{enalty}-o{verlay}", (POSITIVE,), "penalty of a closed joint", "Pa", "10 E",
+            also=("p{enalty}-o{verlap}",)),
+     Option("p{enalty}-n{ormal}", (POSITIVE,), "penalty of opening", "Pa", "10 E"),
+     Option("p{enalty}-s{hear}", (POSITIVE,), "penalty of shear", "Pa", "10 E"),
+     Option("np", (COUNT,), "integration points: 3 in two dimensions", "1", "3")),
+)  # fmt: skip
+_POROUS = (
+    Option("f{luid}-den{sity}", (POSITIVE,), "", "kg/m3"), Option("f{luid}-b{ulk}", (POSITIVE,), "", "Pa"),
+    Option("vis{cosity}", (POSITIVE,), "kinematic", "m2/s"),
+    Option("a{perature}-i{nitial}", (NOT_NEGATIVE,), "", "m", also=("a{perture}-i{nitial}",)),
+    Option("a{perature}-min{umum}", (NOT_NEGATIVE,), "", "m",
+           also=("a{perature}-min{imum}", "a{perture}-min{imum}", "a{perture}-min{umum}")),
+    Option("a{perature}-max{imum}", (NOT_NEGATIVE,), "", "m", also=("a{perture}-max{imum}",)),
+    Option("leak-off", (BOOL,), ""), Option("m{atrix}-p{ore}-p{ressure}", (FLOAT,), "", "Pa"),
+    Option("m{atrix}-p{ermeability}", (NOT_NEGATIVE,), "", "m2"),
+    Option("m{atrix}-p{orosity}-c{ompressibility}", (NOT_NEGATIVE,), "", "1/Pa"),
+    Option("m{atrix}-p{orosity}", (NOT_NEGATIVE,), "", "1"),
+)  # fmt: skip
+_LATER_JOINT = (
+    Model("hydr{aulic}-p{orous}-m{edium}", "10", "Fluid in joints.", _POROUS, later=FLOW),
+    Model("t{hermal}-f{luid}", "13", "Heat in the fluid of joints.", _HEAT_OF, later=HEAT),
+    Model("hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17", "Fluid with proppant in joints.",
+          (*_POROUS, Option("p{roppant}-den{sity}", (POSITIVE,), "", "kg/m3"),
+           Option("p{roppant}-s{ize}", (POSITIVE,), "", "m"),
+           Option("p{roppant}-s{ize}-f{actor}", (POSITIVE,), "", "1"),
+           Option("a{perature}-f{actor}", (POSITIVE,), "", "1", also=("a{perture}-f{actor}",)),
+           Option("p{roppant}-c{oncentration}-l{imit}", (POSITIVE,), "", "1"),
+           Option("p{roppant}-m{odulus}", (POSITIVE,), "", "Pa"), Option("vis{cosity}-p{ower}", (FLOAT,), "", "1")),
+          later=PROPPANT),
+)  # fmt: skip
+
+# ---- RANGE ---------------------------------------------------------------------------------------------------------
+
+_FACES = ("element-face", "face-joint", "node")
+RANGE_TERMS = (
+    Option("group", (STRING,), "members of the group", more=(SET,)),
+    Option("set", (STRING,), "members of any group of the set"),
+    Option("id", (ZERO_OR_MORE, LAST_ID), "the number, or from first to last; numbers begin at 0, as in the output"),
+    Option("x", (FLOAT, FLOAT), "x from ... to ..., at the present positions", "m"),
+    Option("y", (FLOAT, FLOAT), "y from ... to ...", "m"),
+    Option("z", (FLOAT, FLOAT), "", later=THREE_D),
+    Option("geom{etry}", (STRING,), "lies on the lines of the geometry layer; elements: their centre is inside of it"),
+    Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
+    Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in it",
+           more=(SET,), only=_FACES),
+    Option("between", (STRING, STRING), "joints with an element of each of the two groups", more=(SET,),
+           only=("face-joint",)),
+    Option("crack", (), "joints on a crack of the mesh", only=("face-joint",)),
+)  # fmt: skip
+
+# ---- commands ------------------------------------------------------------------------------------------------------
+
+_GROUP = Option("group", (STRING,), "the group that the new elements are in", "", "'default'", more=(SET,))
+_LAYER = Option("a{s}-l{ayer}", (STRING,), "name of the layer; a layer may hold several shapes", required=True)
+_NAME = Option("name", (STRING,), "name", required=True)
+RECORDED = {
+    "node": {
+        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
+        "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m",
+    },
+    "element": {"stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa"},
+    "joint": {
+        "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
+    },
+    "model": {
+        "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
+        "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
+        "contact-energy": "J/m", "viscous-loss": "J/m", "gravity-work": "J/m", "outside-work": "J/m",
+        "energy-error": "J/m",
+    },
+}  # fmt: skip
+"""What a history can follow, and its unit."""
+_RECORDED = choice(*(name for of in RECORDED.values() for name in of))
+_EVERY = Option("ev{ery}", (COUNT,), "steps between two records", "", "1")
+
+
+def _leading(name: str, kind: Kind, doc: str, unit: str = "", required: bool = True) -> Option:
+    return Option(name, (kind,), doc, unit, required=required)
+
+
+def _group_command(kind: str, notation: str) -> Command:
+    return Command(
+        f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
+        "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
+        (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
+    )  # fmt: skip
+
+
+def _properties(model: Model) -> tuple[Option, ...]:
+    """Those of a model, none of them compulsory, for commands that change some."""
+    return tuple(Option(o.notation, o.values, o.doc, o.unit, also=o.also) for o in model.options if o.name != "np")
+
+
+_MODEL = (
+    Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
+            ("pcdc model new", "pcdc model new dim 2"),
+            options=(Option("dim", (COUNT,), "dimensions of space: 2", "", "2"),), manual=True),
+    Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
+            "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
+            (_leading("file", FILE, "name of the file, beside the script"),), manual=True),
+    Command("mod{el} restore", "The state of a file, and its m_ variables and functions.",
+            ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True),
+    Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
+            (_leading("gravity", VECTOR, "acceleration", "m/s2"),)),
+    Command("mod{el} opt{ion}", "Switches of the calculation.",
+            ("pcdc model option dynamic off", "pcdc model option collision on"),
+            options=(
+                Option("dyn{amic}", (BOOL,), "true motion in time; off: static, towards equilibrium", default="on"),
+                Option("col{lision}", (BOOL,), "contact of surfaces", default="on"),
+                Option("mech{anical}", (BOOL,), "", later="motion and stress are always computed in this version"),
+                Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
+                Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
+                       "histories of the model, a table at the end", default="off"),
+                Option("hyd{raulic}", (BOOL,), "", later=FLOW), Option("therm{al}", (BOOL,), "", later=HEAT),
+                Option("prop{pant}", (BOOL,), "", later=PROPPANT), Option("one-way", (BOOL,), "", later=FLOW)),
+            needs_option=True, manual=True),
+    Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time.",
+            ("pcdc model time-step auto off", "pcdc model time-step value 1e-7"),
+            options=(
+                Option("value", (POSITIVE,), "the time step itself", "s"),
+                Option("auto", (BOOL,), "on: follow the largest stable one during the run; off: keep that of the "
+                       "first step", default="off"),
+                Option("safe{ty}", (POSITIVE,), "part of the stable time step that is taken", "1", "0.8"),
+                Option("mass-s{caling}", (POSITIVE,), "nodes get as much mass as this time step needs", "s"),
+                Option("hyd{raulic}", (POSITIVE,), "", later=FLOW), Option("therm{al}", (POSITIVE,), "", later=HEAT)),
+            needs_option=True, manual=True),
+    Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
+            (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
+    Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
+            "stop at ratio 1e-5. With elastic: straight to static equilibrium by linear equations, for elastic blocks "
+            "whose joints stay before their peak and whose surfaces do not touch.",
+            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic"),
+            options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
+                            "as far below as rounding allows", "1"),
+                     Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
+                            "velocities act"),
+                     Option("time", (POSITIVE,), "time that passes", "s"),
+                     Option("ela{stic}", (), "at once, without steps"),
+                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic: SciPy on one rank, the same "
+                            "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
+                            "unknowns on", default="auto"))),
+    Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
+    Command("mod{el} creep", "Creep in a clock of its own.", later=CREEP),
+)  # fmt: skip
+
+_GEOMETRY = (
+    Command("geom{etry} cr{eate} p{olyline}", "Straight lines from point to point.",
+            ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
+            (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True),
+    Command("geom{etry} cr{eate} polyg{on}", "A closed line.",
+            ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
+            (_leading("points", VECTORS, "the corners", "m"),), (_LAYER,)),
+    Command("geom{etry} cr{eate} rec{tangle}", "A rectangle along the axes.",
+            ("pcdc geometry create rectangle (0,0) (10,5) as-layer 'box'",),
+            (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
+            (_LAYER,)),
+    Command("geom{etry} cr{eate} cir{cle}", "A circle.", ("pcdc geometry create circle (0,0) 1 as-layer 'hole'",),
+            (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
+            (_LAYER,)),
+    Command("geom{etry} cr{eate} arc", "A part of a circle, counter-clockwise.",
+            ("pcdc geometry create arc (0,0) 1 0 90 as-layer 'arch'",),
+            (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m"),
+             _leading("begin", FLOAT, "first angle", "degrees"), _leading("end", FLOAT, "last angle", "degrees")),
+            (_LAYER,)),
+    Command("geom{etry} cr{eate} poi{nt}", "Single points, which become points of the mesh.",
+            ("pcdc geometry create point (1,1) as-layer 'gauge'",),
+            (_leading("points", VECTORS, "the points", "m"),), (_LAYER,)),
+    Command("geom{etry} cr{eate} frac{tures}", "A set of fractures with given statistics, as straight lines; for mesh "
+            "create crack, or mesh intersect.",
+            ("pcdc geometry create fractures orientation fisher 30 spread 20 length exponential 2 p21 1.5 inside 'out' "
+             "seed 7 as-layer 'set1'",),
+            options=(
+                Option("ori{entation}", (choice("fixed", "uniform", "normal", "fisher"), FLOAT),
+                       "distribution and mean of the angle to x, counter-clockwise", "degrees", required=True,
+                       more=(Option("spr{ead}", (NOT_NEGATIVE,), "uniform: half width; normal: standard deviation "
+                                    "[degrees]; fisher: kappa", default="0"),)),
+                Option("len{gth}", (choice("fixed", "exponential", "lognormal", "power"), FLOAT),
+                       "distribution of the length, and its value: the length, the mean, the mean, the exponent", "m",
+                       required=True,
+                       more=(Option("spr{ead}", (NOT_NEGATIVE,), "lognormal: standard deviation", "m"),
+                             Option("least", (NOT_NEGATIVE,), "no shorter ones", "m", "0"),
+                             Option("great{est}", (POSITIVE,), "no longer ones", "m", "none"))),
+                Option("p10", (POSITIVE,), "density: fractures per length of a scan line", "1/m"),
+                Option("p20", (POSITIVE,), "density: fractures per area", "1/m2"),
+                Option("p21", (POSITIVE,), "density: length of fractures per area", "1/m"),
+                Option("scan-l{ine}", (FLOAT,), "direction of the line of p10", "degrees", "0"),
+                Option("reached", (), "p20 or p21 is met as nearly as whole fractures can, not in the mean"),
+                Option("ends-at", (NOT_NEGATIVE,), "share of the crossings with earlier fractures at which one ends",
+                       "1", "0"),
+                Option("ins{ide}", (STRING,), "the layer that bounds them", required=True),
+                Option("hole", (STRING,), "none inside of this layer", repeated=True),
+                Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0"),
+                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER)),
+    Command("geom{etry} cr{eate} box", "", later=THREE_D),
+    Command("geom{etry} cr{eate} sph{ere}", "", later=THREE_D),
+    Command("geom{etry} cr{eate} cyl{inder}", "", later=THREE_D),
+    Command("geom{etry} imp{ort}", "Lines of a DXF file.", ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
+            (_leading("file", FILE, "name of the file"),),
+            (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"))),
+    Command("geom{etry} trans{form}", "Moves, turns or scales a layer.",
+            ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
+            (_leading("layer", STRING, "name of the layer"),),
+            (Option("scale", (POSITIVE,), "done first"),
+             Option("rot{ate}", (FLOAT,), "then, counter-clockwise", "degrees"),
+             Option("about", (VECTOR,), "centre of both", "m", "(0,0)"), Option("move", (VECTOR,), "last", "m")),
+            needs_option=True),
+    Command("geom{etry} del{ete}", "Forgets a layer.", ("pcdc geometry delete 'hole'",),
+            (_leading("layer", STRING, "name of the layer"),)),
+)  # fmt: skip
+
+_MESH = (
+    Command("mesh cr{eate}", "Meshes the inside of a layer with Gmsh. Several meshes make several bodies of one model, "
+            "which may touch each other.",
+            ("pcdc mesh create from-layer 'out' size 0.5 refine-layer 'hole' size 0.05 hole 'hole' group 'rock'",),
+            options=(
+                Option("from-l{ayer}", (STRING,), "its outline", required=True),
+                Option("size", (POSITIVE,), "length of edges", "m", required=True),
+                Option("ref{ine}-l{ayer}", (STRING,), "smaller elements near this layer",
+                       repeated=True,
+                       more=(Option("size", (POSITIVE,), "length of edges there", "m", required=True),
+                             Option("dist{ance}", (POSITIVE,), "over which the size grows to that of the rest", "m",
+                                    "ten times the size"))),
+                Option("hole", (STRING,), "what is inside of this layer stays empty", repeated=True),
+                Option("reg{ion}", (STRING,), "what is inside of this layer is a group of its own", repeated=True,
+                       more=(Option("group", (STRING,), "its name", default="the name of the layer"),)),
+                Option("emb{ed}", (STRING,), "lines that become edges of the mesh", repeated=True),
+                Option("crack", (STRING,), "lines that become edges with a crack from the beginning", repeated=True),
+                Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri"),
+                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks"), _GROUP)),
+    Command("mesh str{uctured}", "A regular mesh of a rectangle.",
+            ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",),
+            (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
+            (Option("cells", (COUNT, COUNT), "along x and y", required=True),
+             Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri"),
+             Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
+                    "both of each rectangle", default="alternate"),
+             Option("ratio", (POSITIVE, POSITIVE), "along x and y: each rectangle is so many times as large as the one "
+                    "before", "1", "1 1"), _GROUP)),
+    Command("mesh equi{lateral}", "Nearly equilateral triangles in a rectangle.",
+            ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
+            (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
+            (Option("size", (POSITIVE,), "length of edges", "m", required=True), _GROUP)),
+    Command("mesh imp{ort}", "A mesh of another program, for example .msh or .inp; its physical groups become groups.",
+            ("pcdc mesh import 'rock.msh'",), (_leading("file", FILE, "name of the file"),),
+            (Option("group", (STRING,), "a group that all elements are put into, besides those of the file",
+                    more=(SET,)),
+             Option("merge", (NOT_NEGATIVE,), "points nearer than this are one", "m", "0"),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1"))),
+    Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
+            ("pcdc mesh intersect layer 'fault'",),
+            options=(Option("layer", (STRING,), "its lines are edges of the mesh", required=True),
+                     Option("follow", (), "they are not: the edges that follow them best are taken"))),
+    Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
+)  # fmt: skip
+
+_OBJECTS = (
+    _group_command("element", "el{ement}"),
+    Command("el{ement} c-m{odel}", "The constitutive model of elements, with its properties.",
+            ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
+             "pcdc element c-model null range group 'excav_1' set 'domain'"),
+            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, BURGERS, ISO_HEAT), ranged="element", manual=True),
+    Command("el{ement} prop{erty}", "Changes properties; the others stay.",
+            ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",), options=_properties(ISO_ELASTIC),
+            ranged="element", needs_option=True),
+    Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
+            "not given are zero.",
+            ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
+             "pcdc element initial stress-yy 0 gradient (0,25e3)"),
+            options=tuple(
+                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa",
+                       more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                for c in ("xx", "yy", "xy", "zz")), ranged="element", needs_option=True),
+    Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none.",
+            ("pcdc element reset state",), ranged="element", manual=True),
+    _group_command("element-face", "element-f{ace}"),
+    Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
+            ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),
+            models=(CONTACT,), ranged="element-face", manual=True),
+    Command("element-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
+            ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
+            ranged="element-face", needs_option=True),
+    Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
+            ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",),
+            models=(STRESS, CONST_HEAT), ranged="element-face"),
+    Command("element-f{ace} bou{ndary} rem{ove}", "Takes boundary conditions of surfaces back.",
+            ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face"),
+    _group_command("face-joint", "face-j{oint}"),
+    Command("face-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
+            ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",),
+            models=(COHESIVE, *_LATER_JOINT), ranged="face-joint"),
+    Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
+            ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",), options=_properties(COHESIVE),
+            ranged="face-joint", needs_option=True),
+    Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
+            ("pcdc face-joint reset state",), ranged="face-joint"),
+    _group_command("node", "node"),
+    Command("node bou{ndary}", "A boundary condition of nodes.",
+            ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
+             "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1"),
+            models=(VELOCITY, FORCE, MOVE, *_LATER_NODE), ranged="node"),
+    Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
+            ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
+    Command("node init{ial}", "The velocity of nodes now.", ("pcdc node initial velocity (1,0) range group 'block'",),
+            options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
+                     Option("temp{erature}", (FLOAT,), "", later=HEAT)), ranged="node", needs_option=True),
+    Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
+    Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
+            manual=True),
+    Command("flow-n{ode}", "", later=FLOW),
+    Command("bolt", "", later=BOLTS),
+    Command("bolt-e{lement}", "", later=BOLTS),
+    Command("bolt-n{ode}", "", later=BOLTS),
+)  # fmt: skip
+
+_RECORDS = (
+    Command("tab{le} cr{eate}", "A function of time, linear from point to point, constant before and after.",
+            ("pcdc table create 'blast' values (0,0) (5e-5,-60e6) (2e-4,0)",
+             "pcdc table create 'blast' values [points]"),
+            (_NAME,), (Option("val{ues}", (VECTORS,), "(time, value), times ascending", "s", required=True),)),
+    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,)),
+    Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range (sum, mean, "
+            "minimum or maximum), or of the model.",
+            ("pcdc history create 'load' node value reaction-y sum every 100 range group 'platen' set 'bc'",
+             "pcdc history create 'gauge' element nearest (5,0) value stress-yy",
+             "pcdc history create 'cracks' model value broken-joints every 100"),
+            (_NAME, _leading("object", choice(*RECORDED), "what it is a number of")),
+            (Option("id", (ZERO_OR_MORE,), "the object of this number"),
+             Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
+             Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
+             Option("sum", (), "of the objects of range"), Option("mean", (), "of the objects of range"),
+             Option("min{imum}", (), "of the objects of range"), Option("max{imum}", (), "of the objects of range")),
+            ranged="any"),
+    Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,)),
+    Command("his{tory} exp{ort}", "Writes all histories, or some, side by side as CSV.",
+            ("pcdc history export 'curves.csv'",), (_leading("file", FILE, "name of the file"),),
+            (Option("name{s}", (STRINGS,), "only these", default="all"),)),
+    Command("chart cr{eate}", "A diagram.", ("pcdc chart create 'ucs' x-label 'strain' y-label 'stress [[MPa]]'",),
+            (_NAME,), (Option("tit{le}", (STRING,), "over the diagram"), Option("x-l{abel}", (STRING,), "of the axis"),
+                       Option("y-l{abel}", (STRING,), "of the axis"))),
+    Command("chart add", "A curve of two histories, or of points.",
+            ("pcdc chart add 'ucs' x 'shortening' scale-x -0.01 y 'load' scale-y 2e-8 label 'sample'",
+             "pcdc chart add 'ucs' values [curve] label 'exact' style points"),
+            (_NAME,),
+            (Option("x", (STRING,), "history along x; without it the time", default="time"),
+             Option("y", (STRING,), "history along y"), Option("scale-x", (FLOAT,), "factor", default="1"),
+             Option("scale-y", (FLOAT,), "factor", default="1"), Option("val{ues}", (VECTORS,), "points (x,y)"),
+             Option("lab{el}", (STRING,), "in the legend"),
+             Option("style", (choice("line", "points"),), "how it is drawn", default="line"))),
+    Command("chart exp{ort}", "Writes a diagram as CSV and as a figure of the same name.",
+            ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks"),
+            (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
+            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),)),
+    Command("output vtk", "Frames for ParaView: now, and every so many steps.",
+            ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
+            (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
+            (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
+             Option("off", (), "no more frames of this name"))),
+    Command("output image", "", later="pictures are drawn from the frames, by hpcdem movie"),
+)  # fmt: skip
+
+COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_OBJECTS, *_RECORDS)
+PCDC = Table(COMMANDS, RANGE_TERMS)

@@ -1,0 +1,132 @@
+"""`pcdc` in the Python of a script: what the model is like now.
+
+Every look is collective: all ranks must come to it, as they come to commands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import CommandError
+from hpcdem.lang.pcdc.vector import Vector
+from hpcdem.model.blocks import groups as g
+
+KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE}
+_VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}
+
+
+class Model:
+    """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
+
+    def __init__(self, project: Any, verbs: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
+        self._project, self._verbs, self._look = project, verbs, look
+
+    @property
+    def time(self) -> float:
+        """Model time [s]."""
+        return self._look(lambda: float(self._project.blocks.clock.time))
+
+    @property
+    def cycle(self) -> int:
+        """Steps done."""
+        return self._look(lambda: int(self._project.blocks.clock.step))
+
+    @property
+    def rank(self) -> int:
+        """This rank, from 0."""
+        return int(self._project.comm.rank)
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """The energy budget [J per m of thickness]."""
+        return self._look(lambda: self._project.blocks.energies())
+
+    @property
+    def ratio(self) -> float:
+        """Unbalanced over all forces of the nodes."""
+        return self._look(lambda: float(self._verbs.looking.ratio(self._project)))
+
+    def node(self, number: int) -> View:
+        """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
+        return View(self, "node", number)
+
+    def element(self, number: int) -> View:
+        """An element: .stress_xx, .stress_yy, .stress_xy, .stress_zz."""
+        return View(self, "element", number)
+
+    def joint(self, number: int) -> View:
+        """A joint: .opening, .slip, .damage, .state, .normal_stress, .shear_stress."""
+        return View(self, "joint", number)
+
+    def numbers(self, kind: str, **where: Any) -> np.ndarray:
+        """Numbers of the elements, nodes, joints or faces of a group (group=, set=) or layer (geometry=)."""
+        return self._look(lambda: self._verbs.looking.numbers(self._project, _kind(kind), _range(where)))
+
+    def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
+        """A quantity by name, in the order of numbers."""
+        return self._look(lambda: self._verbs.looking.values(self._project, _kind(kind), _name(name), _range(where)))
+
+    def total(self, kind: str, name: str, **where: Any) -> float:
+        """Exact sum of a quantity."""
+        return self._look(lambda: self._verbs.looking.total(self._project, _kind(kind), _name(name), _range(where)))
+
+    def history(self, name: str) -> np.ndarray:
+        """(n, 3) step, time and value of what a history has recorded."""
+
+        def rows() -> np.ndarray:
+            return np.array(self._verbs.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
+
+        return self._look(rows)
+
+
+class View:
+    """One object; its quantities are attributes."""
+
+    def __init__(self, model: Model, kind: str, number: int) -> None:
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)):
+            raise CommandError(f"pcdc.{kind}({number!r}): the number of the {kind} is a whole number")
+        self._model, self._kind, self._number = model, kind, int(number)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if self._kind == "node" and name in _VECTORS:
+            return Vector(self.value(f"{name}_x"), self.value(f"{name}_y"))
+        return self.value(name)
+
+    def value(self, name: str) -> float:
+        """A quantity of it by name."""
+        found = self._model.values(self._kind, name, id=self._number)
+        return float(found[0])
+
+
+def _kind(kind: str) -> str:
+    if kind not in KINDS:
+        raise CommandError(f"'{kind}' is none of {', '.join(KINDS)}")
+    return KINDS[kind]
+
+
+def _name(name: str) -> str:
+    return name.replace("-", "_")
+
+
+def _range(where: dict[str, Any]) -> g.Range | None:
+    terms: list[g.Term] = []
+    set_name = where.pop("set", None)
+    for word, value in where.items():
+        if word == "group":
+            terms.append(g.InGroup(value, set_name or g.DEFAULT))
+        elif word == "geometry":
+            terms.append(g.OnLayer(value))
+        elif word == "id":
+            terms.append(g.Ids(int(value), int(value)))
+        elif word in ("x", "y"):
+            terms.append(g.Span("xy".index(word), float(value[0]), float(value[1])))
+        else:
+            raise CommandError(f"'{word}' is none of group, set, geometry, id, x and y")
+    if set_name is not None and "group" not in where:
+        terms.append(g.InSet(set_name))
+    return tuple(terms) or None

@@ -1,0 +1,171 @@
+"""A simulation of blocks that computes nothing: it notes what it is told, for tests of the language."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.blocks import Balanced
+from hpcdem.clock import Clock
+from hpcdem.commands.blocks import Project
+from hpcdem.errors import CommandError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.lang.pcdc.execute import Interpreter
+from hpcdem.model.blocks.connectivity import centroids
+from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.model.blocks.properties import MODELS, Rows
+from hpcdem.model.blocks.tables import Table
+from hpcdem.timers import Timers
+
+
+class Noted:
+    """The log of a test."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def info(self, text: str) -> None:
+        self.lines.append(text)
+
+    def warn(self, text: str) -> None:
+        self.lines.append(f"warning: {text}")
+
+    def warn_once(self, key: str, text: str) -> None:
+        self.warn(text)
+
+
+class FakeBlocks:
+    """The interface of `hpcdem.blocks.Blocks`, as far as the verbs use it. calls: (method, arguments) in order; the
+    time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2 time), reactions are 1 and 2 per node."""
+
+    def __init__(self, comm: Any = None, outdir: Path | str = "data") -> None:
+        self.comm = comm or SerialComm()
+        self.log, self.stop, self.outdir = Noted(), None, Path(outdir)
+        self.timers = Timers()
+        self.calls: list[tuple[str, tuple, dict]] = []
+        self.clear()
+
+    def clear(self) -> None:
+        self.mesh: Mesh | None = None
+        self.clock = Clock()
+        self.tables: dict[str, Table] = {}
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+
+        def noted(*args: Any, **kwargs: Any) -> None:
+            self.calls.append((name, args, kwargs))
+
+        return noted
+
+    def told(self, name: str) -> list[tuple[tuple, dict]]:
+        """Arguments of all calls of a method."""
+        return [(args, kwargs) for called, args, kwargs in self.calls if called == name]
+
+    @property
+    def element_row(self) -> np.ndarray:
+        assert self.mesh is not None
+        return np.ones(len(self.mesh.cells), np.int64)
+
+    @property
+    def element_rows(self) -> Any:
+        """One material, with the moduli that it was given last."""
+        rows = Rows()
+        for (_, name, given), _ in self.told("element_model")[-1:]:
+            rows.row(MODELS[name], MODELS[name].complete(given))
+        return rows
+
+    def place_mesh(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.calls.append(("place_mesh", (mesh,), {}))
+
+    def table(self, name: str, pairs: Any) -> None:
+        self.tables[name] = Table.of(pairs, name)
+
+    def remove_table(self, name: str) -> None:
+        del self.tables[name]
+
+    def advance(self, steps: int) -> int:
+        assert steps > 0
+        self.calls.append(("advance", (steps,), {}))
+        self.clock.dt = 0.01
+        self.clock.step += steps
+        self.clock.time = self.clock.step * 0.01
+        return 0
+
+    def solve_elastic(self, **how: Any) -> Balanced:
+        self.calls.append(("solve_elastic", (), how))
+        self.clock.step += how["cycles"]
+        return Balanced(1e-11, 3, 1, 42, "direct")
+
+    def unbalanced_ratio(self) -> float:
+        return 1.0 / max(self.clock.step, 1)
+
+    def joint_counts(self) -> tuple[int, int, int]:
+        return 7, 2, 1
+
+    def values(self, name: str, numbers: Any = None) -> np.ndarray:
+        assert self.mesh is not None
+        t = self.clock.time
+        stem, _, axis = name.rpartition("_")
+        on_nodes = {"position", "displacement", "velocity", "reaction"}
+        if stem in on_nodes:
+            k = "xy".index(axis)
+            moved = np.full(len(self.mesh.points), (k + 1) * t)
+            found = {
+                "position": self.mesh.points[:, k] + moved, "displacement": moved,
+                "velocity": np.full(len(moved), k + 1.0), "reaction": np.full(len(moved), k + 1.0),
+            }[stem]  # fmt: skip
+        elif name in ("stress_xx", "stress_yy"):
+            found = centroids(self.mesh.points, self.mesh.cells)[:, int(name == "stress_yy")]
+        else:
+            raise CommandError(f"there is no quantity {name}")
+        return found if numbers is None else found[numbers]
+
+    def total(self, name: str, numbers: Any = None) -> float:
+        return float(self.values(name, numbers).sum())
+
+    def save(self, path: Path | str, extra: Any = None) -> None:
+        mesh = self.mesh
+        state = {"extra": extra, "step": self.clock.step, "tables": {k: t.pairs() for k, t in self.tables.items()}}
+        if mesh is not None:
+            state["mesh"] = [mesh.points.tolist(), mesh.cells.tolist(), {k: v.tolist() for k, v in mesh.layers.items()}]
+        Path(path).write_text(json.dumps(state, allow_nan=False))
+
+    def restore(self, path: Path | str) -> dict[str, Any]:
+        try:
+            state = json.loads(Path(path).read_text())
+        except OSError:
+            raise CommandError(f"{path}: there is no such file") from None
+        self.clear()
+        self.clock.step, self.clock.time = state["step"], state["step"] * 0.01
+        for name, pairs in state["tables"].items():
+            self.table(name, pairs)
+        if "mesh" in state:
+            points, cells, layers = state["mesh"]
+            self.mesh = Mesh.of(points, cells, None, layers)
+        return state["extra"]
+
+
+class Bench:
+    """A script on a fake simulation: `bench("pcdc model new")` runs a text; blocks, project and the names of the script
+    can be looked at."""
+
+    def __init__(self, folder: Path, comm: Any = None) -> None:
+        self.blocks = FakeBlocks(comm)
+        self.project = Project(self.blocks, folder, folder / "data")  # type: ignore[arg-type]
+        self.interpreter = Interpreter(self.project)
+        self.count = 0
+
+    def __call__(self, text: str) -> Bench:
+        self.count += 1
+        name = "script.sc" if self.count == 1 else f"script{self.count}.sc"
+        self.interpreter.run(self.interpreter.read(text, name))
+        return self
+
+    def __getitem__(self, name: str) -> Any:
+        return self.interpreter.namespace[name]

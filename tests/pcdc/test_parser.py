@@ -1,0 +1,234 @@
+"""One line: what is read, and what is refused with which words."""
+
+from __future__ import annotations
+
+import pytest
+
+from hpcdem.errors import ScriptError
+from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.parser import parse
+from hpcdem.lang.pcdc.statement import Statement
+from hpcdem.lang.pcdc.table import PCDC
+
+
+def read(words: str) -> Statement:
+    return parse(" " + words, "a.sc", 7, f"pcdc {words}", PCDC)
+
+
+def resolved(words: str, *values):
+    """Arguments and range with these values of the expressions."""
+    return read(words).resolve(values)
+
+
+def test_words_and_values():
+    statement = read("el c-m mech-iso-e prop den 2500 y 50e9 P-R .25 d-f 1 ran group 'rock' set 'domain' x -1 +2.5")
+    assert statement.command.name == "element c-model"
+    assert statement.arguments == {
+        "model": "mechanical-iso-elastic",
+        "properties": {"density": 2500.0, "young": 50e9, "poisson-ratio": 0.25, "damp-factor": 1.0},
+    }
+    assert statement.range == (("group", {"value": "rock", "set": "domain"}), ("x", (-1.0, 2.5)))
+
+
+@pytest.mark.parametrize(
+    ("words", "arguments"),
+    [
+        ("model new", {}),
+        ("model new dim 2", {"dim": 2}),
+        ("model step 100000.0", {"steps": 100000}),
+        ("model gravity (0,-9.81)", {"gravity": (0.0, -9.81)}),
+        ("model option dynamic off collision TRUE", {"dynamic": False, "collision": True}),
+        ("model time-step auto off", {"auto": False}),
+        ("model restore 'a.sav'", {"file": "a.sav"}),
+        ('model restore "out\\a.sav"', {"file": "out/a.sav"}),
+        ("geom cr p (0,0)(1,2) ( 3 , 4 ) a-l 'x'", {"points": [(0.0, 0.0), (1.0, 2.0), (3.0, 4.0)], "as-layer": "x"}),
+        ("table create 't' values (0,1)", {"name": "t", "values": [(0.0, 1.0)]}),
+        ("element group '岩石'", {"group": "岩石"}),
+        ("element group 'a [[b]] c'", {"group": "a [b] c"}),
+        ("element group '#1'  # a comment", {"group": "#1"}),
+        ("node boundary mech-m-b-c type 1", {"model": "mechanical-move-boundary-constraint",
+                                             "properties": {"type": (1,)}}),
+        ("node boundary mech-m-b-c type 2 (1,0)", {"model": "mechanical-move-boundary-constraint",
+                                                   "properties": {"type": (2, (1.0, 0.0))}}),
+        ("mesh create from-l 'o' size 2 refine-l 'h' size .1 refine-l 'g' size .2 dist 3 hole 'h'",
+         {"from-layer": "o", "size": 2.0, "hole": ["h"],
+          "refine-layer": [{"value": "h", "size": 0.1}, {"value": "g", "size": 0.2, "distance": 3.0}]}),
+        ("element initial s-xx -1 grad (0,2) s-yy 3", {"stress-xx": {"value": -1.0, "gradient": (0.0, 2.0)},
+                                                       "stress-yy": {"value": 3.0}}),
+        ("chart exp 'c' 'c.png'", {"name": "c", "file": "c.png"}),
+        ("chart exp 'c' 'c.png' crack", {"name": "c", "file": "c.png", "cracks": True}),
+        ("history exp 'h.csv' names 'a' 'b'", {"file": "h.csv", "names": ["a", "b"]}),
+        ("hist create 'h' node value reaction-y sum range boundary",
+         {"name": "h", "object": "node", "value": "reaction-y", "sum": True}),
+    ],
+)  # fmt: skip
+def test_arguments(words, arguments):
+    assert dict(read(words).arguments) == arguments
+
+
+def test_tables_stand_for_numbers_where_they_may():
+    given = read("element-face boundary m-s-b-c s-n table 'blast'").arguments["properties"]
+    assert given == {"stress-normal": TableName("blast")}
+    with pytest.raises(ScriptError, match="read 'table', expected a number above 0 for 'ratio'"):
+        read("model solve ratio table 'blast'")
+
+
+def test_expressions_stand_where_values_and_their_parts_stand():
+    statement = read("geom create polyline ([i],0) (-[i],[a[0]]) as-layer ['line'+ str(i)]")
+    assert statement.expressions == ("i", "i", "a[0]", "'line'+ str(i)")
+    arguments, _ = statement.resolve((3, 3, 5.0, "line3"))
+    assert arguments == {"points": [(3.0, 0.0), (-3.0, 5.0)], "as-layer": "line3"}
+    arguments, terms = resolved("node group 'a[i]b[j]' range id [n] x -[w] [w]", 1, "x", 4, 2.0, 2.0)
+    assert arguments == {"group": "a1bx"} and terms == (("id", (4,)), ("x", (-2.0, 2.0)))
+    assert resolved("model option dynamic [m_dyn]", True)[0] == {"dynamic": True}
+    assert resolved("element-face boundary m-s-b-c s-n table ['t'+str(i)]", "t1")[0]["properties"] == {
+        "stress-normal": TableName("t1")
+    }
+
+
+def test_a_list_stands_for_many_values():
+    for given in ([(0, 0), (1, 2)], ((0, 0), (1, 2)), iter([(0, 0), (1, 2)])):
+        assert resolved("table create 't' values [points]", given)[0]["values"] == [(0.0, 0.0), (1.0, 2.0)]
+    assert resolved("table create 't' values [p]", (0, 5))[0]["values"] == [(0.0, 5.0)]
+    assert resolved("table create 't' values [p] [q]", (0, 5), (1, 6))[0]["values"] == [(0.0, 5.0), (1.0, 6.0)]
+
+
+@pytest.mark.parametrize(
+    ("words", "values", "message"),
+    [
+        ("model step [n]", (1.5,), "read 1.5 from '[n]', expected a whole number, not negative for 'steps'"),
+        ("model step [n]", (True,), "read True from '[n]', expected a whole number"),
+        ("model step [n]", ("10",), "read '10' from '[n]', expected a whole number"),
+        ("model solve ratio [r]", (float("nan"),), "read nan from '[r]', expected a number above 0"),
+        ("model solve ratio [r]", (None,), "read None from '[r]'"),
+        ("model gravity [g]", ((1, 2, 3),), "read (1, 2, 3) from '[g]', expected a vector (x,y)"),
+        ("model gravity (0,-[g])", ("x",), "read 'x' from '-[g]', which has no negative"),
+        ("element group [name]", (3,), "read 3 from '[name]', expected a text in quotes for 'group'"),
+        ("element group '[name]'", ("",), "read '' from '[name]', expected a text in quotes"),
+        ("table create 't' values [p]", ([1, 2, 3],), "expected a list of vectors (x,y)"),
+        ("table create 't' values [p]", (7,), "read 7 from '[p]'"),
+        ("model option dynamic [d]", (2,), "expected on or off for 'dynamic'"),
+        ("element group ['a'*100000]", (["a"] * 1000,), "expected a text in quotes"),
+    ],
+)
+def test_values_of_the_wrong_kind(words, values, message):
+    with pytest.raises(ScriptError) as caught:
+        resolved(words, *values)
+    assert str(caught.value).startswith(f"a.sc:7: pcdc {words}: ") and message in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+REFUSED = [
+    ("", "the line ends where a command: model, geometry,"),
+    ("foo bar", "read 'foo' after 'pcdc', expected one of model, geometry"),
+    ("modle new", "did you mean 'model'?"),
+    ("m new", "'m' is too short after 'pcdc'; it may mean model (at least 'mod'), mesh (at least 'mesh')"),
+    ("model opt dyn off extra", "read 'extra' after 'model option', expected one of dynamic, collision"),
+    ("model option dynamic", "the line ends where on or off for 'dynamic' is expected; a line that goes on"),
+    ("model option dynamic yes", "read 'yes', expected on or off for 'dynamic'"),
+    ("model option", "'model option' needs at least one of dynamic, collision"),
+    ("model option dynamic on dynamic off", "'dynamic' is given twice"),
+    ("model new dim 3", "dim 3 is not there yet"),
+    ("model step 10 20", "read '20', expected the end of the line"),
+    ("model step 10 range id 1", "'model step' takes no range"),
+    ("model solve ratio m_ratio", "read 'm_ratio'; variables and expressions of Python stand in square brackets: ["),
+    ("model solve ratio 1e-6*2", "variables and expressions of Python stand in square brackets: [1e-6*2]"),
+    ("model solve ratio n", "a variable of Python stands in brackets: [n]"),
+    ("model solve ratio [1+]", "'[1+]' is no expression of Python"),
+    ("model solve ratio []", "read '[]', expected a Python expression"),
+    ("model solve ratio [x", "does not end: ']' is missing"),
+    ("model solve ratio [x]*2", "read '*2' right after '[x]'; the whole expression stands in the brackets"),
+    ("model solve ratio [x = 1]", "is no expression of Python"),
+    ("model solve ratio -1", "read '-1', expected a number above 0 for 'ratio'"),
+    ("model solve ratio 1e999", "this one is too large"),
+    ("model solve ratio 0x10", "read '0x10'"),
+    ("model solve ratio 1_000", "read '1_000'"),
+    ("model step 12345678901234567890", "expected a number of fewer digits"),
+    ("model gravity (0,-9.81", "does not end: ')' is missing"),
+    ("model gravity (0;1)", "read '0;1', expected a keyword, a number"),
+    ("model gravity (0 1)", "expected ',' or ')'"),
+    ("model gravity (0,m_g)", "read 'm_g'; variables"),
+    ("model gravity (0,g)", "read 'g' in a vector, expected a number; variables"),
+    ("model gravity 0 -9.81", "read '0', expected a vector (x,y) for 'gravity'"),
+    ("model gravity (0,0,-9.81)", "expected a vector (x,y) for 'gravity'"),
+    ("model gravity（0，-9.81）", "is a full-width sign, expected '('"),
+    ("model restore a", "expected the name of a file in quotes for 'file'; write 'a', or [a] for a variable of Python"),
+    ("model restore 'a", "the text 'a does not end: ' is missing"),
+    ("model restore 'data/'", "expected the name of a file"),
+    ("element group 'a[i'", "in a text [[ stands for the bracket itself"),
+    ("element group 'a'range", "a blank is missing"),
+    ("element c-model", "the line ends where the name of a model: mechanical-iso-elastic, null"),
+    ("element c-model mech-iso", "it may mean mechanical-iso-elastic (at least 'mech-iso-e')"),
+    ("element c-model mech-iso-x", "read 'mech-iso-x' after 'element c-model', expected one of"),
+    ("element c-model mech-iso-e y 1 p-r 0.2", "lacks den{sity}"),
+    ("element c-model mech-iso-e den 1 y 1", "needs young and poisson-ratio or shear and bulk"),
+    ("element c-model mech-iso-e den 1 y 1 p-r 0.5", "read '0.5', expected a number above -1 and below 0.5"),
+    ("element c-model mech-iso-e den 1 y 1 p-r 0.2 colour 3", "after 'element c-model mechanical-iso-elastic'"),
+    ("element c-model null density 3", "read 'density' after 'element c-model null'"),
+    ("element-face c-model contact-m-c p 3", "it may mean penalty-normal (at least 'p-n'), penalty-shear"),
+    ("element-face boundary m-s-b-c", "needs at least one of stress-xx, stress-yy, stress-normal"),
+    ("node group 'a' range", "the line ends where a term: group, set, id"),
+    ("node group 'a' range colour 3", "read 'colour' after 'node group range', expected one of group, set, id, x, y"),
+    ("node group 'a' range x 1", "the line ends where a number for 'x' is expected"),
+    ("node group 'a' range id 1.5", "read '1.5', expected a whole number, not negative for 'id'"),
+    ("node group 'a' range z 1 2", "'z' is not there yet: this version computes in two dimensions"),
+    ("element group 'a' range between 'b' 'c'", "read 'between' after 'element group range'"),
+    ("mesh create from-layer 'a'", "'mesh create' lacks size"),
+    ("mesh create from-layer 'a' size 1 refine-layer 'b'", "'mesh create refine-layer' lacks size"),
+    ("mesh create from-layer 'a' size 1 type hex", "expected one of tri, quad for 'type'"),
+    ("table create 't' values", "the line ends where vectors (x,y) for 'values' is expected"),
+    ("table create 't' values 3 4", "read '3', expected vectors (x,y) for 'values'"),
+    ("history create 'h' node value stress-xx id 1", "a history of node can follow position-x"),
+    ("history create 'h' node value reaction-y", "needs one of id, nearest and range"),
+    ("history create 'h' node value reaction-y id 1 nearest (0,0)", "one of id, nearest and range, not id and nearest"),
+    ("history create 'h' node value reaction-y range boundary", "needs sum, mean, minimum or maximum"),
+    ("history create 'h' node value reaction-y sum id 3", "sum goes with range"),
+    ("history create 'h' model value time id 3", "a history of the model takes no id"),
+    ("chart add 'c'", "a curve has either y, the name of a history, or values"),
+    ("chart add 'c' values (0,0) scale-x 2", "scale-x goes with histories"),
+    ("model time-step auto on value 1e-6", "exclude each other"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "message"), REFUSED, ids=[words or "nothing" for words, _ in REFUSED])
+def test_refusals_name_file_line_text_and_what_was_expected(words, message):
+    with pytest.raises(ScriptError) as caught:
+        read(words)
+    told = str(caught.value)
+    assert told.startswith(f"a.sc:7: pcdc {words}: ") and message in told and "\n" not in told
+
+
+LATER = [
+    ("element c-model mech-m-c den 1", "plasticity comes later"),
+    ("element c-model mech-burgers den 1", "creep comes later"),
+    ("element c-model therm-iso-h con 1", "heat comes later"),
+    ("face-joint c-model hydr-p-m f-den 1", "fluid in fractures comes later"),
+    ("face-joint c-model t-f con 1", "heat comes later"),
+    ("face-joint c-model hydr-p-p-m f-den 1", "proppant comes later"),
+    ("node boundary hydraulic-c-f-b p 1", "fluid in fractures comes later"),
+    ("node boundary therm-s-b-c t 1", "heat comes later"),
+    ("element-face boundary therm-const-h h-f 1", "heat comes later"),
+    ("node initial temp 20", "heat comes later"),
+    ("bolt create polyline (0,0) (1,1)", "rock bolts come later"),
+    ("bolt-n boundary b-n-c", "rock bolts come later"),
+    ("flow-node initial pressure 1", "fluid in fractures comes later"),
+    ("model option hydraulic on", "fluid in fractures comes later"),
+    ("model sub-step mechanical 1", "fluid in fractures comes later"),
+    ("model creep on", "creep comes later"),
+    ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
+    ("output image 'a'", "hpcdem movie"),
+]
+
+
+@pytest.mark.parametrize(("words", "message"), LATER)
+def test_what_comes_later_is_refused_by_name(words, message):
+    with pytest.raises(ScriptError) as caught:
+        read(words)
+    assert "is not there yet: " in str(caught.value) and message in str(caught.value)
+
+
+def test_every_example_of_the_table_is_read():
+    examples = [(command.name, text) for command in PCDC.commands for text in command.example]
+    assert len(examples) > 50 and {name for name, _ in examples} == {c.name for c in PCDC.commands if not c.later}
+    for name, text in examples:
+        assert parse(text.removeprefix("pcdc"), "a.sc", 1, text, PCDC).command.name == name
