@@ -11,7 +11,8 @@ from hpcdem.io.frames import list_frames, read_frame
 from hpcdem.lang.detect import kind
 from tests.conftest import ROOT, Launcher
 
-EXAMPLES = [p for p in sorted((ROOT / "examples").glob("*.py")) if kind(p.read_bytes()) == "zdem"]
+SCRIPTS = sorted(p for p in (ROOT / "examples").iterdir() if p.suffix in (".py", ".sc"))
+EXAMPLES = [p for p in SCRIPTS if kind(p.read_bytes()) in ("zdem", "pcdc")]
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda p: p.name)

@@ -110,6 +110,7 @@ def test_the_tables_hold_numbers_of_the_moved_model(manual: Chapter) -> None:
         assert known[:, 1].min() == pytest.approx(0.0, abs=201.0)
 
 
+@pytest.mark.slow  # as are the jobs of tests/slurm/test_chapter6.py; quick: unit/test_strain_stress_folder.py
 @pytest.mark.mpi
 def test_job2_writes_the_same_bytes_on_four_ranks(manual: Chapter, tmp_path: Path) -> None:
     shutil.copytree(manual.push / "datass", tmp_path / "datass", ignore=shutil.ignore_patterns("ss"))

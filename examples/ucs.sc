@@ -1,0 +1,19 @@
+# Uniaxial compression of a specimen of rock, 52 x 108 mm: a ready-made model, with a line of one's own.
+#
+# `hpcdem case ucs` writes all that UCS() does as a script; `hpcdem case ucs --help` lists its parameters. The specimen
+# breaks along steep bands of shear, and splits along the load. Two minutes on one core. Needs the extra [mesh].
+#
+#   hpcdem ucs.sc             ucs.png beside the script; figure, histories and frames in data/
+#   hpcdem movie data
+from hpcdem.cases import UCS
+
+case = UCS(cohesion=10e6, friction=30, tensile_strength=2e6)
+case.build()
+
+# How far do the sides go apart?
+for name, x in (('left', 0), ('right', case.width)):
+    pcdc history create '[name]' node nearest ([x],[case.height/2]) value displacement-x every 500
+
+result = case.load()
+bulge = pcdc.history('right')[-1, 2] - pcdc.history('left')[-1, 2]
+print('at the end it is %.2f mm wider than at the beginning' % (1e3 * bulge))

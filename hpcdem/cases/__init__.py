@@ -1,0 +1,45 @@
+"""Ready-made models: parameters in; a script, a model in the running session, or results out.
+
+::
+
+    from hpcdem.cases import UCS
+
+    case = UCS(width=0.05, cohesion=12e6)
+    case.script()          # the text of a script, complete and readable
+    case.build()           # the model of that script in this run; go on with lines of your own
+    case.load()            # its loading; a small object of results
+    case.run()             # both
+
+What is executed is the text of the script, line by line, so the three cannot differ. `hpcdem case` writes the script.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hpcdem.cases.base import Case
+
+CASES = {
+    "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
+    "tunnel": "Tunnel",
+}  # fmt: skip
+"""Names on the command line, and the classes; a class stands in the module of its name."""
+__all__ = ["CASES", "find", *CASES.values()]
+
+
+def find(name: str) -> type[Case]:
+    """The class of a case by its name on the command line. KeyError if there is none."""
+    return getattr(importlib.import_module(f"hpcdem.cases.{name}"), CASES[name])
+
+
+def __getattr__(name: str) -> Any:
+    for case, made in CASES.items():
+        if name == made:
+            return find(case)
+    raise AttributeError(f"module 'hpcdem.cases' has no attribute '{name}'; it has {', '.join(CASES.values())}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,205 @@
+"""What all cases have: parameters that are checked, the text made from them, and the way it is carried out.
+
+A case is a pydantic model. Its fields become the first lines of the script (``width = 0.052   # m, ...``), except
+choices, which choose between pieces of text. `model` and `loading` are the rest: constant text in which the fields are
+variables.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
+from pydantic.fields import FieldInfo
+
+from hpcdem.errors import CommandError, ScriptError
+
+PACKAGE = str(Path(__file__).resolve().parent.parent)
+DIVIDER = "# ---- {} "
+WIDTH = 100
+"""Characters of a comment line."""
+
+
+def quantity(default: float, unit: str, doc: str, **bounds: Any) -> Any:
+    """A parameter with a unit, which becomes a variable of the script. bounds: gt, ge, lt, le."""
+    return Field(default, description=doc, json_schema_extra={"unit": unit}, **bounds)
+
+
+def choice(default: Any, doc: str) -> Any:
+    """A parameter that chooses between pieces of the script; no variable of it. A truth value or one of several words
+    (Literal), never a free text: it stands in a comment of the script."""
+    return Field(default, description=doc, json_schema_extra={"chooses": True})
+
+
+def unit_of(field: FieldInfo) -> str:
+    """Unit of a parameter, "1" for a pure number."""
+    extra = field.json_schema_extra
+    return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+
+def chooses(field: FieldInfo) -> bool:
+    """Does it choose between pieces of text?"""
+    extra = field.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("chooses"))
+
+
+class Case(BaseModel):
+    """Parameters of a model. ScriptError, with the line that gave them, names the one that is wrong.
+
+    name: on the command line and of the files; title: one line; needs: extras of the package that the script wants;
+    result: a dataclass whose fields are variables of the script after `loading`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    needs: ClassVar[str] = ""
+    result: ClassVar[type[Any]]
+
+    _carrier: Any = PrivateAttr(default=None)
+
+    def __init__(self, **given: Any) -> None:
+        try:
+            super().__init__(**given)
+        except ValidationError as error:
+            raise ScriptError(*_place(), explained(type(self), error)) from None
+
+    # ---- text ------------------------------------------------------------------------------------------------------
+
+    def model(self) -> str:
+        """Lines that make the model: mesh, properties, conditions."""
+        raise NotImplementedError
+
+    def loading(self) -> str:
+        """Lines that load it, and say what came of it."""
+        raise NotImplementedError
+
+    def script(self) -> str:
+        """The whole text of a script that runs by itself."""
+        return "".join(self._pieces())
+
+    def _pieces(self) -> tuple[str, str]:
+        """What `build` and what `load` carry out."""
+        head = [f"# {line}".rstrip() for line in self._head()]
+        parameters = [self._parameter(name, field) for name, field in self._variables()]
+        model = "\n".join([*head, "", _divider("parameters"), *parameters, "", _divider("model"), self.model().strip()])
+        return f"{model}\n\n", f"{_divider('loading')}\n{self.loading().strip()}\n"
+
+    def _head(self) -> Iterator[str]:
+        yield f"{self.title}."
+        yield ""
+        yield f"  hpcdem {self.name}.sc       figure, histories and frames in data/, {self.name}.png beside the script"
+        yield "  hpcdem movie data"
+        yield ""
+        yield f"Written by: {self.command()}"
+        yield "SI units, tension is positive." + (f" Needs the extra [{self.needs}]." if self.needs else "")
+
+    def command(self) -> str:
+        """The command line that writes this script."""
+        return " ".join([f"hpcdem case {self.name}", *(_option(name, getattr(self, name)) for name in self._given())])
+
+    def _given(self) -> list[str]:
+        """Parameters that differ from their defaults."""
+        return [name for name, field in type(self).model_fields.items() if getattr(self, name) != field.default]
+
+    def _variables(self) -> Iterator[tuple[str, FieldInfo]]:
+        return ((name, field) for name, field in type(self).model_fields.items() if not chooses(field))
+
+    def _parameter(self, name: str, field: FieldInfo) -> str:
+        unit = unit_of(field)
+        doc = field.description if unit in ("", "1") else f"{unit}, {field.description}"
+        return f"{f'{name} = {number(getattr(self, name))}':30s} # {doc}"
+
+    # ---- in the running session ------------------------------------------------------------------------------------
+
+    def build(self) -> None:
+        """Make the model in this run: a new one, carried out by the script or program that calls. Collective."""
+        self._build(None)
+
+    def load(self) -> Any:
+        """Load the model that `build` made; the results. Collective."""
+        if self._carrier is None:
+            raise ScriptError(*_place(), f"{type(self).__name__}.load: there is no model yet; build() makes it")
+        model, loading = self._pieces()
+        lines = model.count("\n")  # so messages have the lines of the whole script
+        self._carrier.carry_out("\n" * lines + loading)
+        names = self._carrier.names
+        return self.result(**{field.name: names[field.name] for field in dataclasses.fields(self.result)})
+
+    def run(self, outdir: str | Path | None = None) -> Any:
+        """Make the model and load it; the results. Collective.
+
+        outdir: folder for all that is written, for programs that run several cases; without it the folder of the
+        session. In a PCDC script the option --outdir says it.
+        """
+        self._build(outdir)
+        result = self.load()
+        if outdir is not None:
+            self._carrier.close()
+        return result
+
+    def _build(self, outdir: str | Path | None) -> None:
+        from hpcdem.cases.running import Carrier
+
+        try:
+            self._carrier = Carrier(f"{self.name}.sc", outdir)
+        except CommandError as error:
+            raise ScriptError(*_place(), f"{type(self).__name__}.run: {error}") from None
+        self._carrier.carry_out(self._pieces()[0])
+
+
+def explained(kind: type[Case], error: ValidationError) -> str:
+    """What is wrong with the parameters, the first of them."""
+    first = error.errors()[0]
+    if not first["loc"]:  # several that do not go together
+        return f"{kind.__name__}: {first['msg'].removeprefix('Value error, ')}"
+    name = str(first["loc"][0])
+    known = kind.model_fields
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"; did you mean '{near[0]}'?" if near else ""
+        return f"{kind.__name__} has no parameter '{name}'{hint} There are {', '.join(known)}"
+    unit = unit_of(known[name])
+    what = known[name].description if unit in ("", "1") else f"{known[name].description}, {unit}"
+    expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ").split(", unable")[0]
+    return f"{kind.__name__}: {name} is {first['input']}, expected {expected} ({what})"
+
+
+def number(value: Any) -> str:
+    """A value as a script has it: 0.052, 2700, 30e9, 5e-6. Reads back as the same number."""
+    if isinstance(value, bool) or not isinstance(value, float):
+        return repr(value)
+    size = abs(value)
+    if size == 0.0 or 1e-3 <= size < 1e5:
+        text = f"{value:.12g}"
+    else:
+        power = 3 * math.floor(math.log10(size) / 3)
+        text = f"{value / 10.0**power:.12g}e{power}"
+    return text if float(text) == value else repr(value)
+
+
+def _option(name: str, value: Any) -> str:
+    word = name.replace("_", "-")
+    if isinstance(value, bool):
+        return f"--{word}" if value else f"--no-{word}"
+    return f"--{word} {shlex.quote(value) if isinstance(value, str) else number(value)}"
+
+
+def _divider(title: str) -> str:
+    return DIVIDER.format(title).ljust(WIDTH, "-")
+
+
+def _place() -> tuple[str, int]:
+    """File and line of the script or program that is being carried out."""
+    frame: Any = sys._getframe(1)
+    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame = frame.f_back
+    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
