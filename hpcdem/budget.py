@@ -21,8 +21,10 @@ from hpcdem.physics.exact_sum import BINS_SHAPE, as_integer, from_integer
 from hpcdem.simulation import Simulation
 
 COMMANDS, BOX = energy.FLOWS, energy.FLOWS + 1
-ACCOUNTS = energy.FLOWS + 2
-"""Flows of the kernels, then stored energy changed by commands, and gone with particles that left the BOX."""
+BLOCKS = energy.FLOWS + 2
+ACCOUNTS = energy.FLOWS + 3
+"""Flows of the kernels, then stored energy changed by commands, gone with particles that left the BOX, and work done by
+blocks that touch the particles."""
 EMPTIED = 512
 """Steps after which bins are emptied into integers: long before they are full."""
 
@@ -38,8 +40,8 @@ class Energy:
     """All in joules but `relative`. Flows count since the start of the account: work_* was done on the model, loss_* it
     lost, commands and box came with commands and with particles deleted by the BOX.
 
-    closing: change of what is stored + losses - work - commands - box; relative: that over the largest flow (over what
-    is stored, where nothing flowed).
+    closing: change of what is stored + losses - work - commands - box; relative: that over the largest flow (over
+    what is stored, where nothing flowed).
     """
 
     kinetic_translation: float
@@ -58,12 +60,13 @@ class Energy:
     loss_stiffness: float
     commands: float
     box: float
+    work_blocks: float
     closing: float
     relative: float
 
 
 NAMES = tuple(f.name for f in fields(Energy))
-SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1)
+SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1)
 """Whether an account raises what is stored."""
 
 
@@ -167,6 +170,10 @@ class Budget:
         relative = closing / scale if scale else 0.0
         return Energy(*[from_integer(v) for v in (*now, *flows, closing)], relative)  # type: ignore[call-arg]
 
+    def add_from_blocks(self, work: int) -> None:
+        """Book work that blocks did on particles, this rank's share, as an integer of exact_sum.as_integer."""
+        self.accounts[BLOCKS] += work
+
     # ---- checkpoints -----------------------------------------------------------------------------------------------
 
     def state(self, sim: Simulation) -> dict[str, Any]:
@@ -190,7 +197,8 @@ class Budget:
         def share(numbers: list[str]) -> list[int]:
             return [int(v, 16) if first else 0 for v in numbers]
 
-        budget.accounts, budget.left = share(state["accounts"]), share(state["left"])
+        missing = ["0x0"] * (ACCOUNTS - len(state["accounts"]))  # in files of earlier versions
+        budget.accounts, budget.left = share([*state["accounts"], *missing]), share(state["left"])
         budget.start = None if state["start"] is None else share(state["start"])
         budget.running, budget.finite = state["running"], state["finite"]
         return budget

@@ -241,7 +241,11 @@ def tell_energy(sim: Simulation) -> None:
     seen = sim.energy.look(sim)
     if sim.log is None:
         return
-    rows = [(words, f"{getattr(seen, name):.6g}") for name, words in ENERGY_WORDS.items()]
+    rows = [
+        (words, f"{getattr(seen, name):.6g}")
+        for name, words in ENERGY_WORDS.items()
+        if name != "work_blocks" or seen.work_blocks
+    ]
     sim.log.table("energy budget", ("energy", "J"), rows)
     sim.log.info(
         f"energy: closing error {seen.closing:.4g} J, {seen.relative:.2g} of the largest flow "
@@ -266,6 +270,7 @@ ENERGY_WORDS = {
     "loss_stiffness": "lost by change of shear stiffness",
     "commands": "brought by commands",
     "box": "brought by leaving the BOX",
+    "work_blocks": "work of blocks that touch particles",
     "closing": "closing error",
 }
 """What the table at the end calls the columns of energy.csv."""

@@ -41,7 +41,7 @@ from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
 from hpcdem.physics.dem.contacts import LONGEST2
 from hpcdem.physics.dem.neighbours import Histories
-from hpcdem.runtime import run_folder
+from hpcdem.runtime.checkpoints import newest_first
 from hpcdem.simulation import Lattice, Simulation
 
 
@@ -49,12 +49,12 @@ def save(sim: Simulation, path: Path | str) -> None:
     """SAV: write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
     began = time.perf_counter()
     with sim.timers("checkpoint"):
-        checkpoint.write(path, _state(sim), _tables(sim), sim.comm)
+        checkpoint.write(path, state_of(sim), tables_of(sim), sim.comm)
     if sim.stop is not None:
         sim.stop.saved(time.perf_counter() - began)
 
 
-def _state(sim: Simulation) -> dict[str, Any]:
+def state_of(sim: Simulation) -> dict[str, Any]:
     """Everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
     closed = sim.closed
     longest2 = np.array([sim.lists.longest_bond2() if closed else sim._longest2])
@@ -89,7 +89,8 @@ def _state(sim: Simulation) -> dict[str, Any]:
     }
 
 
-def _tables(sim: Simulation) -> dict[str, Table]:
+def tables_of(sim: Simulation) -> dict[str, Table]:
+    """The per-particle tables of the state, as slabs. Collective."""
     p = sim.particles
     columns = {name: p[name].copy() for name in FIELDS}
     if sim.closed:
@@ -169,15 +170,17 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     if sim.comm.rank == 0:
         try:
             found = checkpoint.read(path)
+            if "kind" in found[0]:
+                raise HpcdemError(f"{path} is a checkpoint, but not one of particles: a PCDC script can restore it")
         except HpcdemError as problem:
-            error = str(problem)
+            found, error = None, str(problem)
     try:
         sim.comm.agree(error)
     except HpcdemError as problem:
         raise CommandError(str(problem)) from None
     state = sim.comm.bcast(None if found is None else json.dumps(found[0]))
     state = json.loads(state)
-    _apply(sim, state, found[1] if found is not None else None)
+    apply_state(sim, state, found[1] if found is not None else None)
     return {name: state[name] for name in ("script", "position", "progress")}
 
 
@@ -188,7 +191,7 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
     earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
     the log and the one before it is tried.
     """
-    found, damaged = checkpoints(folders) if sim.comm.rank == 0 else ([], [])
+    found, damaged = newest_first(folders) if sim.comm.rank == 0 else ([], [])
     for error in damaged if sim.log is not None else []:
         sim.log.warn(f"{error}; it is passed over")
     for path in sim.comm.bcast(found):
@@ -207,31 +210,8 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
     return None
 
 
-def checkpoints(folders: list[Path]) -> tuple[list[Path], list[str]]:
-    """The checkpoints of the runs that wrote last into some folders, the newest first, and what is wrong with those of
-    which not even the state can be read. Tables are not looked at. Not collective."""
-    ranked, damaged = [], []
-    for folder in dict.fromkeys(path.resolve() for path in folders):
-        try:
-            record = run_folder.read(folder)
-        except HpcdemError as error:
-            record = None
-            damaged.append(str(error))
-        for path in sorted(folder.glob("*.sav")):
-            if run_folder.is_older(path, record):
-                continue
-            try:
-                state = checkpoint.read_state(path)
-                place = int(state.get("position") or 0), int(state["clock"]["step"]), path.stat().st_mtime_ns
-            except (HpcdemError, OSError, KeyError, TypeError, ValueError) as error:
-                text = str(error) if isinstance(error, HpcdemError) else f"{path} is damaged: {error!r}"
-                damaged.append(text)
-            else:
-                ranked.append((place, path))
-    return [path for _, path in sorted(ranked, reverse=True)], damaged
-
-
-def _apply(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+    """Take a state that was read; tables: on rank 0, else None. Collective."""
     sim.clear()
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])

@@ -102,6 +102,7 @@ class Simulation:
         self.keep = 0  # numbered checkpoints that are kept, 0: all
         self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
+        self.coupled = False  # to blocks, which step them both (hpcdem/coupled)
         self.goes_on_with = "--resume"
         self.draws = False
         self.balance_on = balance_on

@@ -15,6 +15,7 @@ FORMATS = ("vtkhdf", "dat")
 """Formats that can be read, the preferred one first."""
 
 _NAME = re.compile(r"all_(\d+)(_ini)?\.(\w+)")
+_MESH_NAME = re.compile(r"(.+)_(\d{10,})\.vtkhdf")
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,26 @@ def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
             key = int(found[1]), found[2] is not None
             best[key] = min(best.get(key, (len(FORMATS), "")), (FORMATS.index(found[3]), name))
     return [FrameFile(Path(folder) / name, step, ini) for (step, ini), (_, name) in sorted(best.items())]
+
+
+def list_mesh_frames(folder: str | os.PathLike, stem: str | None = None) -> list[FrameFile]:
+    """The frames of blocks in a folder, `<stem>_<step>.vtkhdf`, in the order of steps; without a stem those of the name
+    that most of them have. Raises HpcdemError if the folder cannot be read, or has none of this name."""
+    from hpcdem.io.vtkhdf_mesh import is_mesh_frame
+
+    try:
+        names = os.listdir(folder)
+    except OSError as failure:
+        raise HpcdemError(f"cannot read the folder {os.fspath(folder)}: {failure.strerror}") from None
+    found: dict[str, list[FrameFile]] = {}
+    for name in sorted(names):
+        parts = _MESH_NAME.fullmatch(name)
+        if parts and (stem is None or parts[1] == stem) and is_mesh_frame(Path(folder) / name):
+            found.setdefault(parts[1], []).append(FrameFile(Path(folder) / name, int(parts[2]), False))
+    if stem is not None and not found:
+        raise HpcdemError(f"no frame {stem}_*.vtkhdf of blocks in {os.fspath(folder)}")
+    most = max(found, key=lambda name: len(found[name]), default=None)
+    return sorted(found[most], key=lambda file: file.step) if most is not None else []
 
 
 def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:

@@ -11,6 +11,7 @@ import numpy as np
 from hpcdem.errors import HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.frames import read_frame
+from hpcdem.io.vtkhdf_mesh import is_mesh_frame, read_mesh_frame
 
 Facts = dict[str, Any]
 """JSON values by name; always "kind", "whole" (bool) and "why" (what is wrong)."""
@@ -41,6 +42,8 @@ def of_file(path: Path) -> Facts:
 
 def _checkpoint(path: Path) -> Facts:
     state, tables = checkpoint.read(path)
+    if "kind" in state:
+        return _of_blocks(path, state, tables)
     try:
         clock, progress = state["clock"], state["progress"]
         facts: Facts = {
@@ -58,7 +61,46 @@ def _checkpoint(path: Path) -> Facts:
     return facts
 
 
+def _of_blocks(path: Path, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
+    """A checkpoint of a PCDC script."""
+    try:
+        clock, extra = state["clock"], state["extra"]
+        project, run = extra["project"], extra.get("run") or {}
+        facts: Facts = {
+            "whole": True, "version": checkpoint.version_of(path), "step": int(clock["step"]),
+            "time": float(clock["time"]), "dt": float(clock["dt"]),
+        }  # fmt: skip
+        if "mesh_cells" in tables:
+            faces = tables["faces"]
+            facts["elements"] = int(tables["elements"]["alive"].sum())
+            facts["nodes"] = len(tables["mesh_points"]["x"])
+            facts["joints"] = int(((faces["joint_row"] > 0) & (faces["partner"] > np.arange(len(faces["open"])))).sum())
+            facts["broken"] = int((faces["broken"] > 0).sum())
+        facts["groups"] = {kind: {name: list(of) for name, of in sets.items()} for kind, sets in _groups(project)}
+        facts["histories"] = list(project["histories"])
+        facts["names"] = [name for part in (extra.get("names") or {}).values() for name in part]
+        if run.get("at"):
+            facts["at"] = str(run["at"])
+        if run.get("progress"):
+            facts["inside"] = f"a run, {clock['step'] - run['progress']['first']} steps done"
+    except (KeyError, TypeError, ValueError, AttributeError) as problem:
+        raise HpcdemError(f"{path} is damaged: {problem!r}") from None
+    return facts
+
+
+def _groups(project: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    return [(kind, sets) for kind, sets in project["groups"].items() if sets]
+
+
 def _frame(path: Path) -> Facts:
+    if path.suffix == ".vtkhdf" and is_mesh_frame(path):
+        state = read_mesh_frame(path)
+        return {
+            "kind": "frame of blocks", "whole": True, "step": state.step, "time": state.time, "dt": state.dt,
+            "elements": len(state.cells), "joints": len(state.joints),
+            "broken": int((state.of_joints.get("state", np.empty(0)) == 3.0).sum()),
+            "groups": {name.removeprefix("group_"): list(names) for name, names in state.group_names.items()},
+        }  # fmt: skip
     frame = read_frame(path)
     return {
         "whole": True, "step": frame.step, "time": frame.time, "dt": frame.dt,

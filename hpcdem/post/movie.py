@@ -20,6 +20,7 @@ FASTEST_GIF = 50.0
 _PAGE = re.compile(r"(\D*)(\d+)(_ini)?(.*)\.jpe?g", re.IGNORECASE)
 _SAMPLES = 8
 _EXACT = 160
+_RIMS = 0.0, 0.35, 0.65
 
 
 def pages(folder: str | os.PathLike) -> list[Path]:
@@ -39,14 +40,18 @@ def pages(folder: str | os.PathLike) -> list[Path]:
     return [Path(folder) / name for _, _, name in sorted(kinds[most])]
 
 
-def write_gif(pictures: Sequence[Path], path: str | os.PathLike, fps: float, width: int | None = None) -> Path:
+def write_gif(
+    pictures: Sequence[Path], path: str | os.PathLike, fps: float, width: int | None = None, keep: Sequence[str] = ()
+) -> Path:
     """An animated GIF that runs for ever. Raises HpcdemError.
+
+    keep: colours "#rrggbb" of thin lines, which are kept however few their pixels are.
 
     width: of the film [pixels], by default that of the widest picture. One palette for all frames, in which the
     colours of particles are exact. A frame that equals the one before makes that one last longer.
     """
     size = film_size(pictures, width)
-    palette = _palette([_fitted(p, size) for p in _some(pictures)])
+    palette = _palette([_fitted(p, size) for p in _some(pictures)], keep)
     frames = (_indexed(_fitted(p, size), palette) for p in pictures)
     # GIFs count in hundredths of a second; rounding the ends and not the lengths keeps the film as long as it is.
     ends = np.rint(100.0 / min(fps, FASTEST_GIF) * np.arange(len(pictures) + 1)).astype(int)
@@ -162,21 +167,26 @@ def _some(pictures: Sequence[Path]) -> list[Path]:
     return [pictures[k] for k in chosen]
 
 
-def _palette(images: Sequence[Any]) -> np.ndarray:
-    """The palette (256, 3) of a film: the most frequent colours as they are, the others by their median."""
+def _palette(images: Sequence[Any], keep: Sequence[str] = ()) -> np.ndarray:
+    """The palette (256, 3) of a film: `keep` and their shades at the rims of lines, the most frequent colours as they
+    are, the others by their median."""
     from PIL import Image
 
+    lines = np.array([[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in keep]).reshape(-1, 3)
+    shades = np.concatenate([lines + (255 - lines) * part for part in _RIMS]).round().astype(np.uint8)
+    room = 256 - len(shades)
     pixels = np.concatenate([np.asarray(image).reshape(-1, 3) for image in images])
     codes = _codes(pixels)
     found, counts = np.unique(codes, return_counts=True)
     order = np.lexsort((found, -counts))
-    exact, others = found[order[:_EXACT]], found[order[_EXACT:]]
+    exact, others = found[order[: min(_EXACT, room)]], found[order[min(_EXACT, room) :]]
     colours = _colours(exact)
-    if len(others):
+    if len(others) and room > len(exact):
         rest = Image.fromarray(np.ascontiguousarray(pixels[np.isin(codes, others)][None, :, :]))
-        cut = rest.quantize(256 - len(exact), method=Image.Quantize.MEDIANCUT)
-        middle = np.array(cut.getpalette(), np.uint8).reshape(-1, 3)[: 256 - len(exact)]
+        cut = rest.quantize(room - len(exact), method=Image.Quantize.MEDIANCUT)
+        middle = np.array(cut.getpalette(), np.uint8).reshape(-1, 3)[: room - len(exact)]
         colours = np.concatenate([colours, middle])
+    colours = np.concatenate([colours, shades])
     return np.concatenate([colours, np.repeat(colours[-1:], 256 - len(colours), axis=0)])
 
 

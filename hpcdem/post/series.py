@@ -14,6 +14,7 @@ from typing import Any
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io.axes import View
+from hpcdem.post import blocks
 from hpcdem.post.plots import Style, plot_file
 
 Report = Callable[[str], None]
@@ -26,7 +27,7 @@ class Job:
 
     source: Path
     picture: Path
-    style: Style
+    style: Style | blocks.Looks
     seen: View | None = None
 
 
@@ -81,7 +82,10 @@ def _alone() -> None:
 def _draw(job: Job) -> str | None:
     """Draw; what went wrong, or None."""
     try:
-        plot_file(job.source, job.picture, job.style, job.seen)
+        if isinstance(job.style, blocks.Looks):
+            blocks.plot_file(job.source, job.picture, job.style, job.seen)
+        else:
+            plot_file(job.source, job.picture, job.style, job.seen)
     except HpcdemError as failure:
         text = str(failure)
         return text if job.source.name in text or job.picture.name in text else f"{job.source}: {text}"

@@ -222,14 +222,14 @@ class Log:
 
     # -- the end ---------------------------------------------------------------------------------------------
 
-    def stages(self, timers: Timers, comm: Any) -> Summary:
-        """Collective: the table of stages."""
+    def stages(self, timers: Timers, comm: Any, body: str = "particle") -> Summary:
+        """Collective: the table of stages. body: what the timers count, "particle" or "element"."""
         summary = timers.merge(comm)
         if not self._speaks:
             return summary
         self.command_finished()
         self.table("", HEADINGS, stage_rows(summary))
-        self._print(closing_line(summary))
+        self._print(closing_line(summary, body))
         return summary
 
     def table(self, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -285,13 +285,13 @@ def aligned(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines)
 
 
-def closing_line(summary: Summary) -> str:
+def closing_line(summary: Summary, body: str = "particle") -> str:
     """Totals: wall time, steps, rates, imbalance."""
     wall = max(summary.wall, 1e-9)
     parts = [
         f"{summary.steps} steps in {duration(summary.wall)}",
         f"{rate(summary.steps / wall)} steps/s",
-        f"{rate(summary.particle_steps / wall)} particle-steps/s",
+        f"{rate(summary.particle_steps / wall)} {body}-steps/s",
     ]
     if summary.ranks > 1:
         parts.append(f"imbalance of {summary.ranks} ranks {summary.imbalance:.2f}")

@@ -4,7 +4,7 @@
 
 | key | |
 |---|---|
-| `script`, `language`, `arguments` | what was started: absolute path, "zdem" or "python", words for a Python program |
+| `script`, `language`, `arguments` | what was started: absolute path, "zdem", "pcdc" or "python", further words |
 | `version`, `ranks`, `threads`, `began` | by what, on how many, when (UTC) |
 | `state`, `step` | "running", "stopped" (with a checkpoint), "failed", "done"; step at that moment |
 | `older` | checkpoints that another run had left: name -> [bytes, time of change in ns] |
@@ -40,7 +40,7 @@ _held: dict[Path, FolderLock] = {}
 
 @dataclass(frozen=True)
 class Job:
-    """What was started. script: path as given, "" for a Python session; language: "zdem", "python" or ""."""
+    """What was started. script: path as given, "" for a Python session; language: "zdem", "pcdc", "python" or ""."""
 
     script: str = ""
     language: str = ""

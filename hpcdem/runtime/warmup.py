@@ -31,14 +31,18 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None]) -> Path:
+def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None], kind: str = "") -> Path:
     """Collective: load or compile all kernels (by calling `warm`); returns the cache folder of this rank.
+
+    kind: "" for those of particles, "blocks" for those of blocks, "coupled" for what both together need besides; they
+    have folders of their own.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
     a folder has still to be filled, one rank of each machine type goes first, then one of each host, then the rest,
     so that nothing is compiled twice on a shared file system and each local disk gets its copy.
     """
     folder, writable = cache_folder()
+    folder = folder.with_name(f"{folder.name}-{kind}") if kind else folder
     ranks = comm.allgather((socket.gethostname(), folder.name, folder.is_dir()))
     host, key, _ = ranks[comm.rank]
     if all(ready for *_, ready in ranks):
@@ -147,15 +151,16 @@ def cache_key() -> str:
     """Name of a cache folder: all that compiled code depends on.
 
     numba compares the source file of a kernel, but not of the functions that are inlined into it, and knows nothing
-    of constants: hence the digest over the sources of all kernels and of those who call them. A run with threads has
-    kernels of its own, and a folder must be complete when it gets its name: hence a folder for runs with one thread
-    and one for runs with more.
+    of constants: hence the digest over the sources of all kernels and of those who call them. It keeps kernels apart by
+    the place of their source, and so does the digest: the folder of one copy of hpcdem would look complete to another
+    one, and many ranks would fill it at once. A run with threads has kernels of its own, and a folder must be complete
+    when it gets its name: hence a folder for runs with one thread and one for runs with more.
     """
     import llvmlite.binding as llvm
     import numba
 
-    digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256(str(package).encode() + b"\0")
     for source in kernel_sources(package):
         digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
     features = llvm.get_host_cpu_features().flatten()
@@ -178,7 +183,8 @@ def kernel_sources(package: Path) -> list[Path]:
         found |= more
         wanted += more
     callers = {path for path, used in imports.items() if used & kernels}
-    return sorted(found | callers | {package / "commands" / "rehearsal.py"})  # what it calls is what the folder holds
+    rehearsals = {package / folder / "rehearsal.py" for folder in ("commands", "commands/blocks", "blocks", "coupled")}
+    return sorted(found | callers | rehearsals)  # what they call is what the folders hold
 
 
 def _imported(text: str, package: Path) -> set[Path]:
@@ -210,11 +216,12 @@ def tidy(folder: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
-def warmup(log: Log, warm: Callable[[], None]) -> Path:
-    """Compile for later runs, as on a login node: `hpcdem warmup`."""
+def warmup(log: Log, warm: Callable[[], None], kind: str = "") -> Path:
+    """Compile for later runs, as on a login node: `hpcdem warmup`. Particles or blocks in a process: numba settles the
+    folder of a kernel once."""
     from hpcdem.halo.comm import SerialComm
 
     began = time.monotonic()
-    folder = prepare_kernels(SerialComm(), log, warm)
+    folder = prepare_kernels(SerialComm(), log, warm, kind)
     log.info(f"kernels ready in {time.monotonic() - began:.1f} s: {folder}")
     return folder

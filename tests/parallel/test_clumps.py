@@ -14,6 +14,7 @@ import pytest
 from tests.clumped import write_lattice
 from tests.conftest import Launcher
 from tests.short_push import assert_same_files, contents
+from tests.ways import WAYS, ways
 
 SCRIPT = """\
 START
@@ -46,16 +47,6 @@ BOND break RANGE x 150.0 200.0
 IMPLE wall id 1 xmove 15.0 print 5.0 save 5.0
 STOP
 """
-
-CASES = {
-    "2 ranks": (2, []),
-    "3 ranks": (3, []),
-    "4 ranks": (4, []),
-    "3 ranks, borders stay": (3, ["--no-balance"]),
-    "2 threads": (1, ["-j", "2"]),
-    "3 threads": (1, ["-j", "3"]),
-    "2 ranks x 2 threads": (2, ["-j", "2"]),
-}
 
 
 def run(launch: Launcher, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
@@ -92,15 +83,23 @@ def test_the_model_is_worth_comparing(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ways({"3 ranks", "4 ranks", "2 threads"}))
 def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
-    ranks, options = CASES[case]
+    ranks, options = WAYS[case]
     run(launch, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("checkpoint", "ranks"), [("first", 3), ("middle", 1), ("middle", 2), ("last", 4)])
+@pytest.mark.parametrize(
+    ("checkpoint", "ranks"),
+    [
+        ("first", 3),
+        pytest.param("middle", 1, marks=pytest.mark.slow),
+        ("middle", 2),
+        pytest.param("last", 4, marks=pytest.mark.slow),
+    ],
+)
 def test_resumed_run_equals_the_uninterrupted_one(
     reference: Path, launch: Launcher, tmp_path: Path, ranks: int, checkpoint: str
 ) -> None:

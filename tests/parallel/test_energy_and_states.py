@@ -64,7 +64,17 @@ def test_the_log_tells(one: tuple[Path, str]) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("ranks", "threads"), [(2, 1), (3, 1), (4, 1), (1, 2), (1, 3), (2, 2)])
+@pytest.mark.parametrize(
+    ("ranks", "threads"),
+    [
+        (2, 1),
+        pytest.param(3, 1, marks=pytest.mark.slow),
+        (4, 1),
+        (1, 2),
+        pytest.param(1, 3, marks=pytest.mark.slow),
+        (2, 2),
+    ],
+)
 def test_the_same_on_any_ranks_and_threads(
     one: tuple[Path, str], launch: Launcher, tmp_path: Path, ranks: int, threads: int
 ) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from tests.conftest import Launcher
 from tests.short_push import assert_same_files, contents
+from tests.ways import WAYS, ways
 
 BUSY = """\
 START
@@ -41,16 +42,6 @@ BOND break range x 0.0 1500.0
 IMPLE wall id 1 xmove 80.0 save 32.0
 STOP
 """
-
-CASES = {
-    "2 ranks": (2, []),
-    "3 ranks": (3, []),
-    "4 ranks": (4, []),
-    "3 ranks, borders stay": (3, ["--no-balance"]),
-    "2 threads": (1, ["-j", "2"]),
-    "3 threads": (1, ["-j", "3"]),
-    "2 ranks x 2 threads": (2, ["-j", "2"]),
-}
 
 
 def busy(launch: Launcher, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
@@ -82,9 +73,9 @@ def test_the_model_is_busy(reference: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", ways({"2 ranks", "4 ranks", "3 ranks, borders stay", "2 ranks x 2 threads"}))
 def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
-    ranks, options = CASES[case]
+    ranks, options = WAYS[case]
     busy(launch, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 

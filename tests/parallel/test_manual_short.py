@@ -18,6 +18,7 @@ import pytest
 from hpcdem.io.frames import list_frames, read_frame
 from tests.conftest import Launcher
 from tests.short_push import assert_same_files, contents
+from tests.ways import WAYS, ways
 
 CHAINS: dict[str, dict[str, str | None]] = {
     "push": {
@@ -37,20 +38,15 @@ CHAINS: dict[str, dict[str, str | None]] = {
 }
 """Scripts in the order in which they run, and the file each of them needs."""
 
+QUICK = {("push", 4), ("pre_struct", 2), ("push_add_del", 2)}
+"""Chains and numbers of ranks of the quick tests; those on one rank run all of them."""
+
 LAST_STEP = {
     "push": 8_000, "syn_erosion": 10_000, "syn_sedimentaion": 10_600, "pre_struct": 5_000, "detachment": 6_000,
     "palaeohigh": 6_000, "ex8_dem_am_gen": 6_500, "ex8_dem_am_push": None, "extens_rigid": 15_400,
     "extens_ductile_patent": 6_900, "push_add_del": 12_600,
 }  # fmt: skip
 """By CYC, and by the way and speed of the wall; None: it depends on the time step that is found."""
-
-OTHER_WAYS = {
-    "3 ranks": (3, []),
-    "3 ranks, borders stay": (3, ["--no-balance"]),
-    "2 threads": (1, ["-j", "2"]),
-    "3 threads": (1, ["-j", "3"]),
-    "2 ranks x 2 threads": (2, ["-j", "2"]),
-}
 
 
 def run_script(launch: Launcher, script: Path, folder: Path, needs: Path | None, ranks: int, *options: str) -> None:
@@ -87,8 +83,14 @@ def on_one_rank(manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, 4])
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize(
+    ("chain", "ranks"),
+    [
+        pytest.param(chain, ranks, marks=() if (chain, ranks) in QUICK else pytest.mark.slow)
+        for chain in CHAINS
+        for ranks in (2, 4)
+    ],
+)
 def test_same_files_on_more_ranks(
     on_one_rank: Callable[[str], Path], manual_scripts: Path, tmp_path: Path, chain: str, ranks: int
 ) -> None:
@@ -99,11 +101,11 @@ def test_same_files_on_more_ranks(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("case", OTHER_WAYS)
+@pytest.mark.parametrize("case", ways({"2 threads", "2 ranks x 2 threads"}))
 def test_same_push_however_it_is_run(
     on_one_rank: Callable[[str], Path], manual_scripts: Path, launch: Launcher, tmp_path: Path, case: str
 ) -> None:
-    ranks, options = OTHER_WAYS[case]
+    ranks, options = WAYS[case]
     run_script(launch, manual_scripts / "short" / "push.py", tmp_path / "push", None, ranks, *options)
     assert_same_files(on_one_rank("push") / "push", tmp_path / "push")
     shutil.rmtree(tmp_path / "push")

@@ -106,17 +106,50 @@ def test_a_missing_script_is_said_once(launch, tmp_path):
     assert done.returncode == 2 and done.stderr.count("no such script") == 1
 
 
-def test_a_pcdc_script_is_refused_by_name(launch, tmp_path):
-    (tmp_path / "a.py").write_text("pcdc block create\n")
-    done = launch(1, "a.py", cwd=tmp_path, timeout=60)
-    assert done.returncode == 2 and "hpcdem: a.py: this is a PCDC script" in done.stderr
+def test_a_pcdc_script_is_read_whole_before_anything_runs(launch, tmp_path):
+    (tmp_path / "a.sc").write_text("open('ran', 'w')\nfor i in range(3):\n    pcdc block create\n")
+    done = launch(1, "a.sc", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and "hpcdem: a.sc:3: pcdc block create: read 'block'" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
+
+
+def test_a_pcdc_script_is_checked_without_running_it(launch, tmp_path):
+    lines = ["import math", "open('ran', 'w')", "pcdc model new", "for i in range(3):",
+             "    pcdc geometry create circle ([i],0) 1 as-layer 'hole'",
+             "pcdc mesh create from-layer 'whole' size 0.5"]  # fmt: skip
+    (tmp_path / "a.sc").write_text("\r\n".join(lines))
+    done = launch(1, "--check", "a.sc", cwd=tmp_path, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "a.sc: 3 commands read, nothing was run" in done.stdout and "1 geometry create circle" in done.stdout
+    assert "warning: line 6: no line makes the geometry layer 'whole'" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["a.sc"]
+
+
+def test_a_pcdc_script_without_a_checkpoint_starts_at_the_beginning(launch, tmp_path):
+    (tmp_path / "a.sc").write_text("pcdc model new\n")
+    done = launch(1, "--resume", "a.sc", cwd=tmp_path, timeout=600)
+    assert done.returncode == 0 and "no checkpoint in data: starting at the beginning" in done.stdout
+
+
+def test_a_return_outside_of_a_function_is_found_before_the_run(launch, tmp_path):
+    (tmp_path / "a.sc").write_text("pcdc model new\nreturn 3\n")
+    done = launch(1, "--check", "a.sc", cwd=tmp_path, timeout=60)
+    assert (
+        done.returncode == 2 and "hpcdem: a.sc:2: return 3: this is not correct Python: 'return' outside" in done.stderr
+    )
+
+
+@pytest.mark.mpi
+def test_the_console_is_for_one_rank(launch, tmp_path):
+    done = launch(2, "console", cwd=tmp_path, timeout=60)
+    assert done.returncode == 2 and done.stderr.count("hpcdem console is for one rank") == 1
 
 
 @pytest.mark.parametrize("option", ["--check", "--resume"])
 def test_options_for_zdem_scripts_are_refused_for_python(launch, tmp_path, option):
     (tmp_path / "a.py").write_text("import hpcdem\n")
     done = launch(1, option, "a.py", cwd=tmp_path, timeout=60)
-    assert done.returncode == 2 and f"hpcdem: a.py: {option} is for ZDEM scripts" in done.stderr
+    assert done.returncode == 2 and f"hpcdem: a.py: {option} is for ZDEM and PCDC scripts" in done.stderr
 
 
 def test_a_zdem_script_takes_no_arguments(launch, tmp_path):

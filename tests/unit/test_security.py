@@ -35,10 +35,18 @@ KNOWN = {
     # The user's own program, `hpcdem study.py`.
     ("cli/run.py", "exec"),
     ("cli/run.py", "compile"),
+    # The user's own script in the language PCDC, `hpcdem blast.sc`, and what he types into the console. The functions
+    # that model restore brings back are checked to be plain defs (lang/pcdc/names.py), which do nothing when made.
+    ("lang/pcdc/execute.py", "exec"),
+    ("lang/pcdc/execute.py", "compile"),
+    ("lang/pcdc/check.py", "compile"),
+    ("lang/pcdc/console.py", "import codeop"),
     # Modules of this package, by names from its own tables.
     ("__init__.py", "importlib.import_module"),
+    ("cases/__init__.py", "importlib.import_module"),
     ("cli/__init__.py", "importlib.import_module"),
     ("lang/zdem/execute.py", "importlib.import_module"),
+    ("lang/pcdc/execute.py", "importlib.import_module"),
     ("runtime/doctor/__init__.py", "importlib.import_module"),
     # Handed to the doctor as the way to load the packages that it names.
     ("runtime/doctor/scene.py", "importlib.import_module"),
@@ -48,7 +56,8 @@ KNOWN = {
     ("page/maker.py", "zipfile.ZipFile"),
     # This Python with a module of this package; requests reach it as JSON in a pipe.
     ("page/worker.py", "subprocess.Popen"),
-    # Programs with a list of words, never through a shell.
+    # Programs with a list of words, never through a shell; the first is this one, for another set of kernels.
+    ("cli/__init__.py", "subprocess.run"),
     ("post/movie.py", "subprocess.Popen"),
     ("runtime/stopping.py", "subprocess.run"),
     ("runtime/doctor/scene.py", "subprocess.run"),

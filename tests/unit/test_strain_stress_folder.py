@@ -304,7 +304,7 @@ try:
     work(comm, Log(comm.rank), strain_stress.make_context("hpcdem", sys.argv[2:]).params)
 except HpcdemError as error:
     comm.barrier()
-    print(f"rank {comm.rank}: {error}")
+    print(f"rank {comm.rank}: {error}\\n", end="")
 """
 
 

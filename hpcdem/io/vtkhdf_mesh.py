@@ -1,0 +1,220 @@
+"""Frames of blocks as VTKHDF UnstructuredGrid 2.0, opened by ParaView and pyvista as they are.
+
+Points are the corners of the elements, element by element (z = 0): where joints open, corners that began as one point
+part. Cells are the elements in the order of their numbers (VTK_TRIANGLE, VTK_QUAD), then the joints (VTK_LINE, along
+the edge of their lower face). The cell data `cell` tells them apart; what one of them does not have is NaN, or -1 for
+whole numbers.
+
+Format: VTK File Formats, section VTKHDF, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io import h5
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import find_rows
+
+ELEMENT, JOINT = 0, 1
+"""Values of the cell data `cell`."""
+_LINE, _TRIANGLE, _QUAD = 3, 5, 9
+
+
+@dataclass
+class MeshFrame:
+    """One output time of a model of blocks, as slabs in ascending order of "number".
+
+    corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
+    columns; joints: number, first, last (corners at their ends) and further columns. group_names: by name of an integer
+    column of the elements what its values stand for.
+    """
+
+    step: int
+    time: float
+    dt: float
+    corners: Table
+    elements: Table
+    joints: Table
+    group_names: Mapping[str, list[str]]
+
+
+@dataclass
+class MeshState:
+    """A whole frame, to be drawn or measured.
+
+    points (n, 2): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles; joints (nj, 2):
+    rows of points at their ends; of_points, of_elements, of_joints: columns by name, vectors (n, 2); group_names as in
+    `MeshFrame`.
+    """
+
+    step: int
+    time: float
+    dt: float
+    points: np.ndarray
+    cells: np.ndarray
+    joints: np.ndarray
+    of_points: dict[str, np.ndarray]
+    of_elements: dict[str, np.ndarray]
+    of_joints: dict[str, np.ndarray]
+    group_names: Mapping[str, list[str]]
+
+
+def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
+    """Collective: the frame with all rows on rank 0, None elsewhere."""
+    parts = comm.gather([table.columns for table in (frame.corners, frame.elements, frame.joints)])
+    if parts is None:
+        return None
+    corners, elements, joints = ({c: np.concatenate([p[k][c] for p in parts]) for c in parts[0][k]} for k in range(3))
+    number = corners["number"]
+    ends = np.stack([np.searchsorted(number, joints[k]) for k in ("first", "last")], axis=1)
+    return MeshState(
+        frame.step, frame.time, frame.dt, np.stack([corners["x"], corners["y"]], axis=1), _cells(elements["corners"]),
+        ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y")}),
+        {k: v for k, v in elements.items() if k != "corners"},
+        {k: v for k, v in joints.items() if k not in ("first", "last")}, frame.group_names,
+    )  # fmt: skip
+
+
+def _cells(sizes: np.ndarray) -> np.ndarray:
+    """(ne, 4) rows of points of elements whose corners lie one after the other."""
+    first = np.cumsum(sizes) - sizes
+    cells = first[:, None] + np.arange(4)
+    cells[sizes < 4, 3] = -1
+    return cells
+
+
+def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Vectors with two components."""
+    return {k: v[:, :2] if v.ndim == 2 else v for k, v in _packed(columns).items()}
+
+
+def is_mesh_frame(path: str | os.PathLike) -> bool:
+    """Whether a file is a frame of blocks; False for what cannot be read, too."""
+    try:
+        with h5.reading(path) as file:
+            return bytes(file["VTKHDF"].attrs["Type"]) == b"UnstructuredGrid" and "hpcdem" in file
+    except (HpcdemError, KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError):
+        return False
+
+
+def read_mesh_frame(path: str | os.PathLike) -> MeshState:
+    """A frame that `write_mesh_frame` wrote. Serial. HpcdemError if it is missing, foreign or damaged."""
+    with h5.reading(path) as file:
+        try:
+            top, about = file["VTKHDF"], file["hpcdem"].attrs
+            types, kind = top["Types"][...], top["CellData/cell"][...]
+            elements, joints = kind == ELEMENT, kind == JOINT
+            n = int(elements.sum())
+            sizes = np.where(types[:n] == _QUAD, 4, 3)
+            ids = top["Connectivity"][...]
+            points = top["Points"][...][:, :2]
+            ends = ids[int(sizes.sum()) :].reshape(-1, 2)
+            whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
+            if not whole or (len(ends) and not 0 <= ends.min() <= ends.max() < len(points)):
+                raise ValueError("cells and points do not belong together")
+            cells = {name: values[...] for name, values in top["CellData"].items()}
+            of_points = {name: values[...] for name, values in top["PointData"].items()}
+            names = {name: [one.decode() for one in values[...]] for name, values in file["hpcdem"].items()}
+            return MeshState(
+                int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends,
+                {k: v[:, :2] if v.ndim == 2 else v for k, v in of_points.items()},
+                {k: v[elements] for k, v in cells.items()}, {k: v[joints] for k, v in cells.items()}, names,
+            )  # fmt: skip
+        except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
+            raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
+
+
+def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any) -> None:
+    """Collective: write the frame to `path` (usually ``*.vtkhdf``). The content does not depend on the number of ranks.
+    Raises HpcdemError on all ranks."""
+    corners, elements, joints = frame.corners, frame.elements, frame.joints
+    keys = [corners.columns["number"]]
+    ends = np.stack([find_rows(comm, keys, [joints.columns[k]]) for k in ("first", "last")], axis=1)
+    lost = "a joint names a corner that is not there" if len(ends) and ends.min() < 0 else None
+    comm.agree(f"cannot write {os.fspath(path)}: {lost}" if lost else None)
+    sizes = elements.columns["corners"]
+    first = comm.exscan(int(sizes.sum()))
+    n, n_joints, n_corners = elements.total, joints.total, corners.total
+    with h5.writing(path, comm) as out:
+        out.group("VTKHDF", {"Version": np.array([2, 0], np.int64), "Type": np.bytes_("UnstructuredGrid")})
+        for name, number in (
+            ("NumberOfPoints", n_corners),
+            ("NumberOfCells", n + n_joints),
+            ("NumberOfConnectivityIds", n_corners + 2 * n_joints),
+        ):
+            out.whole(f"VTKHDF/{name}", np.array([number], np.int64))
+        columns = corners.columns
+        out.slabs("VTKHDF/Points", _vector(columns["x"], columns["y"]), corners.offset, n_corners)
+        # Corners lie in the order of elements, so the elements simply count them up.
+        counted = np.arange(first, first + int(sizes.sum()), dtype=np.int64)
+        out.parts(
+            "VTKHDF/Connectivity",
+            [(counted, first), (ends.reshape(-1), n_corners + 2 * joints.offset)],
+            n_corners + 2 * n_joints,
+        )
+        zero = np.zeros(int(comm.rank == 0), np.int64)
+        lines = n_corners + 2 * np.arange(joints.offset + 1, joints.offset + 1 + len(joints), dtype=np.int64)
+        out.parts(
+            "VTKHDF/Offsets",
+            [(zero, 0), (first + np.cumsum(sizes), 1 + elements.offset), (lines, 1 + n + joints.offset)],
+            1 + n + n_joints,
+        )
+        starts = elements.offset, n + joints.offset
+        types = np.where(sizes == 4, _QUAD, _TRIANGLE).astype(np.uint8), np.full(len(joints), _LINE, np.uint8)
+        out.parts("VTKHDF/Types", list(zip(types, starts, strict=True)), n + n_joints)
+        out.group("VTKHDF/PointData")
+        for name, values in _packed({k: v for k, v in columns.items() if k not in ("x", "y")}).items():
+            out.slabs(f"VTKHDF/PointData/{name}", values, corners.offset, n_corners)
+        out.group("VTKHDF/CellData")
+        for name, parts in _cell_data(elements, joints).items():
+            out.parts(f"VTKHDF/CellData/{name}", list(zip(parts, starts, strict=True)), n + n_joints)
+        out.group("VTKHDF/FieldData")
+        out.whole("VTKHDF/FieldData/TimeValue", np.array([frame.time]))
+        out.whole("VTKHDF/FieldData/step", np.array([frame.step], np.int64))
+        out.group("hpcdem", {"format": 1, "step": frame.step, "time": float(frame.time), "dt": float(frame.dt)})
+        for name, names in frame.group_names.items():
+            encoded = [one.encode() for one in names]
+            out.whole(f"hpcdem/{name}", np.array(encoded, dtype=f"S{max([1, *map(len, encoded)])}"))
+
+
+def _vector(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(n, 3) with z = 0."""
+    return np.stack([x, y, np.zeros(len(x))], axis=1)
+
+
+def _packed(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns with the components `name_x` and `name_y` of vectors put together."""
+    found: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        stem, _, part = name.rpartition("_")
+        if part in ("x", "y") and f"{stem}_x" in columns and f"{stem}_y" in columns:
+            found[stem] = _vector(columns[f"{stem}_x"], columns[f"{stem}_y"])
+        else:
+            found[name] = values
+    return found
+
+
+def _cell_data(elements: Table, joints: Table) -> dict[str, list[np.ndarray]]:
+    """Name -> this rank's values on elements and joints."""
+    tables = [
+        {k: v for k, v in elements.columns.items() if k != "corners"},
+        {k: v for k, v in joints.columns.items() if k not in ("first", "last")},
+    ]
+    sizes = len(elements), len(joints)
+    data: dict[str, list[np.ndarray]] = {
+        "cell": [np.full(size, kind, np.int8) for size, kind in zip(sizes, (ELEMENT, JOINT), strict=True)]
+    }
+    for name in dict.fromkeys((*tables[0], *tables[1])):
+        dtype = next(t[name].dtype for t in tables if name in t)
+        fill = np.nan if dtype.kind == "f" else -1
+        data[name] = [
+            table.get(name, np.full(size, fill, dtype)).astype(dtype) for table, size in zip(tables, sizes, strict=True)
+        ]
+    return data

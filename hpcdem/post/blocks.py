@@ -1,0 +1,324 @@
+"""Pictures of blocks: cracks coloured by the way they broke, and contours of the compressive stress.
+
+matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.agreed import atomic_path
+from hpcdem.io.axes import View
+from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+
+CRACKS, STRESS = "cracks", "stress"
+PANELS = (CRACKS, STRESS)
+CM = 1.0 / 2.54
+FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
+FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
+"""States of joints, as frames have them; free: cracks that were there from the beginning."""
+TENSION, MIXED, SHEAR = "#c81e1e", "#d98c00", "#1e3cb4"
+OPEN, YIELD, EDGE, INK = "#202020", "#8f8f8f", "#c9ced1", "#202020"
+LINES = (TENSION, MIXED, SHEAR, INK)
+GROUPS = ("#e9e4d8", "#d5dde3", "#dfe8d2", "#f1dfc8", "#e2d8e6", "#d3e4e2", "#ece6bf", "#dcd6cf")
+KINDS = ((1.0, 4.0 / 3.0, TENSION, "tension"), (4.0 / 3.0, 5.0 / 3.0, MIXED, "mixed"), (5.0 / 3.0, 2.1, SHEAR, "shear"))
+"""Modes of broken joints from ... to ..., 1 opened and 2 slid: colour, word."""
+MOST_EDGES = 4000
+"""The mesh of larger models is a grey mush, and is left out."""
+NEAR = 1e-3
+"""Corners nearer than this part of an edge share the mean of their stress."""
+LEVELS = 14
+PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
+_LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the panels, between them, for the colours
+
+
+@dataclass(frozen=True)
+class Looks:
+    """panels: of PANELS; page: width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with
+    {step} and {time}; stress: range of the colours [Pa], None: of the frame."""
+
+    panels: tuple[str, ...] = PANELS
+    page: float = 17.0
+    font: float = 9.0
+    dpi: float = 300.0
+    title: str | None = None
+    stress: tuple[float, float] | None = None
+
+
+USUAL = Looks()
+
+
+def view(state: MeshState) -> View:
+    """The part of the plane that holds a model, with some air."""
+    if not len(state.points):
+        return View(0.0, 1.0, 0.0, 1.0)
+    low, high = state.points.min(axis=0), state.points.max(axis=0)
+    air = 0.03 * max(float((high - low).max()), 1e-12)
+    return View(float(low[0]) - air, float(high[0]) + air, float(low[1]) - air, float(high[1]) + air)
+
+
+def compression(state: MeshState) -> np.ndarray:
+    """(ne,) larger compressive stress in the plane [Pa]: minus the smaller principal stress."""
+    s = state.of_elements
+    mean, half = 0.5 * (s["stress_xx"] + s["stress_yy"]), 0.5 * (s["stress_xx"] - s["stress_yy"])
+    return -(mean - np.hypot(half, s["stress_xy"]))
+
+
+def stress_range(state: MeshState) -> tuple[float, float]:
+    """Least and greatest compressive stress [Pa] without the extreme percent of the elements."""
+    values = compression(state)
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return 0.0, 1.0
+    low, high = np.percentile(values, (1.0, 99.0))
+    return float(min(low, 0.0) if low > -0.05 * abs(high) else low), float(high)
+
+
+def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
+    """Write the picture of a frame: JPG, PNG, PDF or SVG by the suffix of `path`. Serial. Raises HpcdemError."""
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise HpcdemError(f"cannot draw {path}: pictures end in {', '.join(FORMATS)}")
+    try:
+        import matplotlib
+    except ImportError:
+        raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
+    kind = path.suffix.lower().removeprefix(".")
+    options: dict[str, Any] = {}
+    if kind in ("jpg", "jpeg"):
+        options["pil_kwargs"] = {"quality": 92, "subsampling": 0}
+    elif kind in ("pdf", "svg"):
+        options["metadata"] = {"CreationDate": None} if kind == "pdf" else {"Date": None}
+    with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}):
+        figure = draw(state, looks, seen)
+        with atomic_path(path) as temporary:
+            figure.savefig(temporary, format=kind, dpi=looks.dpi, **options)
+    return path
+
+
+def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
+    """Draw the frame in a file."""
+    plot(read_mesh_frame(source), path, looks, seen)
+
+
+def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
+    """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
+    from matplotlib.figure import Figure
+
+    seen = view(state) if seen is None else seen
+    panels = looks.panels
+    ratio = seen.height / seen.width
+    beside = len(panels) > 1 and ratio > 0.7
+    across = len(panels) if beside else 1
+    k = looks.font / 9.0
+    left, bottom, top, gap, bar = (k * length for length in (_LEFT, _BOTTOM, _TOP, _GAP, _BAR))
+    room = (looks.page - left - bar - (across - 1) * gap) / across
+    if room < 1.0:
+        raise UsageError(f"a page of {looks.page:g} cm is too small for letters of {looks.font:g} points")
+    width = min(room, 21.0 / ratio)
+    height = width * ratio
+    down = 1 if beside else len(panels)
+    page = left + across * width + (across - 1) * gap + bar, down * (height + top) + (down - 1) * 0.3 * gap + bottom
+    figure = Figure(figsize=(page[0] * CM, page[1] * CM))
+    for number, panel in enumerate(panels):
+        x = left + (width + gap) * (number if beside else 0)
+        y = bottom + (0 if beside else (down - 1 - number) * (height + top + 0.3 * gap))
+        axes = figure.add_axes((x / page[0], y / page[1], width / page[0], height / page[1]))
+        _frame(axes, seen, looks, first=number == 0 or not beside, last=beside or number == down - 1)
+        if panel == CRACKS:
+            cracks(axes, state, looks.font, width / seen.width)
+        else:
+            span = looks.stress or stress_range(state)
+            filled = stress(axes, state, span)
+            colours = figure.add_axes(
+                ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
+            )
+            _bar(figure, colours, filled, looks.font)
+            told = f"compressive stress ({pressure_unit(span)[1]})"
+            axes.set_title(told, loc="right", fontsize=0.9 * looks.font, pad=3.0)
+        label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
+        axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
+    if looks.title is not None:
+        text = looks.title.replace("{step}", str(state.step)).replace("{time}", f"{state.time:.6g}")
+        figure.text(0.99, 0.995, text, fontsize=looks.font, ha="right", va="top", parse_math=False)
+    return figure
+
+
+def panel(axes: Any, state: MeshState, seen: View, width: float, looks: Looks = USUAL) -> list[Any]:
+    """The cracks of a model in axes that are so wide [cm]; returns what a legend is made of."""
+    _frame(axes, seen, looks, first=True, last=True)
+    return _cracks(axes, state, width / seen.width)
+
+
+def _frame(axes: Any, seen: View, looks: Looks, first: bool, last: bool) -> None:
+    size, unit = seen.unit
+    axes.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
+    for axis, ticks, name, shown in zip((axes.xaxis, axes.yaxis), seen.ticks(), "xy", (last, first), strict=True):
+        axis.set_ticks([v * size for v in ticks.major], labels=ticks.labels if shown else [])
+        axis.set_ticks([v * size for v in ticks.minor], minor=True)
+        axis.set_tick_params(labelsize=looks.font, width=0.6, length=3.5)
+        axis.set_tick_params(which="minor", width=0.5, length=1.8)
+        if shown:
+            axis.set_label_text(f"{name} ({unit})", fontsize=looks.font)
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.6)
+
+
+# ---- cracks --------------------------------------------------------------------------------------------------------
+
+
+def cracks(axes: Any, state: MeshState, font: float = 9.0, scale: float = 1.0) -> None:
+    """Elements coloured by group, and the joints that have yielded or broken. scale: cm on paper per metre."""
+    handles = _cracks(axes, state, scale)
+    if handles:
+        axes.legend(
+            handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, frameon=False, fontsize=0.9 * font,
+            borderaxespad=0.15, handlelength=1.2, columnspacing=1.0, handletextpad=0.4, labelspacing=0.25,
+        )  # fmt: skip
+
+
+def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
+    from matplotlib.collections import PolyCollection
+    from matplotlib.lines import Line2D
+
+    colour = _group_colours(state)
+    edges = EDGE if len(state.cells) <= MOST_EDGES else "face"
+    for n in (3, 4):
+        rows = np.flatnonzero((state.cells[:, 3] >= 0) == (n == 4))
+        if len(rows):
+            corners = state.points[state.cells[rows, :n]]
+            axes.add_collection(
+                PolyCollection(corners, facecolors=colour[rows], edgecolors=edges, linewidths=0.25, zorder=1),
+                autolim=False,
+            )
+    width = _line_width(state, scale)
+    at = state.points[state.joints]
+    joint_state, mode = state.of_joints.get("state", np.empty(0)), state.of_joints.get("mode", np.empty(0))
+    handles: list[Any] = []
+    for rows, shade, part, word in _kinds(joint_state, mode):
+        _lines(axes, at[rows], shade, part * width)
+        handles.insert(0, Line2D([], [], color=shade, linewidth=max(part * width, 0.9), label=word))
+    return handles
+
+
+def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, float, str]]:
+    """Joints, colour, part of the line width, word of the legend, in the order of drawing; what there is none of is
+    left out."""
+    broken = state == BROKEN
+    rows = [(np.flatnonzero(state == YIELDED), YIELD, 0.45, "yielded")]
+    rows.append((np.flatnonzero((state == FREE) | (broken & (mode < 1.0))), OPEN, 0.7, "initial"))
+    for low, high, shade, word in reversed(KINDS):
+        rows.append((np.flatnonzero(broken & (low <= mode) & (mode < high)), shade, 1.0, word))
+    return [row for row in rows if len(row[0])]
+
+
+def _group_colours(state: MeshState) -> np.ndarray:
+    """A colour per element: by the set of groups that tells most of them apart."""
+    colour = np.full(len(state.cells), GROUPS[0], object)
+    sets = [name for name in state.of_elements if name.startswith("group_")]
+    best = max(sets, key=lambda name: len(np.unique(state.of_elements[name])), default=None)
+    if best is not None:
+        for k, group in enumerate(np.unique(state.of_elements[best])):
+            colour[state.of_elements[best] == group] = GROUPS[k % len(GROUPS)]
+    return colour
+
+
+def _line_width(state: MeshState, scale: float) -> float:
+    """Points: a seventh of an edge on paper, within what can be seen."""
+    return float(np.clip(_edge(state) * scale * CM * 72.0 / 7.0, 0.5, 1.6))
+
+
+def _edge(state: MeshState) -> float:
+    """Typical length of an edge [m]."""
+    if not len(state.cells):
+        return 1.0
+    a, b = state.points[state.cells[:, 0]], state.points[state.cells[:, 1]]
+    return float(np.median(np.hypot(*(b - a).T)))
+
+
+def _lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
+    from matplotlib.collections import LineCollection
+
+    axes.add_collection(
+        LineCollection(list(ends), colors=shade, linewidths=width, capstyle="round", zorder=3), autolim=False
+    )
+
+
+# ---- stress --------------------------------------------------------------------------------------------------------
+
+
+def stress(axes: Any, state: MeshState, span: tuple[float, float]) -> Any:
+    """Contours of the larger compressive stress, colours from ... to ... [Pa]; returns what the colour bar is made of.
+    Broken joints are drawn over them."""
+    from matplotlib.tri import Triangulation
+
+    if not len(state.cells):
+        return None
+    unit, _ = pressure_unit(span)
+    levels = nice_levels(span[0] / unit, span[1] / unit)
+    points, triangles, values = smoothed(state)
+    mesh = Triangulation(points[:, 0], points[:, 1], triangles)
+    filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap="YlOrBr", extend="both", zorder=1)
+    joints = state.of_joints.get("state", np.empty(0))
+    broken = (joints == BROKEN) | (joints == FREE)
+    _lines(axes, state.points[state.joints[broken]], INK, 0.5)
+    return filled
+
+
+def pressure_unit(span: Sequence[float]) -> tuple[float, str]:
+    """The unit in which a stress is read best, in Pa, and its name."""
+    largest = max(abs(value) for value in span)
+    return next(((size, name) for size, name in PRESSURES if largest >= size), PRESSURES[-1])
+
+
+def nice_levels(low: float, high: float) -> np.ndarray:
+    """About LEVELS round steps that hold the range from low to high."""
+    spread = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    power = 10.0 ** math.floor(math.log10(spread / LEVELS))
+    step = next(s * power for s in (1.0, 2.0, 2.5, 5.0, 10.0) if spread / (s * power) <= LEVELS)
+    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    return step * np.arange(first, max(last, first + 1) + 1)
+
+
+def smoothed(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 2) at which corners meet, triangles (m, 3), and the stress there: the mean of the elements around,
+    weighted by area."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    cells, points = state.cells, state.points
+    pairs = cKDTree(points).query_pairs(NEAR * _edge(state), output_type="ndarray")
+    n = len(points)
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (n, n))
+    count, place = connected_components(graph, directed=False)
+    quads = cells[cells[:, 3] >= 0]
+    triangles = np.concatenate([cells[:, :3], quads[:, [0, 2, 3]]])
+    owner = np.concatenate([np.arange(len(cells)), np.flatnonzero(cells[:, 3] >= 0)])
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    value = np.nan_to_num(compression(state))[owner]
+    corner = place[triangles]
+    weight = np.bincount(corner.reshape(-1), np.repeat(area, 3), count)
+    total = np.bincount(corner.reshape(-1), np.repeat(area * value, 3), count)
+    members = np.bincount(place, minlength=count)
+    middle = np.column_stack([np.bincount(place, points[:, k], count) / members for k in range(2)])
+    flat = (corner[:, 0] == corner[:, 1]) | (corner[:, 1] == corner[:, 2]) | (corner[:, 0] == corner[:, 2])
+    return middle, corner[~flat & (area > 0.0)], total / np.where(weight > 0.0, weight, 1.0)
+
+
+def _bar(figure: Any, axes: Any, filled: Any, font: float) -> None:
+    if filled is None:
+        axes.set_axis_off()
+        return
+    bar = figure.colorbar(filled, cax=axes)
+    bar.ax.tick_params(labelsize=0.9 * font, width=0.5, length=2.5)
+    bar.outline.set_linewidth(0.5)

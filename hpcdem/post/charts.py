@@ -1,0 +1,88 @@
+"""Diagrams: curves in axes, for papers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hpcdem.errors import HpcdemError
+from hpcdem.io.vtkhdf_mesh import MeshState
+
+SIZE = 5.5, 3.9
+"""Of the diagram, in inches."""
+FONT = 9.0
+"""Points, beside a model."""
+COLOURS = ("#202020", "#2a8c5a", "#8c5aa8", "#9a6b2f")
+"""Of curves beside a model: none that a crack has."""
+Points = Sequence[tuple[float, float]]
+
+
+def draw(
+    path: Path,
+    kind: str,
+    title: str,
+    x_label: str,
+    y_label: str,
+    curves: Sequence[tuple[str, str, Points]],
+    model: MeshState | None = None,
+) -> None:
+    """Draw (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks that are drawn
+    beside the diagram, with their cracks."""
+    try:
+        import matplotlib
+    except ImportError:
+        raise HpcdemError("a figure needs the package matplotlib, which is not installed") from None
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    if model is None:
+        figure = Figure(figsize=SIZE, layout="constrained")
+        axes = figure.add_subplot()
+    else:
+        figure, axes = _beside(model)
+    for label, style, points in curves:
+        x, y = [p[0] for p in points], [p[1] for p in points]
+        if style == "points":
+            axes.plot(x, y, "o", markersize=4, markerfacecolor="none", label=label)
+        else:
+            axes.plot(x, y, linewidth=1.2, label=label)
+    axes.set(xlabel=x_label, ylabel=y_label)
+    axes.ticklabel_format(style="sci", scilimits=(-3, 4), useMathText=True)
+    axes.tick_params(direction="in", top=True, right=True)
+    if title:
+        axes.set_title(title)
+    if len(curves) > 1:
+        axes.legend(frameon=False)
+    figure.savefig(path, format=kind, dpi=200)
+
+
+def _beside(model: MeshState) -> tuple[Any, Any]:
+    """A figure with a model on the left, and the axes for a diagram on the right."""
+    from matplotlib.figure import Figure
+
+    from hpcdem.post import blocks
+
+    seen = blocks.view(model)
+    height = SIZE[1] - 0.75  # of the panels: above and below there are words
+    width = min(max(height * seen.width / seen.height, 0.3 * height), 1.5 * height)
+    page = 0.7 + width + 0.75 + SIZE[0] - 1.4 + 0.15, SIZE[1]
+    figure = Figure(figsize=page)
+    left = figure.add_axes((0.7 / page[0], 0.5 / page[1], width / page[0], height / page[1]))
+    right = figure.add_axes(
+        ((0.7 + width + 0.75) / page[0], 0.5 / page[1], (SIZE[0] - 1.4) / page[0], height / page[1])
+    )
+    modes = blocks.panel(left, model, seen, 2.54 * width)
+    for axes, label in ((left, "(a)"), (right, "(b)")):
+        axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
+    if modes:  # over the diagram there is room for all of them in one line
+        figure.legend(
+            handles=modes, loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=right.transAxes, ncols=4,
+            frameon=False, fontsize=0.9 * FONT, borderaxespad=0.15, handlelength=1.2, columnspacing=1.0,
+            handletextpad=0.4,
+        )  # fmt: skip
+    right.set_prop_cycle(color=COLOURS)
+    right.tick_params(labelsize=FONT)
+    right.xaxis.label.set_fontsize(FONT)
+    right.yaxis.label.set_fontsize(FONT)
+    return figure, right
