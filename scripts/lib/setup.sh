@@ -83,6 +83,7 @@ debian_venv() {
 debian_packages=(
     python3-venv python3-dev python3-mpi4py python3-petsc4py python3-h5py-mpi python3-scipy python3-matplotlib
     openmpi-bin libopenmpi-dev slurmctld slurmd slurm-client munge libpmix-dev
+    libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1 # libraries that the gmsh wheel loads
 )
 
 # Command prefix that makes us root, empty when we are; fails where there is no way without a password.

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench import launch, other, runs, strain_stress, tables
+from bench import blocks, launch, other, runs, strain_stress, tables
 from bench.launch import Layout
 from bench.peers import PEERS
 from bench.workloads import PEER_WORKLOADS, cache_folder, workloads
@@ -113,6 +113,26 @@ def show_settings(rows: list[tables.Row]) -> None:
     said = {(r["workload"], r["cores"], r["version"]): r["settings"] for r in rows if r["code"] != "hpcdem"}
     for (workload, cores, version), settings in said.items():
         runs.say(f"{workload}, {cores} core(s), {version}: {settings}")
+
+
+@bench.command("blocks", context_settings=HELP)
+@click.option(
+    "--workload", "names", multiple=True, type=click.Choice(list(blocks.WORKLOADS)), metavar="NAME",
+    help=f"Only this one; several times [{', '.join(blocks.WORKLOADS)}].",
+)  # fmt: skip
+@layouts_option("1x1", "2x1", "1x2")
+@REPEATS
+@click.option("--seconds", type=float, default=2.0, metavar="S", help="Stepping time of a run, about [2].")
+@JSON
+def blocks_(names: tuple[str, ...], layouts: list[Layout], repeats: int, seconds: float, json_file: str | None) -> None:
+    """Blocks: element-steps per second, intact and shattered; touching contact pairs per second."""
+    lines = tables.Lines(json_file)
+    try:
+        blocks.blocks(list(names or blocks.WORKLOADS), layouts, repeats, seconds, lines)
+    finally:
+        lines.close()
+        if warning := tables.disturbed(lines.rows):
+            runs.say(f"warning: {warning}")
 
 
 @bench.command(context_settings=HELP)

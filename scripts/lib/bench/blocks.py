@@ -1,0 +1,235 @@
+"""Blocks: element-steps and contact pairs per second.
+
+| workload | what |
+|---|---|
+| intact-20k, intact-200k | a joint before its peak on every inner edge, contact armed, in vibration |
+| yielded-20k | the same with joints behind their peak |
+| quads-20k | quads as one body, contact armed, in vibration |
+| pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
+| shattered-20k | every edge open, all neighbours pressed together: the whole step |
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bench import launch
+from bench.launch import Layout
+from bench.runs import say
+from bench.tables import Lines, Spread
+
+RATES = {"intact": 15e6, "yielded": 3e6, "quads": 5e6, "pairs": 3e6, "shattered": 1e6}
+"""Element-steps per second from which the number of steps follows."""
+
+
+@dataclass(frozen=True)
+class Workload:
+    """kind: one of `RATES`; side: squares along a side, two triangles each, or a quad."""
+
+    name: str
+    kind: str
+    side: int
+
+    @property
+    def elements(self) -> int:
+        """Triangles, or quads."""
+        return self.side**2 * (1 if self.kind == "quads" else 2)
+
+
+WORKLOADS = {
+    w.name: w
+    for w in (
+        Workload("intact-20k", "intact", 100),
+        Workload("intact-200k", "intact", 316),
+        Workload("yielded-20k", "yielded", 100),
+        Workload("quads-20k", "quads", 141),
+        Workload("pairs-20k", "pairs", 141),
+        Workload("shattered-20k", "shattered", 100),
+    )
+}
+
+
+# ---- asked for by the driver ---------------------------------------------------------------------------------------
+
+
+def blocks(names: list[str], layouts: list[Layout], repeats: int, seconds: float, lines: Lines) -> None:
+    """Every workload on every layout, layouts in turn; a table of medians at the end."""
+    for name in names:
+        work = WORKLOADS[name]
+        steps = max(10, round(seconds * RATES[work.kind] / work.elements))
+        for repeat in range(repeats):
+            for layout in layouts:
+                found = launch.ours("blocks", layout, workload=name, steps=steps)
+                found.pop("output")
+                head = {
+                    "code": "hpcdem", "workload": f"blocks-{name}", "ranks": layout.ranks, "threads": layout.threads,
+                    "cores": layout.cores, "repeat": repeat,
+                }  # fmt: skip
+                row = lines.add(head | found)
+                say(
+                    f"{name} {layout} #{repeat}: {row['element_steps_per_s'] / 1e6:.3g} M element-steps/s, "
+                    f"{row['pairs_per_s'] / 1e6:.3g} M touching pairs/s in the contact stage"
+                )
+        digests = {r["digest"] for r in lines.rows if r["workload"] == f"blocks-{name}"}
+        if len(digests) > 1:
+            say(f"{name}: layouts do not agree: {len(digests)} different ends")
+    for name in names:
+        for layout in layouts:
+            rows = [
+                r
+                for r in lines.rows
+                if r["workload"] == f"blocks-{name}" and (r["ranks"], r["threads"]) == (layout.ranks, layout.threads)
+            ]
+            speed = Spread.of(r["element_steps_per_s"] for r in rows)
+            pairs = Spread.of(r["pairs_per_s"] for r in rows)
+            say(f"{name:<14} {layout}: {speed.text(1e6)} M element-steps/s, {pairs.text(1e6)} M pairs/s")
+
+
+# ---- on our ranks --------------------------------------------------------------------------------------------------
+
+
+def work(job: dict[str, Any]) -> dict[str, Any]:
+    """Make the model, step it by the clock; collective."""
+    from bench.worker import versions
+    from hpcdem import session
+    from hpcdem.blocks import Blocks
+    from hpcdem.blocks.rehearsal import rehearse
+
+    shared = session.current()
+    rehearse(job["threads"])
+    sim = Blocks(shared.comm, job["threads"])
+    workload = WORKLOADS[job["workload"]]
+    MAKERS[workload.kind](sim, workload.side)
+    warm = max(3, job["steps"] // 10)
+    sim.advance(warm)
+    sim.close_model()
+    sim.comm.allgather(0)
+    before = {name: watch.ns for name, watch in sim.timers.watches.items()}
+    cpu, began, rebuilds = time.process_time(), time.perf_counter(), sim.rebuilds
+    sim.advance(job["steps"])
+    sim.comm.allgather(0)
+    seconds, used = time.perf_counter() - began, time.process_time() - cpu
+    own = {name: (watch.ns - before.get(name, 0)) * 1e-9 for name, watch in sim.timers.watches.items()}
+    sim.close_model()
+    local = sim.local.pairs
+    touching = sim.comm.allgather(int(local.touching.sum()))
+    ranks = sim.comm.allgather((seconds, used, own, sim.n_own))
+    wall, n = max(r[0] for r in ranks), sum(r[3] for r in ranks)
+    contact = max(r[2].get("contact", 0.0) for r in ranks)
+    stages = {
+        name: {"mean": sum(r[2].get(name, 0.0) for r in ranks) / len(ranks),
+               "largest": max(r[2].get(name, 0.0) for r in ranks)}
+        for name in dict.fromkeys(name for r in ranks for name in r[2])
+    }  # fmt: skip
+    return {
+        "elements": n, "steps": job["steps"], "wall_s": wall, "element_steps_per_s": n * job["steps"] / wall,
+        "pairs_per_s": sum(touching) * job["steps"] / contact if contact > 0.0 else 0.0, "touching": sum(touching),
+        "joints": sim.joint_counts(), "stages": stages, "rebuilds": sim.rebuilds - rebuilds,
+        "cpu_use": sum(r[1] for r in ranks) / (wall * len(ranks) * job["threads"]), "digest": digest(sim),
+    } | versions()  # fmt: skip
+
+
+def digest(sim: Any) -> str:
+    """The same if the positions are, to the last bit, whatever the layout."""
+    import hashlib
+
+    return hashlib.sha256(sim.values("position_x").tobytes() + sim.values("position_y").tobytes()).hexdigest()[:16]
+
+
+ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25, "friction": 30.0, "damp_factor": 0.1}
+JOINT = {
+    "friction": 30.0, "cohesion": 20e6, "tensile_strength": 10e6, "gf1": 100.0, "gf2": 500.0, "penalty_normal": 500e9,
+}  # fmt: skip
+
+
+def square(side: int, gap: float = 0.0, quads: bool = False) -> Any:
+    """side x side squares of 1 cm, two triangles each, diagonals in turn; with a gap they are bodies of their own."""
+    from hpcdem.model.blocks.mesh import Mesh
+
+    h = 0.01
+    i, j = np.divmod(np.arange(side * side), side)
+    even = (i + j) % 2 == 0
+    corners = np.array([(0.0, 0.0), (h, 0.0), (h, h), (0.0, h)])
+    if gap:
+        points = (corners[None] + np.column_stack([i, j])[:, None] * (h + gap)).reshape(-1, 2)
+        a, b, c, d = (4 * np.arange(side * side) + k for k in range(4))
+    else:
+        x, y = np.divmod(np.arange((side + 1) ** 2), side + 1)
+        points = np.column_stack([x, y]) * h
+        a = i * (side + 1) + j
+        b, d = a + side + 1, a + 1
+        c = b + 1
+    if quads:
+        return Mesh.of(points, np.column_stack([a, b, c, d]))
+    first = np.where(even[:, None], np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    second = np.where(even[:, None], np.column_stack([b, c, d]), np.column_stack([a, c, d]))
+    return Mesh.of(points, np.stack([first, second], axis=1).reshape(-1, 3))
+
+
+def intact(sim: Any, side: int) -> None:
+    """In vibration, all joints before their peak."""
+    sim.take_mesh(square(side))
+    sim.element_model(None, "mech_iso_elastic", ROCK)
+    sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+    sim.close_model()
+    x = sim.x[:, :6]
+    sim.v[:, :6] = 0.02 * np.sin(300.0 * x + 1.0)
+
+
+def yielded(sim: Any, side: int) -> None:
+    """The same with joints so weak, and tough, that they soften throughout."""
+    intact(sim, side)
+    sim.joint_property(None, {"cohesion": 1e4, "tensile_strength": 1e4, "gf1": 10.0, "gf2": 10.0})
+    sim.close_model()
+
+
+def quads(sim: Any, side: int) -> None:
+    """Quads without joints, in vibration."""
+    sim.take_mesh(square(side, quads=True))
+    sim.element_model(None, "mech_iso_elastic", ROCK)
+    sim.close_model()
+    x = sim.x[:, :12]
+    sim.v[:, :12] = 0.02 * np.sin(300.0 * x + 1.0)
+
+
+def pairs(sim: Any, side: int) -> None:
+    """Each square is two triangles that lie on each other along its diagonal, pressed and sheared."""
+    mesh = square(side, gap=0.01)
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", ROCK)
+    inner = mesh.edges()
+    sim.crack(inner.faces[inner.inner, 0])
+    _swell(sim, 1.0005)
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    sim.close_model()
+
+
+def shattered(sim: Any, side: int) -> None:
+    """Every element a body of its own, all pressed together by a frame that does not give way."""
+    mesh = square(side)
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.5})
+    inner = mesh.edges()
+    sim.crack(inner.faces[inner.inner, 0])
+    sim.velocity_condition(np.unique(inner.points[~inner.inner]), vx=0.0, vy=0.0)
+    _swell(sim, 1.0005)
+    sim.set_velocity(None, 0.001, -0.001)
+    sim.close_model()
+
+
+def _swell(sim: Any, factor: float) -> None:
+    """Every element grows about its middle."""
+    sim.open_model()
+    corners = sim.x[:, :6].reshape(-1, 3, 2)
+    middle = corners.mean(axis=1, keepdims=True)
+    sim.x[:, :6] = (middle + factor * (corners - middle)).reshape(-1, 6)
+    sim.x[:, 6:] = sim.x[:, :2]
+    assert math.isfinite(float(sim.x.sum()))
+
+
+MAKERS = {"intact": intact, "yielded": yielded, "quads": quads, "pairs": pairs, "shattered": shattered}
