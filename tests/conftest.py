@@ -18,6 +18,9 @@ ROOT = Path(__file__).resolve().parent.parent
 BIN = Path(sys.executable).parent
 
 
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `nohup ... &`: programs that are started would ignore it too
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 # --- what this machine has -------------------------------------------------------------------------------------
 
 
@@ -122,13 +125,16 @@ def needs_manual_scripts(manual_scripts: Path) -> Path:
     return manual_scripts
 
 
-_WATCHES = {"launch_once", "wait_until", "needs_mpi", "needs_parallel_hdf5", "slurm", "serve_page"}
-"""Fixtures of tests that start several ranks, or look at a program while it runs."""
+_WATCHES = {"launch_once", "wait_until", "slurm", "serve_page"}
+"""Fixtures of tests that look at a program while it runs: nothing else may keep it waiting."""
+
+_RANKS = {"needs_mpi", "needs_parallel_hdf5"}
+"""Fixtures of tests that start several ranks and wait for their end, however long it takes."""
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest sorts out what `-m` asks for
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A mark is a promise about the machine: let it check the machine too. And ranks need all cores."""
+    """A mark is a promise about the machine: let it check the machine too. And who needs how much of it."""
     for item in items:
         if not isinstance(item, pytest.Function):
             continue
@@ -137,6 +143,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.fixturenames.insert(0, f"needs_{mark}")
         if item.get_closest_marker("slurm") or not _WATCHES.isdisjoint(item.fixturenames):
             item.add_marker("alone")
+        elif not item.get_closest_marker("alone") and not _RANKS.isdisjoint(item.fixturenames):
+            item.add_marker("ranks")
 
 
 # --- starting the program --------------------------------------------------------------------------------------

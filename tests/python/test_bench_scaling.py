@@ -216,6 +216,7 @@ def test_numbers():
     assert report.took(7690.0) == "2.1 h" and report.lasts(1.5e7) == "174 d"
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_measures_a_tiny_bed(tmp_path):
     """The whole way on one and two ranks with beds of a few hundred particles: lines that hold what the fit needs."""

@@ -10,7 +10,7 @@ from tests.cases.stress_strain.chapter6 import PATH, SIGMA1, Chapter, chapter, p
 from tests.short_push import assert_same_files
 from tests.slurm.cluster import CPUS, Cluster
 
-pytestmark = [pytest.mark.slurm, pytest.mark.figures]
+pytestmark = [pytest.mark.slurm, pytest.mark.figures, pytest.mark.slow]
 OURS = ("--partition=tests", f"--ntasks={CPUS}", "--cpus-per-task=1", "--time=20")
 """What the test cluster has, in place of what the scripts ask of the manual's."""
 

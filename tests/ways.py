@@ -1,0 +1,23 @@
+"""Ways to run the same script, all of which give the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import pytest
+
+WAYS: dict[str, tuple[int, list[str]]] = {
+    "2 ranks": (2, []),
+    "3 ranks": (3, []),
+    "4 ranks": (4, []),
+    "3 ranks, borders stay": (3, ["--no-balance"]),
+    "2 threads": (1, ["-j", "2"]),
+    "3 threads": (1, ["-j", "3"]),
+    "2 ranks x 2 threads": (2, ["-j", "2"]),
+}
+"""Number of ranks, and options, by name."""
+
+
+def ways(quick: Collection[str]) -> list:
+    """Parameters of a test: the names of all ways; those that are not in `quick` are slow."""
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.slow) for name in WAYS]
