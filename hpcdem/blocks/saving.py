@@ -21,6 +21,7 @@ from hpcdem.model.blocks.mesh import Mesh
 
 if TYPE_CHECKING:
     from hpcdem.blocks.solving import Solving
+    from hpcdem.halo.comm import SerialComm
 
 KIND = "blocks"
 ARRAYS = {
@@ -102,21 +103,30 @@ def _whole(columns: dict[str, np.ndarray], root: bool) -> Table:
 def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`. Collective. Returns `extra`. CommandError if the file is missing,
     foreign or damaged; the simulation is then as it was."""
+    state, found = read(sim.comm, path, KIND, "a model of blocks")
+    put(sim, state, found)
+    return state["extra"]
+
+
+def read(
+    comm: SerialComm, path: Path | str, kind: str, what: str
+) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]] | None]:
+    """The state in a checkpoint of this kind, on all ranks, and its tables, on rank 0. Collective. what: its name in
+    messages. CommandError if the file is missing, foreign or damaged."""
     found, error = None, None
-    if sim.comm.rank == 0:
+    if comm.rank == 0:
         try:
             found = checkpoint.read(path)
-            if found[0].get("kind") != KIND:
-                raise HpcdemError(f"{path} is a checkpoint, but not one of a model of blocks")
+            if found[0].get("kind") != kind:
+                raise HpcdemError(f"{path} is a checkpoint, but not one of {what}")
         except HpcdemError as problem:
             error = str(problem)
     try:
-        sim.comm.agree(error)
+        comm.agree(error)
     except HpcdemError as problem:
         raise CommandError(str(problem)) from None
-    state = json.loads(sim.comm.bcast(None if found is None else json.dumps(found[0])))
-    put(sim, state, found[1] if found is not None else None)
-    return state["extra"]
+    state = json.loads(comm.bcast(None if found is None else json.dumps(found[0])))
+    return state, None if found is None else found[1]
 
 
 def put(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | None) -> None:

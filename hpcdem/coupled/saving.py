@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from hpcdem import saving as of_particles
 from hpcdem.blocks import saving as of_blocks
 from hpcdem.coupled.links import Touching
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.errors import HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.slabs import to_slabs
 
@@ -66,20 +66,7 @@ def _without_discs(tables: dict[str, Any]) -> dict[str, Any]:
 def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`; returns `extra`. Collective. CommandError if the file is missing,
     foreign or damaged; both models are then as they were."""
-    found, error = None, None
-    if both.comm.rank == 0:
-        try:
-            found = checkpoint.read(path)
-            if found[0].get("kind") != KIND:
-                raise HpcdemError(f"{path} is a checkpoint, but not one of particles and blocks together")
-        except HpcdemError as problem:
-            error = str(problem)
-    try:
-        both.comm.agree(error)
-    except HpcdemError as problem:
-        raise CommandError(str(problem)) from None
-    state = json.loads(both.comm.bcast(None if found is None else json.dumps(found[0])))
-    tables = found[1] if found is not None else None
+    state, tables = of_blocks.read(both.comm, path, KIND, "particles and blocks together")
     of_the_discs = None
     if tables is not None:
         of_the_discs = {name.removeprefix(PREFIX): t for name, t in tables.items() if name.startswith(PREFIX)}

@@ -6,6 +6,7 @@ import pytest
 
 from hpcdem.cases import DirectTension
 from tests.cases.ready import results
+from tests.conftest import Launcher
 
 BRITTLE = {"tensile_strength": 2e6, "gf1": 1e-4, "gf2": 0.2}
 """Fracture energies of the manual's example: 0.1 and 200 uN/mm."""
@@ -56,3 +57,23 @@ def test_dog_bone(launch, tmp_path, path):
     assert done.crack_high - done.crack_low < 0.005
     assert done.tension >= 10 and done.shear == 0
     assert done.energy_error < 0.01
+
+
+@pytest.fixture(scope="module")
+def free_bone(tmp_path_factory):
+    """The dog-bone on an irregular mesh, run once."""
+    return results(Launcher(), tmp_path_factory.mktemp("bone"), DirectTension(**BRITTLE))
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="the mean of the three points of a joint stays 2.5 % below the strength")
+def test_dog_bone_breaks_at_the_strength_of_its_joints(free_bone):
+    """What is asked of it: the largest stress of a joint is the strength, to 1 %. Not reached (docs/validation.md)."""
+    assert free_bone.peak_joint == pytest.approx(2e6, rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="the crack lies up to 5.7 mm from the neck, where the mesh has a weaker path")
+def test_dog_bone_breaks_at_its_neck(free_bone):
+    """What is asked of it: the whole crack within 5 mm of the neck. Not reached (docs/validation.md)."""
+    assert -0.005 < free_bone.crack_low <= free_bone.crack_high < 0.005
