@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import atexit
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,9 +60,7 @@ class Session:
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
         if not self.kernels_ready:
-            from hpcdem.runtime.warmup import prepare_kernels
-
-            prepare_kernels(self.comm, self.log, lambda: rehearse(self.threads))
+            prepare(self.comm, self.log, "", self.threads)
             self.kernels_ready = True
             self.stop.install(self.comm.rank)
         from hpcdem.simulation import Simulation  # brings the kernels with it
@@ -77,9 +77,7 @@ class Session:
     def project(self, outdir: Path | None = None) -> Project:
         """Collective: an empty model of blocks; the first one waits for the kernels."""
         if not self.blocks_ready:
-            from hpcdem.runtime.warmup import prepare_kernels
-
-            prepare_kernels(self.comm, self.log, lambda: rehearse_blocks(self.threads), "blocks")
+            prepare(self.comm, self.log, "blocks", self.threads)
             self.blocks_ready = True
             self.stop.install(self.comm.rank)
         from hpcdem.blocks import Blocks
@@ -96,9 +94,7 @@ class Session:
     def prepare_coupling(self) -> None:
         """Collective: wait for the kernels of particles and blocks in one run."""
         if not self.coupling_ready:
-            from hpcdem.runtime.warmup import prepare_kernels
-
-            prepare_kernels(self.comm, self.log, lambda: rehearse_coupling(self.threads), "coupled")
+            prepare(self.comm, self.log, "coupled", self.threads)
             self.coupling_ready = True
 
     def finish(self, sim: Simulation) -> None:
@@ -163,30 +159,29 @@ class Session:
             run_folder.leave(Path(sim.outdir), self.comm, state, sim.clock.step)
 
 
-def rehearse(*threads: int) -> None:
-    """Call every kernel once for each number of threads. Imports them: the cache must be settled before."""
-    from hpcdem.commands import rehearsal
-    from hpcdem.io import textnum
+def prepare(comm: SerialComm, log: Log, kind: str, *threads: int) -> Path:
+    """Collective: load the kernels of a kind (see `rehearse`), and before them those that all share, or compile them,
+    for each number of threads; particles and blocks come before "coupled". Returns their cache folder."""
+    from hpcdem.runtime.warmup import prepare_kernels
 
+    kinds = dict.fromkeys(("shared", kind))
+    return prepare_kernels(comm, log, {name: partial(rehearse, name, *threads) for name in kinds})
+
+
+def rehearse(kind: str, *threads: int) -> None:
+    """Call every kernel of a kind once for each number of threads: "" of particles, "blocks", "coupled" what both need
+    besides, "shared" by all. Imports them: the cache must be settled before."""
+    call: Callable[[int], None]
+    if kind == "shared":
+        from hpcdem.rehearsal import rehearse as call
+    elif kind == "blocks":
+        from hpcdem.commands.blocks.rehearsal import rehearse as call
+    elif kind == "coupled":
+        from hpcdem.coupled.rehearsal import rehearse as call
+    else:
+        from hpcdem.commands.rehearsal import rehearse as call
     for n in threads:
-        rehearsal.rehearse(n)
-    textnum.warm_up()
-
-
-def rehearse_blocks(*threads: int) -> None:
-    """The same for the kernels of blocks."""
-    from hpcdem.commands.blocks import rehearsal
-
-    for n in threads:
-        rehearsal.rehearse(n)
-
-
-def rehearse_coupling(*threads: int) -> None:
-    """The same for the kernels of particles and blocks in one run; those of either are there."""
-    from hpcdem.coupled import rehearsal
-
-    for n in threads:
-        rehearsal.rehearse(n)
+        call(n)
 
 
 def watch_states(sim: Simulation, reproduction: Reproduction) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+from functools import partial
 from typing import NoReturn
 
 import click
@@ -18,7 +19,7 @@ from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run
 from hpcdem.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
-from hpcdem.session import Session, greet, rehearse, rehearse_blocks, rehearse_coupling
+from hpcdem.session import Session, greet, prepare
 
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
@@ -91,15 +92,12 @@ def run_warmup(words: list[str]) -> NoReturn:
             kinds = ("particles", "blocks", "coupled")
             sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in kinds))
         launch.prepare_environment(threads)
+        from hpcdem.halo.comm import SerialComm
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.warmup import warmup as compile_all
 
-        if kind in ("blocks", "coupled"):
-            compile_all(Log(), lambda: rehearse_blocks(*{1, threads}), "blocks")
-        if kind in ("particles", "coupled"):
-            compile_all(Log(), lambda: rehearse(*{1, threads}))
-        if kind == "coupled":
-            compile_all(Log(), lambda: rehearse_coupling(*{1, threads}), "coupled")
+        for one in {"particles": [""], "blocks": ["blocks"], "coupled": ["", "blocks", "coupled"]}[kind]:
+            compile_all(Log(), partial(prepare, SerialComm(), Log(), one, *{1, threads}))
     sys.exit(EXIT_OK)
 
 

@@ -54,25 +54,8 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
 
 
 def load_kernels(comm: SerialComm) -> None:
-    """Collective: compile or load what writes text, in a cache folder of its own: that of the runs holds all kernels
-    of a run, or does not exist. Rank 0 goes first. Before any import of hpcdem.io."""
-    from hpcdem.runtime import warmup
-    from hpcdem.runtime.launch import patient_barrier
+    """Collective: compile or load what writes text, which runs share. Before any import of hpcdem.io."""
+    from hpcdem.runtime.progress import Log
+    from hpcdem.session import prepare
 
-    folder, _ = warmup.cache_folder()
-    folder = folder.with_name(f"{folder.name}-text")
-    for first in (True, False):
-        if (comm.rank == 0) is first:
-            warmup.load_kernels(folder, _write_a_little)
-        patient_barrier(comm)
-
-
-def _write_a_little() -> None:
-    import numpy as np
-
-    from hpcdem.io.textnum import INT, Column, TextTable, sci
-
-    numbers = np.array([1.5, np.nan])
-    columns = [(Column("id", INT, 11), np.array([1, 2])), (sci("x", 13), numbers), (sci("y"), numbers)]
-    for _ in TextTable(columns).blocks():
-        pass
+    prepare(comm, Log(1), "shared", 1)  # of which nobody need hear

@@ -8,6 +8,7 @@ from hpcdem import observe
 from hpcdem.budget import Budget
 from hpcdem.commands import bonds, clumps, particles, properties, running, settings, walls
 from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.dem import laws
 from hpcdem.selection import Ids
 from hpcdem.simulation import Simulation
 
@@ -41,3 +42,4 @@ def rehearse(threads: int = 1) -> None:
     observe.highest_frequency(sim)
     observe.frame(sim)
     observe.critical_dt(sim)
+    laws.tangent_normal_stiffness(1.0, 1.0, 1.0, 1.0)  # SET frac where nothing touches

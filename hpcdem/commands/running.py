@@ -160,7 +160,7 @@ def time_step(sim: Simulation) -> float:
     touching = float(sim.comm.max_into(largest)[0])
     if len(hertz) and touching == 0.0:
         r = sim.largest_radius
-        touching = max(tangent_normal_stiffness(1, a, 2.0 * r, 0.01 * r) for a in hertz[:, 1])
+        touching = max(tangent_normal_stiffness(model, a, 2.0 * r, 0.01 * r) for model, a, *_ in hertz)
     stiffest = max(stiffest, touching)
     if stiffest <= 0.0:
         raise CommandError("SET frac: no stiffness is set (PROP kn, or shear with HERTZ); use SET DT")

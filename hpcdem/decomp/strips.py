@@ -36,6 +36,7 @@ def global_order(cell: np.ndarray, gid: np.ndarray) -> np.ndarray:
     """
     if not len(cell):
         return np.empty(0, np.int64)
+    cell, gid = np.ascontiguousarray(cell), np.ascontiguousarray(gid)  # the ids are mostly a column of a table
     left, right, bottom, top = _extent(cell)
     rows = top - bottom + 1
     number = (right - left + 1) * rows

@@ -3,7 +3,7 @@
 A kernel is compiled once per machine type and read by everyone else. numba's own cache folder is not safe when
 several processes fill it at the same time (two of them may number different kernels alike), so a folder is filled
 under a private name and then renamed; a folder with its final name is complete. Folders that already have their
-final name are only read.
+final name are only read: a kernel that is missing there is compiled by each process that needs it, for itself.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hpcdem.runtime.launch import patient_barrier, version
 
@@ -31,18 +31,32 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None], kind: str = "") -> Path:
-    """Collective: load or compile all kernels (by calling `warm`); returns the cache folder of this rank.
-
-    kind: "" for those of particles, "blocks" for those of blocks, "coupled" for what both together need besides; they
-    have folders of their own.
+def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callable[[], None]]) -> Path:
+    """Collective: load or compile kernels, those of one kind after those of another; returns the last cache folder of
+    this rank. rehearsals: by kind, what calls all of its kernels once; each kind has a folder of its own.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
     a folder has still to be filled, one rank of each machine type goes first, then one of each host, then the rest,
     so that nothing is compiled twice on a shared file system and each local disk gets its copy.
     """
     folder, writable = cache_folder()
-    folder = folder.with_name(f"{folder.name}-{kind}") if kind else folder
+    folders = [folder.with_name(f"{folder.name}-{kind}") if kind else folder for kind in rehearsals]
+    if comm.rank == 0 and not all(folder.is_dir() for folder in folders):
+        log.info("compiling the kernels (first run of this version on this machine)")
+    damaged = [_prepare(comm, *one) for one in zip(folders, rehearsals.values())]
+
+    if comm.any(not writable):
+        log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
+    if comm.any(any(damaged)):
+        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it anew")
+    if comm.rank == 0:
+        for folder in folders:
+            tidy(folder)
+    return folders[-1]
+
+
+def _prepare(comm: SerialComm, folder: Path, warm: Callable[[], None]) -> bool:
+    """The same for one folder; whether it had to be given up."""
     ranks = comm.allgather((socket.gethostname(), folder.name, folder.is_dir()))
     host, key, _ = ranks[comm.rank]
     if all(ready for *_, ready in ranks):
@@ -53,22 +67,13 @@ def prepare_kernels(comm: SerialComm, log: Log, warm: Callable[[], None], kind: 
         turn = 1
     else:
         turn = 2
-    if comm.rank == 0 and not folder.is_dir():
-        log.info("compiling the kernels (first run of this version on this machine)")
 
     damaged = False
     for now in range(3):
         if now == turn:
             damaged = not load_kernels(folder, warm)
         patient_barrier(comm)
-
-    if comm.any(not writable):
-        log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
-    if comm.any(damaged):
-        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it anew")
-    if comm.rank == 0:
-        tidy(folder)
-    return folder
+    return damaged
 
 
 def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
@@ -78,8 +83,10 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     private = f"{folder.name}{BUILDING}{socket.gethostname()}-{os.getpid()}"
     building = None if folder.is_dir() else folder.with_name(private)
     numba.config.CACHE_DIR = str(building or folder)  # type: ignore[attr-defined]
+    (_only_read.add if building is None else _only_read.discard)(building or folder)
     try:
-        warm()
+        with _rehearsing():
+            warm()
     except Exception:
         # numba passes on whatever a damaged file makes pickle or LLVM say. If it is no cache error it comes again.
         give_up_cache()
@@ -91,7 +98,36 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
             building.rename(folder)
         shutil.rmtree(building, ignore_errors=True)
         numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+        _only_read.update((building, folder))  # the kernels of this process still have it under its first name
     return True
+
+
+late: list[str] = []
+"""Kernels that this process has compiled for itself, as they were not in their folder: a rehearsal lacks them."""
+_only_read: set[Path] = set()
+_plain_save: Any = None
+
+
+@contextlib.contextmanager
+def _rehearsing() -> Iterator[None]:
+    """See to it that numba writes nothing into complete folders: neither now, when kernels that are compiled have those
+    of other folders in them, nor later, when many processes may do so at the same time."""
+    global _plain_save
+    from numba.core.caching import FunctionCache
+
+    if _plain_save is None:
+        _plain_save = FunctionCache.save_overload
+    count = len(late)
+
+    def save(cache: Any, signature: Any, kernel: Any) -> None:
+        if _only_read.isdisjoint(Path(cache.cache_path).parents):
+            _plain_save(cache, signature, kernel)
+        else:
+            late.append(f"{kernel.fndesc.modname}.{kernel.fndesc.qualname}{signature}")
+
+    FunctionCache.save_overload = save  # type: ignore[method-assign]
+    yield
+    del late[count:]
 
 
 def give_up_cache() -> None:
@@ -183,7 +219,7 @@ def kernel_sources(package: Path) -> list[Path]:
         found |= more
         wanted += more
     callers = {path for path, used in imports.items() if used & kernels}
-    rehearsals = {package / folder / "rehearsal.py" for folder in ("commands", "commands/blocks", "blocks", "coupled")}
+    rehearsals = set(package.rglob("rehearsal.py"))
     return sorted(found | callers | rehearsals)  # what they call is what the folders hold
 
 
@@ -216,12 +252,8 @@ def tidy(folder: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
-def warmup(log: Log, warm: Callable[[], None], kind: str = "") -> Path:
-    """Compile for later runs, as on a login node: `hpcdem warmup`. Particles or blocks in a process: numba settles the
-    folder of a kernel once."""
-    from hpcdem.halo.comm import SerialComm
-
+def warmup(log: Log, prepare: Callable[[], Path]) -> None:
+    """Compile for later runs, as on a login node: `hpcdem warmup`."""
     began = time.monotonic()
-    folder = prepare_kernels(SerialComm(), log, warm, kind)
+    folder = prepare()
     log.info(f"kernels ready in {time.monotonic() - began:.1f} s: {folder}")
-    return folder

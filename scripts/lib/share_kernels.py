@@ -34,7 +34,7 @@ def folder(threads: int) -> Path:
 def main() -> None:
     """Copy what is there."""
     compiled, single = folder(2), folder(1)
-    for kind in ("", "-blocks", "-coupled"):
+    for kind in ("-shared", "", "-blocks", "-coupled"):
         source, target = (f.with_name(f.name + kind) for f in (compiled, single))
         for package in {path.parent for path in Path(hpcdem.__file__).parent.rglob("*.py")}:
             of_package = source / _CacheLocator.get_suitable_cache_subpath(str(package / "any.py"))

@@ -52,9 +52,8 @@ def get_ready(comm: Any) -> None:
     """Load the kernels, or compile them: a script is not to wait for that."""
     from hpcdem import session
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.warmup import prepare_kernels
 
-    prepare_kernels(comm, Log(comm.rank, stream=io.StringIO()), lambda: session.rehearse(1))
+    session.prepare(comm, Log(comm.rank, stream=io.StringIO()), "", 1)
 
 
 # ---- a script --------------------------------------------------------------------------------------------------------

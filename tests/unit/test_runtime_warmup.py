@@ -61,7 +61,7 @@ def kernels(tmp_path, monkeypatch):
 
 def prepare(kernels) -> tuple[Path, str]:
     out = io.StringIO()
-    return warmup.prepare_kernels(SerialComm(), Log(stream=out), kernels()), out.getvalue()
+    return warmup.prepare_kernels(SerialComm(), Log(stream=out), {"": kernels()}), out.getvalue()
 
 
 def files(folder: Path) -> list[str]:
@@ -84,7 +84,7 @@ def test_nobody_sees_a_folder_that_is_not_complete(base, kernels):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), fails)
+        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": fails})
     assert not (base / warmup.cache_key()).exists()
 
 
@@ -95,7 +95,7 @@ def test_the_faster_of_two_jobs_wins(base, kernels):
         other.mkdir()
         (other / "theirs.nbi").write_text("complete")
 
-    warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), warm)
+    warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": warm})
     (left,) = base.iterdir()
     assert [p.name for p in left.iterdir()] == ["theirs.nbi"]
 
@@ -118,7 +118,7 @@ def test_an_error_of_the_kernels_themselves_comes_through(base):
         raise TypeError("a kernel that cannot be compiled")
 
     with pytest.raises(TypeError):
-        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), wrong)
+        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": wrong})
 
 
 def test_a_cache_that_cannot_be_written_moves_to_a_temporary_folder(tmp_path, monkeypatch, kernels, base):
@@ -186,7 +186,7 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
         "    import kernels_of_a_test as k\n"
         "    k.twice(21)\n"
         "def work():\n"
-        "    warmup.prepare_kernels(comm, Log(comm.rank), warm)\n"
+        "    warmup.prepare_kernels(comm, Log(comm.rank), {'': warm})\n"
         "    import kernels_of_a_test as k\n"
         "    hits = sum(k.twice.stats.cache_hits.values())\n"
         "    sys.stdout.write(f'rank {comm.rank} hits {hits}\\n')\n"

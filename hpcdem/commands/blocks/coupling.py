@@ -1,13 +1,14 @@
-"""Particles beside the blocks of a script: hpcdem.couple, and what `model step` and `model solve` then do."""
+"""Particles beside the blocks of a script: hpcdem.couple, and what `model step` and `model solve` then do.
+
+Whatever is about particles is imported where they are there: a script of blocks alone does without their kernels, and
+numba keeps a kernel in the folder of those with which it was imported (see runtime/warmup.py).
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hpcdem import output
-from hpcdem.budget import Budget
-from hpcdem.commands import running
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 def couple(project: Project, particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupled:
     """From now on both are stepped together. friction: largest one between discs and faces; dt [s]: time step of both,
     0: as said for one of them, else the smaller of the stable ones. Collective."""
+    from hpcdem.commands import running
     from hpcdem.coupled import Coupled
 
     if project.coupled is not None:
@@ -49,6 +51,9 @@ def advance(project: Project, steps: int) -> int:
     both = project.coupled
     if both is None:
         return project.blocks.advance(steps)
+    from hpcdem import output
+    from hpcdem.budget import Budget
+
     take_up(project)
     sim, settings = both.particles, both.particles.settings
     intervals = [every for every in (settings.print, settings.energy) if every > 0]
@@ -73,6 +78,8 @@ def advance(project: Project, steps: int) -> int:
 
 def _write(sim: Simulation) -> None:
     """What is due of the particles at this step."""
+    from hpcdem import output
+
     step, settings = sim.clock.step, sim.settings
     if settings.print > 0 and step % settings.print == 0:
         output.Snapshot(sim).write_print()

@@ -67,7 +67,7 @@ class Histories:
 
     def bonded(self) -> int:
         """Number of entries with a bond: each bond counts at both its ends."""
-        return _count_bonds(self.bond)
+        return _count_bonds(self.rows.view(np.int64))
 
     def take(self, order: np.ndarray) -> Histories:
         """The histories of the particles in `order` (indices, with or without some left out)."""
@@ -95,10 +95,10 @@ def _starts(counts: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _count_bonds(bond):
+def _count_bonds(rows):
     n = 0
-    for value in bond:
-        n += value != 0
+    for row in rows:
+        n += row[BOND] != 0
     return n
 
 
