@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.blocks.solving import Solving
     from hpcdem.halo.comm import SerialComm
 
-KIND = "blocks"
+KIND = checkpoint.BLOCKS
 ARRAYS = {
     "elements": ("alive", "element_row"),
     "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row"),

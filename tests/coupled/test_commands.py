@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 from hpcdem.blocks import Blocks
-from hpcdem.commands import properties, running, settings
+from hpcdem.cli import info
+from hpcdem.commands import properties, running, settings, walls
 from hpcdem.commands.blocks import assigning, coupling, meshing, saving
 from hpcdem.commands.blocks import running as stepping
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.post import inventory
 from tests.coupled.support import ROCK, discs
 
 
@@ -75,3 +80,45 @@ def test_refusals(tmp_path):
         running.cycle(sim, 1)
     project.clear()
     running.cycle(sim, 1)
+
+
+def test_info_of_a_checkpoint_of_both(tmp_path, capsys):
+    """Both stand in it, each with its own step; damage is found wherever it is."""
+    project, sim = scene(tmp_path)
+    walls.wall(sim, 1, nodes=((-1.0, -0.5), (2.0, -0.5)))
+    running.cycle(sim, 7)
+    both = coupling.couple(project, sim)
+    stepping.step(project, 130)
+    saving.save(project, "middle.sav")
+    path = tmp_path / "middle.sav"
+    facts = inventory.of_file(path)
+    assert facts["whole"] and (facts["kind"], facts["version"]) == ("checkpoint", checkpoint.VERSION)
+    assert (facts["step"], facts["dt"], facts["elements"], facts["nodes"]) == (130, 5e-6, 36, 28)
+    assert facts["time"] == project.blocks.clock.time
+    assert facts["particles_at"] == {"step": 137, "time": sim.clock.time, "dt": 5e-6}
+    assert (facts["particles"], facts["bonds"], facts["walls"]) == (2, 0, 1)
+    assert facts["disc_face_contacts"] == len(both.contacts()["id"]) > 0
+    info.show(path, facts)
+    shown = capsys.readouterr().out
+    assert f"{path}: checkpoint, whole" in shown and "\n  particles    2\n" in shown
+    assert "\n  particles at step 137, time 0.000685, dt 5e-06\n" in shown
+
+    content = path.read_bytes()
+    tables = checkpoint.read(path)[1]
+    broken = tmp_path / "broken.sav"
+    for name in ("discs_particles", "disc_contacts", "state"):
+        rows = next(iter(column for column in tables[name].values() if column.any()))
+        at = content.index(rows.tobytes())
+        broken.write_bytes(content[: at + 1] + bytes([content[at + 1] ^ 1]) + content[at + 2 :])
+        assert not inventory.of_file(broken)["whole"]
+    broken.write_bytes(content[:-100])
+    assert "seal" in inventory.of_file(broken)["why"]
+
+    state = checkpoint.read_state(path)
+    hostile = ({"kind": "plasma"}, {"particles": None}, {"particles": {**state["particles"], "walls": 3}},
+               {"particles": {}}, {"extra": []})  # fmt: skip
+    for change in hostile:
+        slabs = {name: Table(columns, 0, len(next(iter(columns.values())))) for name, columns in tables.items()}
+        checkpoint.write(broken, {**state, **change}, slabs, SerialComm())
+        facts = inventory.of_file(broken)
+        assert not facts["whole"] and ("of what ('plasma')" in facts["why"] or "is damaged" in facts["why"])
