@@ -253,6 +253,8 @@ def tell_energy(sim: Simulation) -> None:
     )
 
 
+ACROSS = "work across contacts of discs and faces"
+"""The same in the tables of both sides."""
 ENERGY_WORDS = {
     "kinetic_translation": "stored: motion",
     "kinetic_rotation": "stored: rotation",
@@ -270,7 +272,7 @@ ENERGY_WORDS = {
     "loss_stiffness": "lost by change of shear stiffness",
     "commands": "brought by commands",
     "box": "brought by leaving the BOX",
-    "work_blocks": "work of blocks that touch particles",
+    "work_blocks": ACROSS,
     "closing": "closing error",
 }
 """What the table at the end calls the columns of energy.csv."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import sys
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -60,7 +61,8 @@ class Session:
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
         if not self.kernels_ready:
-            prepare(self.comm, self.log, "", self.threads)
+            with self._counted():
+                prepare(self.comm, self.log, "", self.threads)
             self.kernels_ready = True
             self.stop.install(self.comm.rank)
         from hpcdem.simulation import Simulation  # brings the kernels with it
@@ -94,11 +96,19 @@ class Session:
     def prepare_coupling(self) -> None:
         """Collective: wait for the kernels of particles and blocks in one run."""
         if not self.coupling_ready:
-            prepare(self.comm, self.log, "coupled", self.threads)
+            with self._counted():
+                prepare(self.comm, self.log, "coupled", self.threads)
             self.coupling_ready = True
 
+    def _counted(self) -> AbstractContextManager[None]:
+        """What blocks wait for that are there already stands in their table of stages."""
+        return self.projects[-1].blocks.timers.around("kernels") if self.projects else nullcontext()
+
     def finish(self, sim: Simulation) -> None:
-        """Collective: the table of stages, the figure of the last frame; MPI forgets the simulation."""
+        """Collective: the table of stages, the figure of the last frame; MPI forgets the simulation. Particles that are
+        stepped with blocks wait for the end of these, which is that of the program."""
+        if any(project.coupled is not None and project.coupled.particles is sim for project in self.projects):
+            return
         if sim in self.unfinished:
             self.unfinished.remove(sim)
         if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
@@ -108,7 +118,7 @@ class Session:
             output.Snapshot(sim).write_print()
         if sim.timers.steps:
             report_end(sim)
-        if sim.log is not None and sim.timers.steps:
+        if sim.log is not None and sim.timers.steps and not sim.coupled:  # else the table of the blocks has both
             summary = sim.log.stages(sim.timers, self.comm)
             if self.comm.rank == 0:
                 law = "hertz" if sim.materials.rows["hertz"].any() else "linear"
@@ -120,6 +130,9 @@ class Session:
 
     def close(self, failure: BaseException | None = None) -> None:
         """The end of the program: simulations that were not finished are, unless it is the end by a failure."""
+        for project in [project for project in self.projects if project.coupled is not None]:
+            self.projects.remove(project)
+            self._leave(project, failure)  # while its particles are there
         for sim in list(self.unfinished):
             if failure is None:
                 self.finish(sim)

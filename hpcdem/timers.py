@@ -13,13 +13,13 @@ counted in both, unless the outer one is entered by `around`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Any
 
-WAITING = frozenset({"halo", "migrate", "reduce", "output", "checkpoint", "figure", "callback"})
+WAITING = frozenset({"halo", "exchange", "migrate", "reduce", "output", "checkpoint", "figure", "callback"})
 """Stages in which a rank mostly waits for others or for the disk; all others are its own work."""
 
 
@@ -81,6 +81,19 @@ class Timers:
         self.particle_steps = 0
         self._began = perf_counter_ns()
 
+    @staticmethod
+    def joined(parts: Mapping[str, Timers], shared: Mapping[str, str]) -> Timers:
+        """Those of models that run together, for one table: stages get the name of their model before them, `shared`
+        ones (whatever the model) that in `shared`. Wall time counts from the first model on; no steps."""
+        made = Timers()
+        made._began = min(timers._began for timers in parts.values())
+        for model, timers in parts.items():
+            for name, watch in timers.watches.items():
+                into = made(shared.get(name, f"{model}: {name}"))
+                into.ns += watch.ns
+                into.calls += watch.calls
+        return made
+
     def __call__(self, name: str) -> Stopwatch:
         """The stopwatch of a stage, for ``with timers("force"):``."""
         watch = self.watches.get(name)
@@ -116,7 +129,7 @@ class Timers:
         """Time this rank spent in the stages [s]; in all of its own work when no name is given."""
         if names:
             return sum(self.watches[n].seconds for n in names if n in self.watches)
-        return sum(w.seconds for n, w in self.watches.items() if n not in WAITING)
+        return sum(w.seconds for n, w in self.watches.items() if n.rpartition(": ")[2] not in WAITING)
 
     def merge(self, comm: Any) -> Summary:
         """Collective: the same summary on every rank."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.physics.exact_sum import exact_sum
+from hpcdem.physics.exact_sum import exact_sum, from_integer
 from hpcdem.physics.fdem import energy
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ WORK = ("joints", "contact", "viscous", "gravity", "outside")
 
 class Budget:
     """The account of one model. accounts: work of each kind up to the last interruption [J/m]; commands: changes by
-    commands of what is stored; start, left: what was stored at the beginning and at the interruption.
+    commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
+    of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer.
 
     running: steps are being booked; otherwise the account stands at a whole step.
     """
@@ -35,6 +36,7 @@ class Budget:
         self.start: dict[str, float] | None = None
         self.left = dict.fromkeys(STORED, 0.0)
         self.running = False
+        self.discs = 0
         self._before = np.empty((0, 0))
 
     # ---- called by the step ----------------------------------------------------------------------------------------
@@ -94,6 +96,7 @@ class Budget:
         work = {name: self.accounts[name] + done[name] + half[name] for name in WORK}
         change = sum(stored.values()) - sum(start.values())
         by_commands = sum(self.commands.values())
+        of_discs = self._of_discs(sim)
         joints_lost = -work["joints"] - (stored["joints"] - start["joints"] - self.commands["joints"])
         found = {
             "kinetic": stored["kinetic"],
@@ -103,7 +106,8 @@ class Budget:
             "contact": -work["contact"],
             "viscous_lost": -work["viscous"],
             "work_gravity": work["gravity"],
-            "work_outside": work["outside"],
+            "work_outside": work["outside"] - of_discs,
+            "work_discs": of_discs,
             "commands": by_commands,
         }
         given = work["gravity"] + work["outside"] + by_commands
@@ -114,6 +118,14 @@ class Budget:
         largest = max(map(abs, flows))
         found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
         return found
+
+    def add_from_discs(self, work: int) -> None:
+        """Say how much of the work from outside discs did, this rank's share, as an integer of
+        exact_sum.as_integer."""
+        self.discs += work
+
+    def _of_discs(self, sim: Looking) -> float:
+        return from_integer(sum(sim.comm.allgather(self.discs)))
 
     def _done(self, sim: Looking) -> dict[str, float]:
         """Work booked in the columns of the elements, summed over the model."""
@@ -154,17 +166,18 @@ class Budget:
 
     # ---- state on disk ---------------------------------------------------------------------------------------------
 
-    def state(self) -> dict[str, Any]:
-        """As JSON values; the columns of the elements are saved with them."""
+    def state(self, sim: Looking) -> dict[str, Any]:
+        """As JSON values; the columns of the elements are saved with them. Collective."""
         return {
             "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,
-            "running": self.running,
+            "running": self.running, "discs": hex(sum(sim.comm.allgather(self.discs))),
         }  # fmt: skip
 
     @staticmethod
-    def restored(state: dict[str, Any]) -> Budget:
-        """Inverse of `state`."""
+    def restored(state: dict[str, Any], first: bool) -> Budget:
+        """Inverse of `state`; first: this rank takes the share of all ranks."""
         made = Budget()
+        made.discs = int(state.get("discs", "0x0"), 16) if first else 0
         made.accounts, made.commands = dict(state["accounts"]), dict(state["commands"])
         made.start, made.left, made.running = state["start"], state["left"], state["running"]
         return made

@@ -397,8 +397,8 @@ class Looking(Core):
 
         Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
         in joints), contact (stored or lost there), viscous_lost, work_gravity, work_outside (loads and conditions),
-        commands (change of what is stored by commands). closing: change of what is stored + lost - work - commands;
-        relative: that over the largest of all.
+        work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
+        what is stored + lost - work - commands; relative: that over the largest of all.
         """
         if self.budget is None:
             raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hpcdem.blocks.solving import Solving
     from hpcdem.halo.comm import SerialComm
 
-KIND = "blocks"
+KIND = checkpoint.BLOCKS
 ARRAYS = {
     "elements": ("alive", "element_row"),
     "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row"),
@@ -52,7 +52,7 @@ def state_of(sim: Solving, extra: Mapping[str, Any]) -> dict[str, Any]:
         "longest": sim._longest,
         "tally": tally.tolist(),
         "rebuilds": sim.rebuilds,
-        "budget": sim.budget.state() if sim.budget is not None else None,
+        "budget": sim.budget.state(sim) if sim.budget is not None else None,
         "columns": {name: values.shape[1] for name, values in sim.cold.items()},
         "mesh": None if mesh is None else {
             "groups": {s: {g: rows.tolist() for g, rows in of.items()} for s, of in mesh.groups.items()},
@@ -169,7 +169,7 @@ def _apply(
         return
     places = _take_rows(sim, state, tables)
     if state["budget"] is not None:
-        sim.budget = Budget.restored(state["budget"])
+        sim.budget = Budget.restored(state["budget"], sim.comm.rank == 0)
     if state["closed"]:
         _close_as_it_was(sim, state, places)
     sim.rebuilds = state["rebuilds"]

@@ -19,6 +19,7 @@ import numpy as np
 
 from hpcdem import observe
 from hpcdem.blocks import Blocks, build
+from hpcdem.budget import EMPTIED
 from hpcdem.coupled import saving
 from hpcdem.coupled.links import Link, Touching
 from hpcdem.errors import CommandError, PhysicsError
@@ -65,6 +66,7 @@ class Coupled:
         self._countdown = self._pace = 1
         self._bins = np.zeros((2, *BINS_SHAPE), np.int64)
         self._done = [0, 0]
+        self._booked = 0
         self._stored_at_start: float | None = None
         self._law_key: Any = None
         blocks.open_model()
@@ -78,17 +80,18 @@ class Coupled:
         request = done = 0
         self.prepare()
         while done < steps and not request:
-            request = self.step()
+            request = self._step()
             done += 1
+        self._empty()
         self.particles.timers.count(done, len(self.particles.particles))
         self.blocks.timers.count(done, len(self.blocks.number[self.blocks.owned]))
         return request
 
-    def step(self) -> int:
+    def _step(self) -> int:
         """Advance both by one dt. Returns what the outside asked for (0: nothing), agreed by all ranks."""
         particles, blocks = self.particles, self.blocks
         self.prepare()
-        books = particles.energy is not None or blocks.budget is not None
+        books = self.accounted
         if books:
             self._book_discs(kick=True)
         self._stepping = True
@@ -108,7 +111,9 @@ class Coupled:
         if books:
             self._book_discs(kick=False)
             self._book_faces()
-            self._empty()
+            self._booked += 1
+            if self._booked >= EMPTIED:
+                self._empty()
         return request
 
     def prepare(self) -> None:
@@ -138,7 +143,7 @@ class Coupled:
                 f"the time steps differ: {one!r} s of the particles, {other!r} s of the blocks; one must be said "
                 "for both (SET dt and model time-step), or `settle_time_step` called anew"
             )
-        if (self.particles.energy is not None or self.blocks.budget is not None) and self.particles.clumps:
+        if self.accounted and self.particles.clumps:
             raise CommandError("there is no account of energy for clumps that touch blocks: leave it off")
 
     def _link(self) -> Link:
@@ -153,7 +158,7 @@ class Coupled:
     def _connect(self) -> None:
         """Search for contacts at the present positions."""
         particles, blocks = self.particles, self.blocks
-        with particles.timers("couple"):
+        with particles.timers("search"):
             if self.link is not None:
                 self._known = self.link.touching()
                 self.link.close()
@@ -171,19 +176,15 @@ class Coupled:
         particles, blocks, link = self.particles, self.blocks, self._link()
         p, mesh, dt = particles.particles, blocks.the_mesh(), particles.clock.dt
         of_discs, of_blocks = np.zeros(4), np.zeros(4)
-        motion.survey(p.hot, p.n_left, p.n_own, link.origin, dt, of_discs)
-        build.survey(
-            blocks.x,
-            blocks.v,
-            link.corners,
-            blocks.owned.start,
-            len(link.corners),
-            mesh.cells,
-            blocks.number,
-            of_blocks,
-        )
-        found = np.array([of_discs[0], of_discs[1], of_blocks[0], of_blocks[1], float(self._inside)])
-        self.comm.max_into(found)
+        with particles.timers("search"):
+            motion.survey(p.hot, p.n_left, p.n_own, link.origin, dt, of_discs)
+            build.survey(
+                blocks.x, blocks.v, link.corners, blocks.owned.start, len(link.corners), mesh.cells, blocks.number,
+                of_blocks,
+            )  # fmt: skip
+            found = np.array([of_discs[0], of_discs[1], of_blocks[0], of_blocks[1], float(self._inside)])
+        with particles.timers("reduce"):
+            self.comm.max_into(found)
         if found[4] >= 0.0:
             self._stop_on_breakthrough(int(found[4]))
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
@@ -200,24 +201,22 @@ class Coupled:
     def _interact(self) -> None:
         """Forces between the two at the present positions; friction moves on by dt."""
         link, particles = self._link(), self.particles
-        with self.blocks.timers("couple"):
-            link.fetch()
+        link.fetch()
         with particles.timers("couple"):
             self._inside = max(self._inside, self._forces(False))
             b = particles.lists.blocks
             disc_faces.add_to_discs(1.0, link.disc_row, link.disc_force, b.cut, b.lo, b.foff, particles.lists.force)
-        with self.blocks.timers("couple"):
-            link.deliver()
+        link.deliver()
         if particles.clumps:
             particles.clumps.sum_forces(particles.particles, particles.halo, particles.lists)
 
     def _replay(self) -> None:
         """The forces on the blocks as they were; those on the particles are stored with them."""
         link = self._link()
-        with self.blocks.timers("couple"):
-            link.fetch()
+        link.fetch()
+        with self.particles.timers("couple"):
             self._forces(True)
-            link.deliver()
+        link.deliver()
 
     def _forces(self, again: bool) -> int:
         link, particles = self._link(), self.particles
@@ -397,23 +396,36 @@ class Coupled:
             )
 
     def _empty(self) -> None:
+        """What was booked in the steps since then, to the accounts."""
+        if not self._booked:
+            return
+        self._booked = 0
         for side in (ON_DISCS, ON_FACES):
             value = as_integer(self._bins[side]) or 0
             self._done[side] += value
             if side == ON_DISCS and self.particles.energy is not None:
                 self.particles.energy.add_from_blocks(value)
+            if side == ON_FACES and self.blocks.budget is not None and self.blocks.budget.start is not None:
+                self.blocks.budget.add_from_discs(value)
         self._bins[:] = 0
+
+    @property
+    def accounted(self) -> bool:
+        """An account of energy is kept, of one model at least."""
+        return self.particles.energy is not None or self.blocks.budget is not None
 
     def energies(self) -> dict[str, float]:
         """Energy that went across the contacts since the account began [J]: work_on_particles, work_on_blocks; stored:
-        elastic energy of the contacts now; lost: by their friction, and by errors of the time step. With accounts of
-        both models also closing: what does not add up in all, and relative: that over the largest flow."""
+        elastic energy of the contacts now, stored_before: at the beginning; lost: by their friction, and by errors of
+        the time step. With accounts of both models also closing: what does not add up in all, and relative: that over
+        the largest flow."""
         self.prepare()
         parts = self.comm.allgather(tuple(self._done))
         discs, faces = (from_integer(sum(part[side] for part in parts)) for side in (ON_DISCS, ON_FACES))
         stored = self._stored()
-        found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored}
-        found["lost"] = -(discs + faces) - (stored - (self._stored_at_start or 0.0))
+        before = self._stored_at_start or 0.0
+        found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored, "stored_before": before}
+        found["lost"] = -(discs + faces) - (stored - before)
         if self.particles.energy is not None and self.blocks.budget is not None:
             one, other = self.particles.energy.look(self.particles), self.blocks.energies()
             found["closing"] = one.closing + other["closing"]

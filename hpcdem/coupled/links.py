@@ -268,19 +268,24 @@ class Link:
     def fetch(self) -> None:
         """The ends of faces, where they are now, to the owners of the discs. Collective."""
         x, v = self.blocks.x, self.blocks.v
-        for (rows, k, k2), out in zip(self._asked, self._told):
-            if len(out):
-                disc_faces.pack(rows, k, k2, x, v, out)
-        with self.blocks.timers("halo"):
+        timers = self.blocks.timers
+        with timers("couple"):
+            for (rows, k, k2), out in zip(self._asked, self._told):
+                if len(out):
+                    disc_faces.pack(rows, k, k2, x, v, out)
+        with timers("exchange"):
             self._travel(self._to_discs, self._told, self._ends)
 
     def deliver(self) -> None:
         """Forces of contacts to the owners of the faces, added up there by faces. Collective."""
-        for slots, out in zip(self._slots, self._back):
-            np.take(self.slot_force, slots, axis=0, out=out)
-        with self.blocks.timers("halo"):
+        timers = self.blocks.timers
+        with timers("couple"):
+            for slots, out in zip(self._slots, self._back):
+                np.take(self.slot_force, slots, axis=0, out=out)
+        with timers("exchange"):
             self._travel(self._to_faces, self._back, self._pieces)
-        disc_faces.gather(self._order, self._of_face, self._arrived, self.face_force)
+        with timers("couple"):
+            disc_faces.gather(self._order, self._of_face, self._arrived, self.face_force)
 
     def apply(self, applied: np.ndarray) -> None:
         """Add the forces of faces to those applied to corners (n, 8) [N]."""

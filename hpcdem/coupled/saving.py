@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from hpcdem.blocks import Blocks
     from hpcdem.coupled import Coupled
 
-KIND = "coupled"
-PREFIX = "discs_"
-CONTACTS = "disc_contacts"
+KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LINKS
 
 
 def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:

@@ -34,6 +34,10 @@ from hpcdem.io.h5 import reading, writing_to
 FORMAT = "hpcdem checkpoint"
 VERSION = 4
 
+BLOCKS, BOTH = "blocks", "coupled"
+"""`kind` in the state: a model of blocks, one of particles and blocks; particles alone have none."""
+OF_PARTICLES, LINKS = "discs_", "disc_contacts"
+"""In a file of both: what stands before the names of the particles' tables; the table of their contacts."""
 
 _PART = 1 << 18
 """Words that are mixed at a time."""

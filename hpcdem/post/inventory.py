@@ -42,50 +42,72 @@ def of_file(path: Path) -> Facts:
 
 def _checkpoint(path: Path) -> Facts:
     state, tables = checkpoint.read(path)
-    if "kind" in state:
-        return _of_blocks(path, state, tables)
+    facts: Facts = {"whole": True, "version": checkpoint.version_of(path)}
     try:
-        clock, progress = state["clock"], state["progress"]
-        facts: Facts = {
-            "whole": True, "version": checkpoint.version_of(path), "step": int(clock["step"]),
-            "time": float(clock["time"]), "dt": float(clock["dt"]),
-            "particles": len(tables["particles"]["gid"]), "pairs": len(tables["pairs"]["gid"]),
-            "bonds": int(np.count_nonzero(tables["pairs"]["bond"])), "walls": len(state["walls"]["id"]),
-            "groups": list(state["groups"]), "script": str(state["script"]), "position": state["position"],
-        }  # fmt: skip
-        if progress is not None:
-            done, all_of_it = clock["step"] - progress["first"], progress["last"] - progress["first"]
-            facts["inside"] = f"{progress['name']}, {done} of {all_of_it} steps done"
-    except (KeyError, TypeError, ValueError) as problem:
-        raise HpcdemError(f"{path} is damaged: {problem!r}") from None
-    return facts
-
-
-def _of_blocks(path: Path, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
-    """A checkpoint of a PCDC script."""
-    try:
-        clock, extra = state["clock"], state["extra"]
-        project, run = extra["project"], extra.get("run") or {}
-        facts: Facts = {
-            "whole": True, "version": checkpoint.version_of(path), "step": int(clock["step"]),
-            "time": float(clock["time"]), "dt": float(clock["dt"]),
-        }  # fmt: skip
-        if "mesh_cells" in tables:
-            faces = tables["faces"]
-            facts["elements"] = int(tables["elements"]["alive"].sum())
-            facts["nodes"] = len(tables["mesh_points"]["x"])
-            facts["joints"] = int(((faces["joint_row"] > 0) & (faces["partner"] > np.arange(len(faces["open"])))).sum())
-            facts["broken"] = int((faces["broken"] > 0).sum())
-        facts["groups"] = {kind: {name: list(of) for name, of in sets.items()} for kind, sets in _groups(project)}
-        facts["histories"] = list(project["histories"])
-        facts["names"] = [name for part in (extra.get("names") or {}).values() for name in part]
-        if run.get("at"):
-            facts["at"] = str(run["at"])
-        if run.get("progress"):
-            facts["inside"] = f"a run, {clock['step'] - run['progress']['first']} steps done"
+        kind = state.get("kind")
+        if kind is None:
+            facts |= _of_particles(state, tables)
+        elif kind in (checkpoint.BLOCKS, checkpoint.BOTH):
+            facts |= _of_blocks(state, tables)
+            if kind == checkpoint.BOTH:
+                facts |= _beside_blocks(state["particles"], tables)
+        else:
+            raise HpcdemError(f"{path} is a checkpoint, but of what ('{kind}') this program does not know")
     except (KeyError, TypeError, ValueError, AttributeError) as problem:
         raise HpcdemError(f"{path} is damaged: {problem!r}") from None
     return facts
+
+
+def _of_particles(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
+    clock, progress = state["clock"], state["progress"]
+    facts: Facts = {
+        **_moment(clock), "particles": len(tables["particles"]["gid"]), "pairs": len(tables["pairs"]["gid"]),
+        "bonds": int(np.count_nonzero(tables["pairs"]["bond"])), "walls": len(state["walls"]["id"]),
+        "groups": list(state["groups"]), "script": str(state["script"]), "position": state["position"],
+    }  # fmt: skip
+    if progress is not None:
+        done, all_of_it = clock["step"] - progress["first"], progress["last"] - progress["first"]
+        facts["inside"] = f"{progress['name']}, {done} of {all_of_it} steps done"
+    return facts
+
+
+def _of_blocks(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
+    """Of a PCDC script, or of a program that saved its blocks by itself."""
+    clock, extra = state["clock"], state["extra"]
+    project, run = extra.get("project"), extra.get("run") or {}
+    facts: Facts = _moment(clock)
+    if "mesh_cells" in tables:
+        faces = tables["faces"]
+        facts["elements"] = int(tables["elements"]["alive"].sum())
+        facts["nodes"] = len(tables["mesh_points"]["x"])
+        facts["joints"] = int(((faces["joint_row"] > 0) & (faces["partner"] > np.arange(len(faces["open"])))).sum())
+        facts["broken"] = int((faces["broken"] > 0).sum())
+    if project is not None:
+        facts["groups"] = {kind: {name: list(of) for name, of in sets.items()} for kind, sets in _groups(project)}
+        facts["histories"] = list(project["histories"])
+    facts["names"] = [name for part in (extra.get("names") or {}).values() for name in part]
+    if run.get("at"):
+        facts["at"] = str(run["at"])
+    if run.get("progress"):
+        facts["inside"] = f"a run, {clock['step'] - run['progress']['first']} steps done"
+    return facts
+
+
+def _beside_blocks(state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]]) -> Facts:
+    """The particles of a checkpoint of both, which have steps and groups of their own."""
+    prefix = checkpoint.OF_PARTICLES
+    own = {name.removeprefix(prefix): table for name, table in tables.items() if name.startswith(prefix)}
+    facts = _of_particles(state, own)
+    moment = {name: facts[name] for name in ("step", "time", "dt")}
+    return {
+        **{name: facts[name] for name in ("particles", "pairs", "bonds", "walls")},
+        "disc_face_contacts": len(tables[checkpoint.LINKS]["gid"]), "particles_at": moment,
+        "particle_groups": facts["groups"],
+    }  # fmt: skip
+
+
+def _moment(clock: dict[str, Any]) -> Facts:
+    return {"step": int(clock["step"]), "time": float(clock["time"]), "dt": float(clock["dt"])}
 
 
 def _groups(project: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

@@ -232,6 +232,22 @@ class Log:
         self._print(closing_line(summary, body))
         return summary
 
+    def stages_of_both(self, particles: Timers, blocks: Timers, comm: Any) -> None:
+        """Collective: the table of stages of particles and blocks in one run."""
+        parts = {"particles": particles, "blocks": blocks}
+        whole, *each = (timers.merge(comm) for timers in (Timers.joined(parts, BETWEEN), *parts.values()))
+        if not self._speaks:
+            return
+        self.command_finished()
+        self.table("", HEADINGS, stage_rows(whole))
+        of_particles, of_blocks = each
+        line = (
+            f"{of_particles.steps} steps of particles and {of_blocks.steps} of blocks in {duration(whole.wall)} | "
+            f"{rate(of_particles.particle_steps / whole.wall)} particle-steps/s | "
+            f"{rate(of_blocks.particle_steps / whole.wall)} element-steps/s"
+        )
+        self._print(line + (f" | imbalance of {whole.ranks} ranks {whole.imbalance:.2f}" if whole.ranks > 1 else ""))
+
     def table(self, title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """A table, drawn on a terminal, aligned text in a file; the first column to the left, the others to the
         right."""
@@ -258,6 +274,10 @@ def percent(done: int, total: int) -> str:
 
 # -- stages ----------------------------------------------------------------------------------------------------
 
+BETWEEN = {
+    "couple": "between: contact", "search": "between: search", "exchange": "between: exchange", "kernels": "kernels",
+}  # fmt: skip
+"""Stages that belong to neither particles nor blocks, whose timers count them, by name in the table of both."""
 HEADINGS = ("stage", "mean s", "max s", "max/mean", "%", "calls")
 
 

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import io
+import itertools
+
 import numpy as np
 import pytest
 
+from hpcdem import output
 from hpcdem.blocks import Blocks
-from hpcdem.commands import properties, running, settings
-from hpcdem.commands.blocks import assigning, coupling, meshing, saving
+from hpcdem.cli import info
+from hpcdem.commands import properties, running, settings, walls
+from hpcdem.commands.blocks import assigning, closing, coupling, meshing, saving
 from hpcdem.commands.blocks import running as stepping
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.post import inventory
+from hpcdem.runtime.progress import BETWEEN, Log
+from hpcdem.timers import Timers
 from tests.coupled.support import ROCK, discs
 
 
@@ -75,3 +86,107 @@ def test_refusals(tmp_path):
         running.cycle(sim, 1)
     project.clear()
     running.cycle(sim, 1)
+
+
+def test_info_of_a_checkpoint_of_both(tmp_path, capsys):
+    """Both stand in it, each with its own step; damage is found wherever it is."""
+    project, sim = scene(tmp_path)
+    walls.wall(sim, 1, nodes=((-1.0, -0.5), (2.0, -0.5)))
+    running.cycle(sim, 7)
+    both = coupling.couple(project, sim)
+    stepping.step(project, 130)
+    saving.save(project, "middle.sav")
+    path = tmp_path / "middle.sav"
+    facts = inventory.of_file(path)
+    assert facts["whole"] and (facts["kind"], facts["version"]) == ("checkpoint", checkpoint.VERSION)
+    assert (facts["step"], facts["dt"], facts["elements"], facts["nodes"]) == (130, 5e-6, 36, 28)
+    assert facts["time"] == project.blocks.clock.time
+    assert facts["particles_at"] == {"step": 137, "time": sim.clock.time, "dt": 5e-6}
+    assert (facts["particles"], facts["bonds"], facts["walls"]) == (2, 0, 1)
+    assert facts["disc_face_contacts"] == len(both.contacts()["id"]) > 0
+    info.show(path, facts)
+    shown = capsys.readouterr().out
+    assert f"{path}: checkpoint, whole" in shown and "\n  particles    2\n" in shown
+    assert "\n  particles at step 137, time 0.000685, dt 5e-06\n" in shown
+
+    content = path.read_bytes()
+    tables = checkpoint.read(path)[1]
+    broken = tmp_path / "broken.sav"
+    for name in ("discs_particles", "disc_contacts", "state"):
+        rows = next(iter(column for column in tables[name].values() if column.any()))
+        at = content.index(rows.tobytes())
+        broken.write_bytes(content[: at + 1] + bytes([content[at + 1] ^ 1]) + content[at + 2 :])
+        assert not inventory.of_file(broken)["whole"]
+    broken.write_bytes(content[:-100])
+    assert "seal" in inventory.of_file(broken)["why"]
+
+    state = checkpoint.read_state(path)
+    hostile = ({"kind": "plasma"}, {"particles": None}, {"particles": {**state["particles"], "walls": 3}},
+               {"particles": {}}, {"extra": []})  # fmt: skip
+    for change in hostile:
+        slabs = {name: Table(columns, 0, len(next(iter(columns.values())))) for name, columns in tables.items()}
+        checkpoint.write(broken, {**state, **change}, slabs, SerialComm())
+        facts = inventory.of_file(broken)
+        assert not facts["whole"] and ("of what ('plasma')" in facts["why"] or "is damaged" in facts["why"])
+
+
+def rows_of(text, title):
+    """The table with this title, by its first column."""
+    lines = text.split(f"{title}\n", 1)[1].splitlines()
+    cells = [line.rsplit(maxsplit=1) for line in lines[1:]]
+    return {name.strip(): float(value) for name, value in itertools.takewhile(lambda row: row[1][-1].isdigit(), cells)}
+
+
+def test_the_tables_of_energy_close_together(tmp_path):
+    """Both list what went across the contacts by one name; with the energy of the falling discs in, theirs and what the
+    contacts kept add up as `energies` does, to the digits that are shown."""
+    project, sim = scene(tmp_path)
+    said = io.StringIO()
+    project.blocks.log = sim.log = Log(stream=said)
+    project.blocks.account_energy()
+    both = coupling.couple(project, sim)
+    falling = 2 * 0.5 * 2500.0 * np.pi * 0.1**2 * (1.0**2 + 0.3**2)
+    stepping.step(project, 250)
+    saving.save(project, "middle.sav")
+    stepping.step(project, 3000)
+    whole = project.blocks.energies()
+    saving.restore(project, str(tmp_path / "middle.sav"))
+    stepping.step(project, 3000)
+    assert project.blocks.energies() == whole  # a restart forgets nothing of it
+    found = both.energies()
+    assert whole["work_discs"] == pytest.approx(found["work_on_blocks"], rel=1e-9) and whole["work_discs"] > 1.0
+    assert abs(whole["work_outside"]) < 1e-9 * whole["work_discs"]
+
+    output.tell_energy(sim)
+    told = said.getvalue()
+    discs = rows_of(told, "energy budget")
+    said.truncate(0)
+    closing.close(project, figure=False)
+    told = said.getvalue()
+    blocks, between = rows_of(told, "energy budget"), rows_of(told, output.ACROSS)
+    assert discs[output.ACROSS] == between["work on particles"] and blocks[output.ACROSS] == between["work on blocks"]
+    assert sum(between.values()) == pytest.approx(0.0, abs=1e-4)
+    of_discs = sum(v for name, v in discs.items() if name.startswith(("stored", "lost"))) - falling
+    of_blocks = sum(v for name, v in blocks.items() if name.startswith(("stored", "lost")))
+    left = of_discs + of_blocks + between["lost by friction, less overlaps at first"]
+    left += between["stored in the contacts, more than at first"]
+    assert abs(left) < 1e-4 * falling and found["relative"] < 1e-6
+    assert found["lost"] == pytest.approx(-0.5 * 1e7 * 0.0005**2, rel=0.02)  # sticks; begins with an overlap of 0.5 mm
+    assert "energy of both: closing error" in told
+
+
+def test_the_table_of_stages_names_both(tmp_path):
+    """One table: stages of either, what is between them, nothing twice: they add up to the wall time at most."""
+    project, sim = scene(tmp_path)
+    said = io.StringIO()
+    project.blocks.log = Log(stream=said)
+    coupling.couple(project, sim)
+    stepping.step(project, 300)
+    closing.close(project, figure=False)
+    cells = [line.split("  ") for line in said.getvalue().splitlines()]
+    names = {row[0] for row in cells}
+    assert {"particles: force", "blocks: force", "between: contact", "between: search", "between: exchange",
+            "particles: output", "blocks: node", "other"} <= names  # fmt: skip
+    assert "300 steps of particles and 300 of blocks in" in said.getvalue()
+    summary = Timers.joined({"a": sim.timers, "b": project.blocks.timers}, BETWEEN).merge(SerialComm())
+    assert sum(stage.mean for stage in summary.stages) < summary.wall and summary.imbalance == 1.0

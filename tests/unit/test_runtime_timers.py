@@ -87,3 +87,12 @@ def test_a_stage_around_others_counts_its_own_time_only():
         time.sleep(0.002)
     assert timers("callback").calls == timers("force").calls == 1
     assert 0.002 <= timers.seconds("callback") < 0.02 <= timers.seconds("force")
+
+
+def test_timers_of_two_models_in_one_table():
+    one, other = spent(Timers(), force=2.0, couple=0.5, halo=4.0), spent(Timers(), force=1.0, couple=0.25)
+    both = Timers.joined({"discs": one, "blocks": other}, {"couple": "between: contact"})
+    assert {name: watch.seconds for name, watch in both.watches.items()} == pytest.approx(
+        {"discs: force": 2.0, "between: contact": 0.75, "discs: halo": 4.0, "blocks: force": 1.0}
+    )
+    assert both("between: contact").calls == 20 and both.seconds() == pytest.approx(3.75)  # waiting is no work

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hpcdem import output
 from hpcdem.commands.blocks import frames, histories
 from hpcdem.commands.blocks.project import Project
+from hpcdem.errors import CommandError
 from hpcdem.io.agreed import on_first
 
 ENERGY_WORDS = {
@@ -17,27 +19,63 @@ ENERGY_WORDS = {
     "viscous_lost": "lost by viscous damping",
     "work_gravity": "work of gravity",
     "work_outside": "work of loads and conditions",
+    "work_discs": output.ACROSS,
     "commands": "brought by commands",
     "closing": "closing error",
 }
 """What the table at the end calls the entries of the energy budget."""
+ACROSS_WORDS = {
+    "work_on_particles": "work on particles",
+    "work_on_blocks": "work on blocks",
+    "stored": "stored in the contacts, more than at first",
+    "lost": "lost by friction, less overlaps at first",
+}
+"""The same of what went from one to the other: these four add up to nothing."""
 
 
 def close(project: Project, figure: bool = True) -> None:
     """Bring what waits to the disk, tell how it was, draw the last state. Collective."""
     histories.flush(project)
     blocks, log = project.blocks, project.log
-    if log is None or not blocks.timers.steps:
+    both = project.coupled
+    if log is None or not (blocks.timers.steps or (both is not None and both.particles.timers.steps)):
         return
     if blocks.budget is not None:
         energies = blocks.energies()
-        rows = [(text, f"{energies[name]:.6g}") for name, text in ENERGY_WORDS.items()]
+        rows = [
+            (text, f"{energies[name]:.6g}")
+            for name, text in ENERGY_WORDS.items()
+            if name != "work_discs" or energies["work_discs"]
+        ]
         log.table("energy budget", ("energy", "J/m"), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
+    _tell_both(project)
     if figure:
         path = last_figure(project)
         log.info(f"figure: {path}")
-    log.stages(blocks.timers, project.comm, "element")
+    if both is None:
+        log.stages(blocks.timers, project.comm, "element")
+    else:
+        log.stages_of_both(both.particles.timers, blocks.timers, project.comm)
+
+
+def _tell_both(project: Project) -> None:
+    """What went across the contacts of discs and faces, and how both accounts add up. Collective."""
+    both, log = project.coupled, project.log
+    if both is None or project.continues is not None or not both.accounted:
+        return
+    try:
+        found = both.energies()
+    except CommandError as error:  # the last commands of the script left them so that no step could follow
+        log.warn(f"no table of the energy between discs and faces: {error}")
+        return
+    found["stored"] -= found["stored_before"]
+    rows = [(text, f"{found[name]:.6g}") for name, text in ACROSS_WORDS.items()]
+    log.table(output.ACROSS, ("energy", "J/m"), rows)
+    if "closing" in found:
+        log.info(
+            f"energy of both: closing error {found['closing']:.4g} J/m, {found['relative']:.2g} of the largest flow"
+        )
 
 
 def last_figure(project: Project) -> Path:

@@ -31,7 +31,7 @@ UNITS = {
         "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
         "contact_energy": "J/m", "viscous_loss": "J/m", "gravity_work": "J/m", "outside_work": "J/m",
-        "energy_error": "J/m",
+        "disc_work": "J/m", "energy_error": "J/m",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -63,6 +63,7 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "viscous_loss": _energy("viscous_lost"),
     "gravity_work": _energy("work_gravity"),
     "outside_work": _energy("work_outside"),
+    "disc_work": _energy("work_discs"),
     "energy_error": _energy("closing"),
 }
 ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")

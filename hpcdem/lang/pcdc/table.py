@@ -343,7 +343,7 @@ RECORDED = {
         "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
         "contact-energy": "J/m", "viscous-loss": "J/m", "gravity-work": "J/m", "outside-work": "J/m",
-        "energy-error": "J/m",
+        "disc-work": "J/m", "energy-error": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""

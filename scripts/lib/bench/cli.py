@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench import blocks, launch, other, runs, strain_stress, tables
+from bench import blocks, coupled, launch, other, runs, strain_stress, tables
 from bench.launch import Layout
 from bench.peers import PEERS
 from bench.workloads import PEER_WORKLOADS, cache_folder, workloads
@@ -129,6 +129,22 @@ def blocks_(names: tuple[str, ...], layouts: list[Layout], repeats: int, seconds
     lines = tables.Lines(json_file)
     try:
         blocks.blocks(list(names or blocks.WORKLOADS), layouts, repeats, seconds, lines)
+    finally:
+        lines.close()
+        if warning := tables.disturbed(lines.rows):
+            runs.say(f"warning: {warning}")
+
+
+@bench.command("coupled", context_settings=HELP)
+@layouts_option("1x1", "2x1")
+@REPEATS
+@click.option("--seconds", type=float, default=4.0, metavar="S", help="Stepping time of a run, about [4].")
+@JSON
+def coupled_(layouts: list[Layout], repeats: int, seconds: float, json_file: str | None) -> None:
+    """Particles and blocks in one run: steps per second, and the shares of both and of what is between them."""
+    lines = tables.Lines(json_file)
+    try:
+        coupled.coupled(layouts, repeats, seconds, lines)
     finally:
         lines.close()
         if warning := tables.disturbed(lines.rows):
