@@ -276,8 +276,9 @@ def longest_link(middle, slots, face, partner, where, state):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def edges_now(slots, face, at, kind, state, memory, where, cells, x, table, beyond, out):
-    """Forces on the ends of joints (4), mean opening and slip [m], mean normal and shear stress [Pa] into out (n, 8);
-    histories stay as they are. Shear as this side feels it along its edge."""
+    """Forces on the ends of joints (4), mean opening and slip [m], mean normal and shear stress [Pa], normal (3) and
+    shear (3) stress at the points along the edge, into out (n, 14); histories stay as they are. Shear as this side
+    feels it along its edge."""
     flat = x.reshape(x.size)
     own = np.empty((1, joints.MEMORY))
     for i in range(len(slots)):
@@ -288,15 +289,17 @@ def edges_now(slots, face, at, kind, state, memory, where, cells, x, table, beyo
         ax, ay, bx, by = x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1]
         px, py, qx, qy = flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
         own[0] = memory[s]
-        fax, fay, fbx, fby, _ = joints.yielded_edge(
+        tx, ty, s0, s1, s2, t0, t1, t2, _ = joints.yielded_points(
             ax, ay, bx, by, px, py, qx, qy, table, beyond, kind[s], own, 0, state[s]
         )
-        tx, ty, h2, oa, sa, ob, sb = joints.openings(ax, ay, bx, by, px, py, qx, qy)
+        fax, fay, fbx, fby = joints.end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
+        _, _, h2, oa, sa, ob, sb = joints.openings(ax, ay, bx, by, px, py, qx, qy)
         h = math.sqrt(h2)
         fx, fy = fax + fbx, fay + fby
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = fax, fay, fbx, fby
         out[i, 4], out[i, 5] = 0.5 * (oa + ob) / h, 0.5 * (sa + sb) / h
         out[i, 6], out[i, 7] = (fx * ty - fy * tx) / h2, (fx * tx + fy * ty) / h2
+        out[i, 8], out[i, 9], out[i, 10], out[i, 11], out[i, 12], out[i, 13] = s0, s1, s2, t0, t1, t2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

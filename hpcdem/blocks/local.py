@@ -470,11 +470,16 @@ class Local:
 
     def joint_means(self, slots: np.ndarray) -> np.ndarray:
         """Mean opening, slip [m], normal and shear stress [Pa] of joints (n, 4)."""
-        return self._edges(slots)[:, 4:]
+        return self._edges(slots)[:, 4:8]
+
+    def joint_points(self, slots: np.ndarray) -> np.ndarray:
+        """Normal (3) and shear (3) stress [Pa] at the points of joints, from the first corner of the slot's face to the
+        last (n, 6)."""
+        return self._edges(slots)[:, 8:]
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:
         sim = self.sim
-        out = np.zeros((len(slots), 8))
+        out = np.zeros((len(slots), 14))
         build.edges_now(
             slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_memory, sim.where,
             sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, out,
@@ -509,7 +514,7 @@ class Local:
         rows = np.zeros((len(slots), WORDS))
         if not len(slots):
             return np.empty(0, np.int64), rows
-        _, _, _, _, _, _, sigma, tau = self._edges(slots).T
+        _, _, sigma, tau = self.joint_means(slots).T
         mesh = sim.the_mesh()
         ends = connectivity.face_points(mesh.cells, self.slot_face[slots])
         way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]

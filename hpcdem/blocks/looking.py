@@ -20,11 +20,13 @@ from hpcdem.physics.fdem.joints import BROKEN, INTACT, NONE, YIELDED
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity that can be asked for by number: what it belongs to (element, node, joint), unit, meaning."""
+    """One quantity that can be asked for by number: what it belongs to (element, node, joint), unit, meaning; framed:
+    it stands in frames."""
 
     on: str
     unit: str
     doc: str
+    framed: bool = True
 
 
 def _pair(name: str, on: str, unit: str, doc: str) -> dict[str, Quantity]:
@@ -51,15 +53,28 @@ QUANTITIES: dict[str, Quantity] = {
     "slip": Quantity("joint", "m", "mean slip"),
     "normal_stress": Quantity("joint", "Pa", "mean normal stress, tension positive"),
     "shear_stress": Quantity("joint", "Pa", "mean shear stress"),
+    "normal_stress_largest": Quantity("joint", "Pa", "largest normal stress of its three points, tension positive"),
+    "shear_stress_largest": Quantity("joint", "Pa", "largest shear stress of its three points, without sign"),
+    **{
+        f"{name}_stress_{point}": Quantity("joint", "Pa", f"{name} stress at the {point} of its three points", False)
+        for name in ("normal", "shear")
+        for point in ("first", "middle", "last")
+    },
     "length": Quantity("joint", "m", "length in the mesh"),
 }
 """Names that `Blocks.values`, `Blocks.total` and frames know. With `element_` or `joint_` before they are means of
-corners."""
+corners. The points of a joint go from the first corner of the face that it is numbered by to the last; the laws are
+evaluated there."""
 
 for _on, _names in (("element", ("position", "displacement", "velocity")), ("joint", ("position",))):
     for _name in _names:
         for _axis in "xy":
-            QUANTITIES[f"{_on}_{_name}_{_axis}"] = Quantity(_on, QUANTITIES[f"{_name}_{_axis}"].unit, f"mean {_name}")
+            QUANTITIES[f"{_on}_{_name}_{_axis}"] = Quantity(
+                _on, QUANTITIES[f"{_name}_{_axis}"].unit, f"mean {_name}", False
+            )
+
+_MEANS = ("opening", "slip", "normal_stress", "shear_stress")
+_AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for point in ("first", "middle", "last"))
 
 
 class Looking(Core):
@@ -262,12 +277,17 @@ class Looking(Core):
         waiting = local.slot_state[slot] == BROKEN
         columns["mode"][waiting] = memory[waiting, 9]
         columns["damage"] = np.where(broken, 1.0, memory[:, 6:9].max(axis=1) if len(lower) else 0.0)
-        if {"opening", "slip", "normal_stress", "shear_stress"} & set(names):
-            seen = np.full((len(lower), 4), np.nan)
-            held = np.flatnonzero(local.slot_state[slot] != NONE)
+        held = np.flatnonzero(local.slot_state[slot] != NONE)
+        if set(_MEANS) & set(names):
+            seen = np.full((len(lower), len(_MEANS)), np.nan)
             seen[held] = local.joint_means(slot[held])
-            for k, name in enumerate(("opening", "slip", "normal_stress", "shear_stress")):
-                columns[name] = seen[:, k].copy()
+            columns |= {name: seen[:, k].copy() for k, name in enumerate(_MEANS)}
+        if {*_AT_POINTS, "normal_stress_largest", "shear_stress_largest"} & set(names):
+            seen = np.full((len(lower), len(_AT_POINTS)), np.nan)
+            seen[held] = local.joint_points(slot[held])
+            columns |= {name: seen[:, k].copy() for k, name in enumerate(_AT_POINTS)}
+            columns["normal_stress_largest"] = seen[:, :3].max(axis=1)
+            columns["shear_stress_largest"] = np.abs(seen[:, 3:]).max(axis=1)
         ends = connectivity.face_points(mesh.cells, lower)
         way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
         columns["length"] = np.hypot(way[:, 0], way[:, 1])

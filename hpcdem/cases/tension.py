@@ -13,13 +13,15 @@ from hpcdem.cases.rock import CRACKS, PROPERTIES, WAVES, Rock
 
 @dataclass(frozen=True)
 class Tension:
-    """peak [Pa]: largest nominal stress, the force over the neck; peak_joint [Pa]: largest mean normal stress of a
-    joint; crack_low, crack_high [m]: where the broken joints lie along y, from the neck, NaN if none broke; curve:
-    (strain between the ends, nominal stress [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error:
-    closing error of the energy budget over its largest flow."""
+    """peak [Pa]: largest nominal stress, the force over the neck; peak_joint [Pa]: largest normal stress of a joint at
+    one of its three points, where its law is evaluated; peak_joint_mean [Pa]: of their mean; crack_low, crack_high [m]:
+    where the broken joints lie along y, from the neck, NaN if none broke; curve: (strain between the ends, nominal
+    stress [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error: closing error of the energy budget
+    over its largest flow."""
 
     peak: float
     peak_joint: float
+    peak_joint_mean: float
     crack_low: float
     crack_high: float
     tension: int
@@ -94,7 +96,7 @@ pcdc model new
 pcdc geometry create polygon [outline] as-layer 'outline'
 pcdc geometry create polyline ([-0.5*neck],0) ([0.5*neck],0) as-layer 'neck'
 pcdc mesh create from-layer 'outline' size [coarse] refine-layer 'neck' size [size] distance [0.5*length] \\
-    EMBEDirregular group 'rock' set 'body'
+    EMBEDirregular smooth group 'rock' set 'body'
 """
 BAR = """
 pcdc model new
@@ -120,6 +122,7 @@ every = max(1, round(0.05 * transit / pcdc.time))
 for name in ('bottom', 'top'):
     pcdc history create 'force [name]' node value reaction-y sum every [every] range group '[name]' set 'ends'
     pcdc history create 'way [name]' node value displacement-y mean every [every] range group '[name]' set 'ends'
+pcdc history create 'point' joint value normal-stress-largest maximum every [every] range face-of 'rock' set 'body'
 pcdc history create 'joint' joint value normal-stress maximum every [every] range face-of 'rock' set 'body'
 pcdc history create 'cracks' model value broken-joints every [every]
 
@@ -137,7 +140,8 @@ import numpy as np
 bottom, top, low, up = (pcdc.history(name)[:, 2] for name in ('force bottom', 'force top', 'way bottom', 'way top'))
 stress, strain = (top - bottom) / (2 * neck), (up - low) / length
 curve = list(zip(strain.tolist(), stress.tolist()))
-peak, peak_joint = float(stress.max()), float(np.nanmax(pcdc.history('joint')[:, 2]))
+peak = float(stress.max())
+peak_joint, peak_joint_mean = (float(np.nanmax(pcdc.history(name)[:, 2])) for name in ('point', 'joint'))
 at = pcdc.values('joint', 'joint-position-y')[pcdc.values('joint', 'state') == 3]
 crack_low, crack_high = (float(at.min()), float(at.max())) if len(at) else (math.nan, math.nan)
 """

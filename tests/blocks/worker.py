@@ -165,7 +165,20 @@ def main() -> None:
         sim.advance(1)
         first = set(sim.number[sim.owned].tolist()) if first is None else first
     found = {name: sim.values(name) for name in ("position_x", "position_y", "velocity_x", "velocity_y")}
-    for name in ("stress_xx", "stress_yy", "stress_xy", "state", "damage", "mode", "reaction_y", "displacement_x"):
+    for name in (
+        "stress_xx",
+        "stress_yy",
+        "stress_xy",
+        "state",
+        "damage",
+        "mode",
+        "reaction_y",
+        "displacement_x",
+        "normal_stress_largest",
+        "normal_stress_last",
+        "shear_stress_largest",
+        "shear_stress_first",
+    ):
         found[name] = sim.values(name)
     found.update({f"event_{name}": values for name, values in sim.events().items()})
     found["counts"] = np.array(sim.joint_counts())

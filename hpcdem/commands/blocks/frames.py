@@ -60,9 +60,9 @@ def whole(project: Project) -> MeshState | None:
 
 
 def _names(kind: str) -> list[str]:
-    """What is written of elements and joints: all but where they are, which the points say."""
-    names = [name for name, quantity in QUANTITIES.items() if quantity.on == kind]
-    return [name for name in names if not name.startswith(f"{kind}_")]
+    """What is written of elements and joints: neither where they are, which the points say, nor single points of
+    joints."""
+    return [name for name, quantity in QUANTITIES.items() if quantity.on == kind and quantity.framed]
 
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:

@@ -26,6 +26,9 @@ UNITS = {
     ELEMENT: {"stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa"},
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
+        "normal_stress_largest": "Pa", "normal_stress_first": "Pa", "normal_stress_middle": "Pa",
+        "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
+        "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
     },
     MODEL: {
         "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",

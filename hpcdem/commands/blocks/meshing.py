@@ -35,8 +35,10 @@ def create(
     embedded: Sequence[str] = (),
     cracks: Sequence[str] = (),
     irregular: bool = False,
+    smooth: bool = False,
 ) -> None:
-    """Mesh the inside of a layer with Gmsh; kind: "tri" or "quad"; irregular: triangles in no pattern. Collective.
+    """Mesh the inside of a layer with Gmsh; kind: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
+    points in the middle of their neighbours. Collective.
 
     refine: (layer, size there [m], distance over which it grows [m] or None); holes: layers whose inside stays empty;
     regions: (layer, group) of parts with a group of their own; embedded: layers that become edges; cracks: layers that
@@ -54,6 +56,7 @@ def create(
         [(layer, first + k) for k, layer in enumerate(cracks)],
         refine=[Refinement(layer, fine, distance=distance) for layer, fine, distance in refine],
         irregular=irregular,
+        smooth=smooth,
     )
     made: Meshed = made_once(project.comm, lambda: triangulate(project.layers, wishes))
     for note in made.notes:

@@ -119,6 +119,7 @@ def _mesh_create(call: Call) -> None:
         holes=call.get("hole", []),
         regions=[(r["value"], r.get("group", r["value"])) for r in call.get("region", [])],
         embedded=call.get("embed", []), cracks=call.get("crack", []), irregular=call.get("irregular", False),
+        smooth=call.get("smooth", False),
     )  # fmt: skip
 
 

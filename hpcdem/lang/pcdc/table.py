@@ -338,6 +338,9 @@ RECORDED = {
     "element": {"stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa"},
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
+        "normal-stress-largest": "Pa", "normal-stress-first": "Pa", "normal-stress-middle": "Pa",
+        "normal-stress-last": "Pa", "shear-stress-largest": "Pa", "shear-stress-first": "Pa",
+        "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
     },
     "model": {
         "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
@@ -503,7 +506,9 @@ _MESH = (
                 Option("emb{ed}", (STRING,), "lines that become edges of the mesh", repeated=True),
                 Option("crack", (STRING,), "lines that become edges with a crack from the beginning", repeated=True),
                 Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri"),
-                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks"), _GROUP)),
+                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks"),
+                Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
+                       "edges share a uniform stress evenly; for triangles"), _GROUP)),
     Command("mesh str{uctured}", "A regular mesh of a rectangle.",
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),

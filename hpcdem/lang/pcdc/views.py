@@ -58,7 +58,8 @@ class Model:
         return View(self, "element", number)
 
     def joint(self, number: int) -> View:
-        """A joint: .opening, .slip, .damage, .state, .normal_stress, .shear_stress."""
+        """A joint: .opening, .slip, .damage, .state, .normal_stress, .shear_stress (means), .normal_stress_largest,
+        .shear_stress_largest (of its points)."""
         return View(self, "joint", number)
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:

@@ -51,13 +51,14 @@ def end_forces(tx, ty, s0, s1, s2, t0, t1, t2):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state):
-    """Forces on a and b of a joint that has passed its peak, which remembers more by it.
+def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state):
+    """Stresses at the points of a joint that has passed its peak, which remembers more by it.
 
     table (rows, 8), beyond (rows, 4): of the laws, and the row of this one; memory (slots, 12), and the slot. (Rows are
-    not handed over as such: counting references to views takes longer than the law.) Returns the four forces and the
-    state: BROKEN when two of the three points have no strength left; memory[slot, MODE] then says how, from 1 (opened)
-    to 2 (slid).
+    not handed over as such: counting references to views takes longer than the law.) Returns the mid-line from a to b
+    (tx, ty) [m], normal (s0, s1, s2) and shear (t0, t1, t2) stresses [Pa] at the points from a to b, and the state:
+    BROKEN when two of the three points have no strength left; memory[slot, MODE] then says how, from 1 (opened) to 2
+    (slid). At a joint before its peak, whose memory is zero, this is the law of `laws.intact_point`.
     """
     tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
     h = math.sqrt(h2)
@@ -88,6 +89,16 @@ def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slo
     memory[slot, OPENED], memory[slot, OPENED + 1], memory[slot, OPENED + 2] = o0, o1, o2
     memory[slot, SLIPPED], memory[slot, SLIPPED + 1], memory[slot, SLIPPED + 2] = u0, u1, u2
     memory[slot, DAMAGE], memory[slot, DAMAGE + 1], memory[slot, DAMAGE + 2] = d0, d1, d2
+    return tx, ty, s0, s1, s2, t0, t1, t2, state
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state):
+    """Forces on a and b of a joint that has passed its peak (fax, fay, fbx, fby [N/m]), and its state; see
+    `yielded_points`."""
+    tx, ty, s0, s1, s2, t0, t1, t2, state = yielded_points(
+        ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state
+    )
     fax, fay, fbx, fby = end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
     return fax, fay, fbx, fby, state
 

@@ -24,6 +24,7 @@ from hpcdem.pre.mesh.planar import Plane
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.regions import GRID, edges_of_curve, faces, noded, polygon_of
 from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField
+from hpcdem.pre.mesh.smoothing import smoothed
 
 MOST_ELEMENTS, MOST_EDGES = 20_000_000, 1_000_000
 """More elements, or edges on lines, are refused at once: the size is a slip of units."""
@@ -84,6 +85,8 @@ class Wishes:
     refine: Sequence[Refinement] = ()
     irregular: bool = False
     """Triangles in no pattern: rows of them would lead cracks."""
+    smooth: bool = False
+    """Inner points in the middle of their neighbours (`smoothing`); points on lines stay."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,8 @@ def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
         raise CommandError(f"a mesh consists of 'tri' or 'quad', not '{wishes.kind}'")
     if wishes.irregular and wishes.kind != "tri":
         raise CommandError("irregular is for triangles")
+    if wishes.smooth and wishes.kind != "tri":
+        raise CommandError("smooth is for triangles")
     if not wishes.regions:
         raise CommandError("a mesh needs at least one layer as outline")
     sizes = _size_field(layers, wishes)
@@ -116,7 +121,7 @@ def triangulate(layers: Layers, wishes: Wishes) -> Meshed:
     xy = np.column_stack([plane.x, plane.y])
     notes += _moved(plane, xy, traces)
     surfaces = _surfaces(plane, xy, areas)
-    mesh = _filled(plane, xy, surfaces, points, wishes, sizes)
+    mesh = _filled(plane, xy, surfaces, points, wishes, sizes, notes)
     check(mesh, "mesh made by gmsh")
     found = quality(mesh)
     if found.angle_least < SHARP:
@@ -333,7 +338,13 @@ def _surfaces(plane: Plane, xy: np.ndarray, areas: list[_Area]) -> list[_Surface
 
 
 def _filled(
-    plane: Plane, xy: np.ndarray, surfaces: list[_Surface], points: list[int], wishes: Wishes, sizes: SizeField
+    plane: Plane,
+    xy: np.ndarray,
+    surfaces: list[_Surface],
+    points: list[int],
+    wishes: Wishes,
+    sizes: SizeField,
+    notes: list[str],
 ) -> Mesh:
     gmsh = optional.gmsh()
     ours = not gmsh.isInitialized()  # a Python program may be using gmsh itself
@@ -350,7 +361,7 @@ def _filled(
         try:
             nodes, tags = _described(gmsh, plane, (xy - centre) / sizes.base, surfaces, points, wishes, sizes, centre)
             gmsh.model.mesh.generate(2)
-            return _taken_out(gmsh, plane, xy, surfaces, nodes, tags, wishes, sizes.base, centre)
+            return _taken_out(gmsh, plane, xy, surfaces, nodes, tags, wishes, sizes.base, centre, notes)
         except HpcdemError:
             raise
         except Exception as error:  # gmsh raises nothing more special
@@ -472,6 +483,7 @@ def _taken_out(
     wishes: Wishes,
     scale: float,
     centre: np.ndarray,
+    notes: list[str],
 ) -> Mesh:
     """The mesh with our numbers: points in gmsh's order, elements by surface."""
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
@@ -502,9 +514,16 @@ def _taken_out(
             groups[set_name][group].append(np.arange(start, start + len(here)))
         cells.append(here)
         start += len(here)
+    triangles = np.concatenate(cells)
+    if wishes.smooth:
+        held = np.zeros(len(points), bool)
+        held[list(mine.values())] = True
+        points, stayed = smoothed(points, triangles, held)
+        if stayed:
+            notes.append(f"smooth leaves {stayed} points where they were: triangles would become sharp there")
     return _compact(
         points,
-        np.concatenate(cells),
+        triangles,
         {s: {g: np.concatenate(rows) for g, rows in of.items() if rows} for s, of in groups.items()},
         mine,
         plane,
