@@ -94,10 +94,25 @@ def test_the_same_seed_makes_the_same_fractures(bench):
     assert second != network(4)  # another set of the same network
 
 
+def test_smooth_moves_points_but_not_those_on_lines(bench):
+    script = "pcdc model new\npcdc geometry create rectangle (0,0) (10,6) as-layer 'out'\n"
+    script += "pcdc geometry create polyline (2,1) (8,5) as-layer 'line'\n"
+    meshes = []
+    for words in ("irregular", "irregular smooth"):
+        bench(f"{script}pcdc mesh create from-layer 'out' size 0.5 embed 'line' {words}\n")
+        meshes.append(bench.project.whole_mesh())
+    plain, smooth = meshes
+    moved = np.hypot(*(plain.points - smooth.points).T) > 0.0
+    edges = plain.edges()
+    stay = np.unique([*edges.points[~edges.inner].ravel(), *plain.layers["line"].ravel()])
+    assert not moved[stay].any() and moved.sum() > 0.9 * (len(plain.points) - len(stay))
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [
         ("mesh create from-layer 'ou' size 1", "there is no geometry layer 'ou' (layers so far: 'out')"),
+        ("mesh create from-layer 'out' size 1 type quad smooth", "smooth is for triangles"),
         ("mesh create from-layer 'out' size 1 hole 'h'", "there is no geometry layer 'h'"),
         ("geometry create fractures orientation fixed 0 length fixed 1 inside 'out' seed 1 as-layer 'd'",
          "one density"),

@@ -63,9 +63,14 @@ def test_the_bar_holds_up_to_its_strength_and_breaks(alone):
     assert broken[-1, 2] >= 3 and (np.diff(broken[:, 2]) >= 0).all() and arrived < first < 2.5 * arrived
     assert way[-1, 2] == pytest.approx(0.15 * (way[-1, 1] - 1e-6), rel=1e-2)  # half of the first 2 us at full speed
     with h5py.File(sorted((alone / "data").glob("*.vtkhdf"))[-1]) as file:
+        written = set(file["VTKHDF/CellData"])
         cells = {name: file[f"VTKHDF/CellData/{name}"][...] for name in ("stress_xx", "state", "cell")}
+    assert {"element_model", "normal_stress_largest", "shear_stress_largest", "length"} <= written
+    assert not {name for name in written if name.endswith(("_first", "_middle", "_last")) or "position" in name}
     assert (cells["state"][cells["cell"] == 1] == 3).sum() == broken[-1, 2]
     assert STRENGTH > np.nanmax(cells["stress_xx"])
+    largest = history(alone, "point")[:, 2]
+    assert 0.99 * STRENGTH < largest.max() <= STRENGTH * (1 + 1e-12)  # at its points the law ends at the strength
     table = (alone / "pull.csv").read_text().splitlines()
     assert table[0] == "curve,displacement [um],stress [MPa]" and len(table) == 1 + len(load)
     assert (alone / "pull.png").stat().st_size > 5000
@@ -76,7 +81,7 @@ def test_the_bar_holds_up_to_its_strength_and_breaks(alone):
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_same_on_several_ranks(launch, alone, tmp_path, ranks):
     run(launch, tmp_path / "many", ranks)
-    for name in ("load", "way", "broken"):
+    for name in ("load", "way", "broken", "point"):
         file = f"data/history_{name}.csv"
         assert (alone / file).read_bytes() == (tmp_path / "many" / file).read_bytes()
     frames = sorted(path.name for path in (alone / "data").glob("*.vtkhdf"))
@@ -96,7 +101,7 @@ def test_a_restored_run_goes_on_as_the_one_that_was_not_stopped(launch, alone, t
     said = run(launch, folder, ranks, "go_on.sc")
     assert said.count("second ") == 1  # m_report came back with the model, and with it what it needs
     assert tables(alone / "end.sav") == tables(folder / "end.sav")
-    for name in ("load", "way", "broken"):
+    for name in ("load", "way", "broken", "point"):
         assert (history(alone, name) == history(folder, name)).all()
 
 

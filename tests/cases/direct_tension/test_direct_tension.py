@@ -55,3 +55,14 @@ def test_dog_bone(launch, tmp_path, path):
     assert -0.005 < done.crack_low <= done.crack_high < 0.005
     assert done.tension >= 10 and done.shear == 0
     assert done.energy_error < 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path, size", [("free", 0.0018), ("free", 0.0025), ("line", 0.0018), ("line", 0.0025)])
+def test_dog_bones_of_other_meshes(launch, tmp_path, path, size):
+    """The bounds of strength hold for any mesh, the place along a line of edges too. Else irregular meshes differ by
+    1.2 % in strength, by which the section grows within 7 mm (y2/4500): of thirteen, six go beyond 5 mm."""
+    done = results(launch, tmp_path, DirectTension(path=path, size=size, **BRITTLE))
+    assert 1.80e6 < done.peak < 2.02e6 and done.peak_joint == pytest.approx(2e6, rel=0.01)
+    reach = 0.005 if path == "line" else 0.008
+    assert -reach < done.crack_low <= done.crack_high < reach

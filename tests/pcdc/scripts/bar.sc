@@ -13,6 +13,7 @@ pcdc node boundary mech-vel-b-c velocity-x table 'pull' range group 'right' set 
 pcdc history create 'load' node value reaction-x sum every 5 range group 'right' set 'bc'
 pcdc history create 'way' node value displacement-x mean every 5 range group 'right' set 'bc'
 pcdc history create 'broken' model value broken-joints every 5
+pcdc history create 'point' joint value normal-stress-largest max every 5 range face-of 'bar' set 'domain'
 pcdc output vtk 'bar' every 100
 def m_report(what):
     print(what, pcdc.cycle, '%.4g' % pcdc.time, pcdc.history('broken')[-1][2])
