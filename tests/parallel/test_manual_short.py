@@ -38,7 +38,7 @@ CHAINS: dict[str, dict[str, str | None]] = {
 }
 """Scripts in the order in which they run, and the file each of them needs."""
 
-QUICK = {("push", 4), ("pre_struct", 2), ("push_add_del", 2)}
+QUICK = {("pre_struct", 2), ("push_add_del", 2)}
 """Chains and numbers of ranks of the quick tests; those on one rank run all of them."""
 
 LAST_STEP = {
