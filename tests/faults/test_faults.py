@@ -16,8 +16,6 @@ import pytest
 
 from tests.faults.conftest import LAST_FRAME, PILE
 
-pytestmark = pytest.mark.alone
-
 SECONDS = 20.0
 """Longest time from an accident to the end of the job."""
 
@@ -267,7 +265,7 @@ def taken_up(launch, n, folder, undisturbed, *arguments, cwd):
     return done
 
 
-@pytest.mark.parametrize("n", [1, pytest.param(3, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])
 def test_resume_needs_no_script(launch, script, undisturbed, n, tmp_path_factory):
     """Called from elsewhere, with the folder alone; done, it says so."""
     done = launch(1, script, "--time-limit", "00:00:01", "--no-figure", cwd=script.parent)

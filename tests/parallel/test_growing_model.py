@@ -110,7 +110,7 @@ def starved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow), 4])
+@pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 3, pytest.param(4, marks=pytest.mark.slow)])
 def test_growing_model_on_more_ranks(grown: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
     assert_same_files(grown, run_text(launch, GROWING + REST, tmp_path / "more", ranks))
 

@@ -38,8 +38,11 @@ CHAINS: dict[str, dict[str, str | None]] = {
 }
 """Scripts in the order in which they run, and the file each of them needs."""
 
-QUICK = {("push", 4), ("pre_struct", 2), ("push_add_del", 2)}
+QUICK = {("push_add_del", 2)}
 """Chains and numbers of ranks of the quick tests; those on one rank run all of them."""
+
+OTHERS = {"push", *(chain for chain, _ in QUICK)}
+"""Chains that quick tests of several ranks are compared with: what looks at their run on one rank runs beside them."""
 
 LAST_STEP = {
     "push": 8_000, "syn_erosion": 10_000, "syn_sedimentaion": 10_600, "pre_struct": 5_000, "detachment": 6_000,
@@ -111,10 +114,16 @@ def test_same_push_however_it_is_run(
     shutil.rmtree(tmp_path / "push")
 
 
-@pytest.mark.parametrize("name", LAST_STEP)
-def test_the_run_is_worth_comparing(on_one_rank: Callable[[str], Path], name: str) -> None:
+@pytest.mark.parametrize(
+    ("chain", "name"),
+    [
+        pytest.param(chain, name, marks=pytest.mark.ranks if chain in OTHERS else ())
+        for chain, scripts in CHAINS.items()
+        for name in scripts
+    ],
+)
+def test_the_run_is_worth_comparing(on_one_rank: Callable[[str], Path], chain: str, name: str) -> None:
     """It took all of its steps, and some particle has gone further than its size."""
-    (chain,) = (chain for chain, scripts in CHAINS.items() if name in scripts)
     folder = on_one_rank(chain) / name
     end = contents(folder / "end.sav")
     if LAST_STEP[name] is not None:
@@ -170,6 +179,7 @@ def test_rule_gives_the_published_names() -> None:
     assert sorted(frame_names(PUSH_ADD_DEL)) == sorted(PUBLISHED_NAMES)
 
 
+@pytest.mark.ranks
 @pytest.mark.parametrize("suffix", [".dat", ".vtkhdf"])
 def test_names_of_the_short_run(on_one_rank: Callable[[str], Path], suffix: str) -> None:
     data = on_one_rank("push_add_del") / "push_add_del" / "data"

@@ -22,7 +22,7 @@ from tests.property.workers import Lost, Pair
 pytestmark = pytest.mark.mpi
 
 REGRESSIONS = Path(__file__).with_name("regressions")
-QUICK = 30
+QUICK = 20
 SLOW = int(os.environ.get("HPCDEM_PROPERTY_EXAMPLES", "1000"))
 
 SETTLING = Model(
@@ -92,7 +92,7 @@ def assert_rich(seen: list[dict[str, Any]]) -> None:
     assert all(n > 0 for n in counts.values()), counts
 
 
-def test_thirty_models(pair: Pair) -> None:
+def test_twenty_models(pair: Pair) -> None:
     assert_rich(explore(pair, QUICK))
 
 

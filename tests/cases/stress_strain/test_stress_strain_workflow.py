@@ -72,6 +72,7 @@ def bands(section: Section, part: float, least: int) -> list[tuple[float, bool, 
 # -- files --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow  # the same programs as in job2, which is quick
 def test_job_detachment_writes_the_tree_of_the_manual(manual: Chapter) -> None:
     data = manual.detachment / "data"
     names = [file.path.stem for file in list_frames(data)]
@@ -158,6 +159,10 @@ def test_stress_grows_with_depth_and_towards_the_wall(manual: Chapter) -> None:
         near, far = (pushed.fields[name][np.ix_(rows, (pushed.x > wall + a) & (pushed.x < wall + a + 2000.0))] for a in
                      (0.0, 7000.0))  # fmt: skip
         assert np.nanmean(near) > 1.3 * np.nanmean(far)
+
+
+@pytest.mark.slow
+def test_stress_grows_with_depth_where_a_detachment_is_weak(manual: Chapter) -> None:
     folder = manual.detachment / "data"
     assert (np.diff(by_height(section(folder, "0000006000"), "mean", np.arange(500.0, 2001.0, 500.0))) < 0.0).all()
 
