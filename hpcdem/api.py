@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hpcdem import session
-from hpcdem.errors import CommandError, ScriptError
+from hpcdem.errors import CommandError, ScriptError, UsageError
 from hpcdem.fields import FIELDS, FIX_BITS
 from hpcdem.lang.zdem.execute import Interpreter, Verbs, find
 from hpcdem.lang.zdem.parser import parse_text
@@ -49,7 +49,7 @@ def _verb(method: Method) -> Method:
         place = _place()
         self.engine.line = place[1]
         try:
-            return method(self, *values, **options)
+            return self._asked(lambda: method(self, *values, **options))
         except CommandError as error:
             raise ScriptError(*place, f"{method.__name__}: {error}") from error
         except (TypeError, ValueError) as error:
@@ -415,6 +415,7 @@ class Simulation:
 
     def __len__(self) -> int:
         """Particles of this rank."""
+        self._of_this_rank("len(...)")
         return len(self.engine.particles)
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -424,6 +425,10 @@ class Simulation:
         of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump, which
         is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
         """
+        self._of_this_rank(f"['{name}']")
+        return self._field(name)
+
+    def _field(self, name: str) -> np.ndarray:
         p, engine = self.engine.particles, self.engine
         if name == "group":
             values = np.array(engine.groups)[p["group"]]
@@ -451,6 +456,9 @@ class Simulation:
         """
         if name not in SETTABLE:
             raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(SETTABLE)}")
+        self._asked(lambda: self._set_field(name, values))
+
+    def _set_field(self, name: str, values: Any) -> None:
         engine = self.engine
         if name in ("x", "y", "radius"):
             engine.open()
@@ -468,7 +476,7 @@ class Simulation:
         try:
             p[name][:] = values
         except ValueError as error:
-            raise ScriptError(*_place(), f"field '{name}' has {len(self)} values on this rank: {error}") from error
+            raise ScriptError(*_place(), f"field '{name}' has {len(p)} values on this rank: {error}") from error
         if engine.clumps and name in ("x", "y", "radius", "angle"):
             changed = bool((p[name] != before)[p.clump >= 0].any())
             if engine.comm.any(changed):
@@ -484,24 +492,28 @@ class Simulation:
 
     def gather(self, *names: str) -> Any:
         """Fields of all particles, on every rank, in the order of ids: one array, or a tuple of them."""
-        columns = [np.concatenate(self.engine.comm.allgather(np.array(self[name]))) for name in names]
-        order = np.argsort(np.concatenate(self.engine.comm.allgather(np.array(self["gid"]))))
-        return columns[0][order] if len(columns) == 1 else tuple(c[order] for c in columns)
+
+        def gathered() -> Any:
+            columns = [np.concatenate(self.engine.comm.allgather(np.array(self._field(name)))) for name in names]
+            order = np.argsort(np.concatenate(self.engine.comm.allgather(np.array(self._field("gid")))))
+            return columns[0][order] if len(columns) == 1 else tuple(c[order] for c in columns)
+
+        return self._asked(gathered)
 
     @property
     def count(self) -> int:
         """Particles on all ranks."""
-        return self.engine.count(len(self))
+        return self._asked(lambda: int(self.engine.count(len(self.engine.particles))))
 
     @property
     def steps(self) -> int:
         """Number of the present step."""
-        return self.engine.clock.step
+        return self._asked(lambda: int(self.engine.clock.step))
 
     @property
     def time(self) -> float:
         """Model time [s]."""
-        return self.engine.clock.time
+        return self._asked(lambda: float(self.engine.clock.time))
 
     @property
     def dt(self) -> float:
@@ -526,13 +538,17 @@ class Simulation:
     @property
     def walls(self) -> dict[int, Wall]:
         """The walls by id, those of BOX with ids -1 to -4 (left, right, bottom, top)."""
-        w = self.engine.walls
-        return {
-            int(w.id[k]): Wall(
-                _point(w.p1[k]), _point(w.p2[k]), _point(w.v[k]), float(w.kn[k]), float(w.ks[k]), float(w.fric[k])
-            )
-            for k in range(len(w))
-        }
+
+        def rows() -> dict[int, tuple[Any, ...]]:
+            w = self.engine.walls
+            return {
+                int(w.id[k]): (
+                    _point(w.p1[k]), _point(w.p2[k]), _point(w.v[k]), float(w.kn[k]), float(w.ks[k]), float(w.fric[k])
+                )
+                for k in range(len(w))
+            }  # fmt: skip
+
+        return {name: Wall(*row) for name, row in self._asked(rows).items()}
 
     @_verb
     def extents(self) -> dict[str, float]:
@@ -593,9 +609,7 @@ class Simulation:
 
     def wall_contacts(self) -> dict[str, np.ndarray]:
         """Contacts with walls: id1, wall (its id), fn fs, fx fy on the particle, x y, overlap."""
-        table = self._table("wall_contacts")
-        w = self.engine.walls
-        return {**table, "wall": w.id[w.in_output_order()][table["wall"]]}
+        return self._table("wall_contacts")
 
     @_verb
     def clumps(self) -> dict[str, np.ndarray]:
@@ -609,22 +623,54 @@ class Simulation:
     @property
     def bonds_left(self) -> int:
         """Bonds that hold."""
-        return self.engine.bonds_left()
+        return self._asked(lambda: int(self.engine.bonds_left()))
 
     @property
     def bonds_broken(self) -> tuple[int, int]:
         """Bonds broken so far, in tension and in shear."""
-        return self.engine.broken()
+        return self._asked(self.engine.broken)
 
     # ---- ours ------------------------------------------------------------------------------------------------------
+
+    def _asked(self, make: Callable[[], Any]) -> Any:
+        """What `make` returns. Of particles that are stepped with the blocks of a script the journal of this keeps it:
+        a run that goes on from a checkpoint is told the same, and nothing is done before it has come there."""
+        running = self._session.interpreter
+        return running.look(make) if running is not None and self.engine.coupled else make()
+
+    def _of_this_rank(self, what: str) -> None:
+        """UsageError if a script asks for what another number of ranks would have otherwise, where the answer must be
+        that of the run before."""
+        running = self._session.interpreter
+        if running is None or not self.engine.coupled:
+            return
+        if running.replays:
+            raise UsageError(
+                f"{_place()[0]}:{_place()[1]}: {what}: the particles of one rank, as they were when the run came here, "
+                "are not in the checkpoint, so --resume cannot pass this line: use gather(...) or count, which are; or "
+                "go on with a script of your own that begins with pcdc model restore"
+            )
+        if self.engine.log is not None and running.keeps:
+            self.engine.log.warn_once(
+                "of this rank",
+                f"{_place()[0]}:{_place()[1]}: {what} of particles that touch blocks: --resume will not be able to "
+                "pass this line (gather(...) and count can be passed)",
+            )
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
         from hpcdem import observe
 
-        self._ready()
-        slab = observe.frame(self.engine).tables[name].columns
-        parts = self.engine.comm.allgather({key: np.asarray(values) for key, values in slab.items()})
-        return {key: np.concatenate([part[key] for part in parts]) for key in slab}
+        def table() -> dict[str, np.ndarray]:
+            self._ready()
+            slab = observe.frame(self.engine).tables[name].columns
+            parts = self.engine.comm.allgather({key: np.asarray(values) for key, values in slab.items()})
+            whole = {key: np.concatenate([part[key] for part in parts]) for key in slab}
+            if name == "wall_contacts":
+                w = self.engine.walls
+                whole["wall"] = w.id[w.in_output_order()][whole["wall"]]
+            return whole
+
+        return self._asked(table)
 
     def _ready(self) -> None:
         """Lists, ghosts and masses in place, as kernels that look at contacts need them."""
@@ -648,26 +694,36 @@ class Coupling:
     @property
     def dt(self) -> float:
         """Time step of both [s]."""
-        return self.engine.particles.clock.dt
+        return self._asked(lambda: float(self.engine.particles.clock.dt))
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Contacts of particles with faces of elements, on every rank, in the order of ids and faces: id, face (element
         * 4 + edge), fn, fs [N], x, y [m], overlap [m], energy [J]."""
-        return self.engine.contacts()
+        return self._asked(self.engine.contacts)
 
     def force(self) -> tuple[float, float]:
         """Sum of the forces of all particles on the blocks [N]."""
-        return self.engine.force_on_blocks()
+        return self._asked(self.engine.force_on_blocks)
 
     def energies(self) -> dict[str, float]:
         """Energy that went from one to the other [J], see docs/blocks.md; counts while either has an account."""
-        return self.engine.energies()
+        return self._asked(self.engine.energies)
 
     def end(self) -> None:
         """Part them: each may go on alone."""
         from hpcdem.commands.blocks import coupling
 
+        if self._project.continues is not None:
+            file, line = _place()
+            raise UsageError(
+                f"{file}:{line}: end: particles that were parted from the blocks before the checkpoint are not in it, "
+                "so --resume cannot pass this line; go on with a script of your own that begins with pcdc model restore"
+            )
         coupling.release(self._project)
+
+    def _asked(self, make: Callable[[], Any]) -> Any:
+        running = session.current().interpreter
+        return running.look(make) if running is not None else make()
 
 
 def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupling:

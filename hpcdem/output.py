@@ -23,7 +23,7 @@ import numpy as np
 from hpcdem import budget, guards, observe, saving
 from hpcdem.errors import CommandError, HpcdemError
 from hpcdem.io.agreed import on_first
-from hpcdem.io.behind import Deliveries
+from hpcdem.io.behind import under_way as _under_way
 from hpcdem.io.columns import append_rows
 from hpcdem.io.dat import write_dat
 from hpcdem.io.disk import to_disk
@@ -39,9 +39,6 @@ from hpcdem.simulation import Simulation
 
 WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
 ENERGY_COLUMNS = ",".join(["step", "time", *budget.NAMES])
-
-
-_under_way = Deliveries()
 
 
 class Snapshot:

@@ -133,3 +133,7 @@ class Deliveries:
 
     def _first_error(self) -> str | None:
         return next((file.error for file in self._files if file.error is not None), None)
+
+
+under_way = Deliveries()
+"""The files of this process that are under way, of whatever model."""

@@ -19,6 +19,7 @@ import numpy as np
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io import h5
+from hpcdem.io.behind import Deliveries
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import find_rows
 
@@ -131,9 +132,9 @@ def read_mesh_frame(path: str | os.PathLike) -> MeshState:
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
 
 
-def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any) -> None:
+def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later: Deliveries | None = None) -> None:
     """Collective: write the frame to `path` (usually ``*.vtkhdf``). The content does not depend on the number of ranks.
-    Raises HpcdemError on all ranks."""
+    Raises HpcdemError on all ranks; `later`: see `h5.writing`."""
     corners, elements, joints = frame.corners, frame.elements, frame.joints
     keys = [corners.columns["number"]]
     ends = np.stack([find_rows(comm, keys, [joints.columns[k]]) for k in ("first", "last")], axis=1)
@@ -142,7 +143,7 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any) -> No
     sizes = elements.columns["corners"]
     first = comm.exscan(int(sizes.sum()))
     n, n_joints, n_corners = elements.total, joints.total, corners.total
-    with h5.writing(path, comm) as out:
+    with h5.writing(path, comm, later) as out:
         out.group("VTKHDF", {"Version": np.array([2, 0], np.int64), "Type": np.bytes_("UnstructuredGrid")})
         for name, number in (
             ("NumberOfPoints", n_corners),

@@ -24,7 +24,8 @@ LOOP = (
 @pytest.mark.parametrize(
     "value",
     [0.1, -0.0, math.inf, 5e-324, 3, True, "text", np.arange(6.0).reshape(2, 3), np.array([], np.int64),
-     np.array([1, -(2**60)]), np.array([True]), {"a": 1.5, "b": -math.inf}],
+     np.array([1, -(2**60)]), np.array([True]), {"a": 1.5, "b": -math.inf}, (0.1, (2, "x")), {-3: (0.5, 1.0)},
+     np.array(["rock", ""]), np.float64(0.1).item()],
 )  # fmt: skip
 def test_answers_come_back_to_the_bit(value):
     found = decoded(encoded(value))

@@ -63,26 +63,22 @@ def advance(project: Project, steps: int) -> int:
     if sim.energy is not None and not sim.energy.running:
         sim.energy.begin(sim)
     last, request = sim.clock.step + steps, 0
-    try:
-        while sim.clock.step < last and not request:
-            due = min([last, *(every * (sim.clock.step // every + 1) for every in intervals)])
-            request = both.advance(due - sim.clock.step)
-            _write(sim)
-    finally:
-        output.wait_for_disk()
+    while sim.clock.step < last and not request:
+        due = min([last, *(every * (sim.clock.step // every + 1) for every in intervals)])
+        request = both.advance(due - sim.clock.step)
+        _write(sim)
     if sim.energy is not None:
         sim.energy.pause(sim)
-    output.settle(sim)
     return request
 
 
 def _write(sim: Simulation) -> None:
-    """What is due of the particles at this step."""
+    """What is due of the particles at this step; frames behind the back of the run, see frames.py."""
     from hpcdem import output
 
     step, settings = sim.clock.step, sim.settings
     if settings.print > 0 and step % settings.print == 0:
-        output.Snapshot(sim).write_print()
+        output.Snapshot(sim, waits=False).write_print()
     if settings.energy > 0 and step % settings.energy == 0:
         output.write_energy(sim)
 

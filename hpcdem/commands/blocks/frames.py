@@ -1,6 +1,13 @@
-"""output vtk: frames of the model for ParaView."""
+"""output vtk: frames of the model for ParaView.
+
+Those that are due while the model is stepped are written behind its back, as those of particles are (hpcdem/output.py):
+the next step with frames, a checkpoint and the end of the command wait for them; errors of the disk stop all ranks
+there, or at the next line of the log.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,6 +15,8 @@ from hpcdem.blocks import QUANTITIES, Blocks
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 from hpcdem.io import vtkhdf_mesh
+from hpcdem.io.behind import Deliveries, under_way
+from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.model.blocks.connectivity import face_points
@@ -34,10 +43,30 @@ def stop(project: Project, name: str) -> None:
 
 
 def write_due(project: Project) -> None:
-    """The frames that are due at this step, once each. Collective."""
-    for name, every in project.frames.items():
-        if project.step % every == 0 and project.framed.get(name) != project.step:
-            _write(project, name)
+    """The frames that are due at this step, once each; `settle` waits for them. Collective."""
+    due = [
+        name for name, every in project.frames.items()
+        if project.step % every == 0 and project.framed.get(name) != project.step
+    ]  # fmt: skip
+    if not due:
+        return
+    if not _particles_just_wrote(project):
+        settle(project)
+    for name in due:
+        _write(project, name, under_way)
+    under_way.go()
+
+
+def settle(project: Project) -> None:
+    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    with project.blocks.timers.around("output"):
+        under_way.settle(project.comm)
+
+
+def _particles_just_wrote(project: Project) -> bool:
+    """What is under way is a frame of this step, of the particles beside the blocks."""
+    both = project.coupled
+    return both is not None and both.particles.last_frame == (both.particles.clock.step, False)
 
 
 def write_last(project: Project) -> None:
@@ -47,11 +76,27 @@ def write_last(project: Project) -> None:
             _write(project, name)
 
 
-def _write(project: Project, name: str) -> None:
-    path = project.folder() / f"{name}_{project.step:010d}.vtkhdf"
+def _write(project: Project, name: str, later: Deliveries | None = None) -> None:
+    path, comm = project.folder() / f"{name}_{project.step:010d}.vtkhdf", project.comm
     with project.blocks.timers.around("output"):
-        write_mesh_frame(path, frame(project), project.comm)
+        if later is None:
+            write_mesh_frame(path, frame(project), comm)
+        else:
+            moment = _kept(frame(project))
+            if comm.size == 1:
+                later.entrust(lambda: write_mesh_frame(path, moment, comm))
+            else:
+                write_mesh_frame(path, moment, comm, later)
     project.framed[name] = project.step
+
+
+def _kept(moment: MeshFrame) -> MeshFrame:
+    """The same with arrays of its own: the model goes on."""
+
+    def own(table: Table) -> Table:
+        return Table({name: np.array(values) for name, values in table.columns.items()}, table.offset, table.total)
+
+    return replace(moment, corners=own(moment.corners), elements=own(moment.elements), joints=own(moment.joints))
 
 
 def whole(project: Project) -> MeshState | None:

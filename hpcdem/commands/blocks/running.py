@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from hpcdem.commands.blocks import coupling, frames, histories, saving
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.io.behind import under_way
 from hpcdem.runtime.progress import duration, rate
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None,
     histories.record(project)
     frames.write_due(project)
     histories.flush(project)
+    frames.settle(project)
 
 
 def _run(project: Project, name: str, steps: int | None, ratio: float | None, time: float | None) -> None:
@@ -68,7 +70,9 @@ def _run(project: Project, name: str, steps: int | None, ratio: float | None, ti
     try:
         _advance(project, name, first, math.inf if steps is None else first + steps, math.inf if end is None else end,
                  ratio)  # fmt: skip
+        frames.settle(project)
     finally:
+        under_way.wait()  # the way out after an error, too
         project.progress = None
 
 
@@ -166,6 +170,7 @@ class _Report:
         done = blocks.clock.step - self.told_step
         speed = done / max(now - self.told, 1e-9)
         left = f" | left {duration((self.last - blocks.clock.step) / speed)}" if self.last < math.inf and speed else ""
+        under_way.look(self.project.comm)
         elements = int(self.project.alive.sum())
         self.project.log.info(
             f"{self._state(blocks)} | {rate(speed)} steps/s, {rate(speed * elements)} element-steps/s{left}"

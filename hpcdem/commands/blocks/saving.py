@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.commands.blocks import coupling
+from hpcdem.commands.blocks import coupling, frames
 from hpcdem.commands.blocks.charts import Chart, Curve
 from hpcdem.commands.blocks.histories import History, flush
 from hpcdem.commands.blocks.project import Project
@@ -48,6 +48,7 @@ def write_checkpoint(project: Project, automatic: bool = False) -> Path:
 def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
     if project.mesh is not None:
         project.ready(use=False)
+    frames.settle(project)
     began = time.perf_counter()
     coupling.save(project, path, {"project": _state(project), **more})
     if project.blocks.stop is not None:

@@ -54,7 +54,7 @@ class Interpreter:
         self.journal: Journal | None = None
         self._own_names: dict[str, Any] = {
             "__name__": "__main__", "__builtins__": __builtins__, "math": math, "Vector": Vector, "print": self._print,
-            "pcdc": Model(project, self.verbs, self._look), CALL: self._carry_out,
+            "pcdc": Model(project, self.verbs, self.look), CALL: self._carry_out,
         }  # fmt: skip
         self.namespace = dict(self._own_names)
         self._included_at: int | None = None
@@ -209,7 +209,17 @@ class Interpreter:
                 "way back to a checkpoint; restart files can still be read with pcdc model restore",
             )
 
-    def _look(self, make: Callable[[], Any]) -> Any:
+    @property
+    def replays(self) -> bool:
+        """The script is on its way back to a checkpoint."""
+        return self.journal is not None and self.journal.replays
+
+    @property
+    def keeps(self) -> bool:
+        """A journal is kept: --resume will run this script anew."""
+        return self.journal is not None and not self.journal.lost
+
+    def look(self, make: Callable[[], Any]) -> Any:
         """What the script asks of the model."""
         if self.journal is None:
             return make()

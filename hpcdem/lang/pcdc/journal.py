@@ -129,7 +129,8 @@ class Journal:
 
 
 def encoded(value: Any) -> str:
-    """A value as JSON text, to the last bit: numbers, truth values, texts, dicts of them, and arrays of numpy."""
+    """A value as JSON text, to the last bit: numbers, truth values, texts, tuples and dicts of them (keys: texts
+    or whole numbers), and arrays of numpy."""
     return json.dumps(_encoded(value))
 
 
@@ -137,6 +138,12 @@ def _encoded(value: Any) -> list[Any]:
     if isinstance(value, np.ndarray):
         packed = zlib.compress(np.ascontiguousarray(value).tobytes(), 1)
         return ["array", value.dtype.str, list(value.shape), base64.b64encode(packed).decode("ascii")]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, tuple):
+        return ["tuple", [_encoded(item) for item in value]]
+    if isinstance(value, dict) and not all(isinstance(name, str) for name in value):
+        return ["pairs", [[name, _encoded(item)] for name, item in value.items()]]
     if isinstance(value, dict):
         return ["dict", {name: _encoded(item) for name, item in value.items()}]
     if isinstance(value, float):
@@ -156,11 +163,15 @@ def _decoded(given: list[Any]) -> Any:
     kind, *rest = given
     if kind == "array":
         dtype = np.dtype(rest[0])
-        if dtype.kind not in "biuf":
+        if dtype.kind not in "biufU":
             raise ValueError(f"an array of {rest[0]}")
         size = dtype.itemsize * math.prod(rest[1])
         data = zlib.decompressobj().decompress(base64.b64decode(rest[2], validate=True), size + 1)
         return np.frombuffer(data, dtype).reshape(rest[1]).copy()
     if kind == "dict":
         return {name: _decoded(item) for name, item in rest[0].items()}
+    if kind == "tuple":
+        return tuple(_decoded(item) for item in rest[0])
+    if kind == "pairs":
+        return {name: _decoded(item) for name, item in rest[0]}
     return float.fromhex(rest[0]) if kind == "float" else {"plain": rest[0]}[kind]
