@@ -51,7 +51,6 @@ def advance(project: Project, steps: int) -> int:
     both = project.coupled
     if both is None:
         return project.blocks.advance(steps)
-    from hpcdem import output
     from hpcdem.budget import Budget
 
     take_up(project)
