@@ -133,7 +133,7 @@ def time_step(sim: Simulation) -> float:
 
     m_min: the smallest mass of a particle with a free degree of freedom (of clumps see observe.lightest); k_max: the
     largest pair stiffness, linear: of any two materials or material and wall in use; Hertz: tangent at the largest
-    overlap (1 % of R without contacts).
+    overlap (1 % of R if none is larger than a millionth of it: discs of a grid touch without pressing).
     Source: step count published with Li et al. 2021.
     """
     s, p = sim.settings, sim.particles
@@ -158,9 +158,12 @@ def time_step(sim: Simulation) -> float:
     hertz = rows[rows[:, 0] == 1.0]
     largest = np.array([now.max() if len(now) and len(hertz) else 0.0])
     touching = float(sim.comm.max_into(largest)[0])
-    if len(hertz) and touching == 0.0:
+    if len(hertz):
         r = sim.largest_radius
-        touching = max(tangent_normal_stiffness(model, a, 2.0 * r, 0.01 * r) for model, a, *_ in hertz)
+        barely, pressed = (
+            max(tangent_normal_stiffness(model, a, 2.0 * r, part * r) for model, a, *_ in hertz) for part in (1e-6, 0.01)
+        )
+        touching = touching if touching > barely else pressed
     stiffest = max(stiffest, touching)
     if stiffest <= 0.0:
         raise CommandError("SET frac: no stiffness is set (PROP kn, or shear with HERTZ); use SET DT")

@@ -79,3 +79,14 @@ def test_hertz_particles(tmp_path):
     steps(sim, 100)
     running.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(mass / (1.5 * k * math.sqrt(0.1))), rel=1e-6)
+
+
+def test_hertz_particles_that_hardly_press(tmp_path):
+    """As without contacts: the tangent of an overlap that is rounding would allow any time step."""
+    sim = with_frac(tmp_path, 0.2, disk="off")
+    particles.ball(sim, 0, 0.0, 0.0, 1.0)
+    particles.ball(sim, 1, 2.0 - 1e-12, 0.0, 1.0)
+    properties.prop(sim, density=1000.0, shear=1e8, poiss=0.25, hertz=True)
+    running.prepare(sim)
+    mass, k = 4000.0 / 3.0 * math.pi, 2e8 * math.sqrt(2.0) / (3.0 * 0.75)
+    assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(mass / (1.5 * k * math.sqrt(0.01))), rel=1e-9)
