@@ -60,3 +60,38 @@ def test_a_restart_does_not_change_a_bit(alone, launch, ranks, threads):
     run = launch.python(ranks, WORKER, kind, threads, STEPS, out, "resume", "middle.sav", cwd=folder, env=THREADS)
     assert run.returncode == 0, run.stderr[-2000:]
     same(folder / "alone.npz", folder / out)
+
+
+@pytest.fixture(scope="module")
+def hit_by_clumps(tmp_path_factory):
+    """Rigid bodies of discs hit a jointed block, on one rank."""
+    from tests.conftest import Launcher
+
+    folder = tmp_path_factory.mktemp("clumps")
+    run = Launcher().python(1, WORKER, "clumps", 1, STEPS, "alone.npz", 601, "middle.sav", cwd=folder)
+    assert run.returncode == 0, run.stderr[-2000:]
+    with np.load(folder / "alone.npz") as found:
+        of_clumps = np.flatnonzero(found["discs"][:, 0] >= found["clump_id"].min())
+        assert len(found["clump_id"]) == 4 and len(of_clumps) > 8
+        assert np.ptp(found["clump_spin"]) > 1.0 and found["clump_vy"].max() > -8.0  # they were braked, and turned
+        assert found["about"][1] == 0
+    return folder
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [3, pytest.param(2, marks=SLOW), pytest.param(4, marks=SLOW)])
+def test_clumps_on_other_ranks(hit_by_clumps, launch, ranks):
+    out = f"r{ranks}.npz"
+    run = launch.python(ranks, WORKER, "clumps", 1, STEPS, out, cwd=hit_by_clumps, env=THREADS)
+    assert run.returncode == 0, run.stderr[-2000:]
+    same(hit_by_clumps / "alone.npz", hit_by_clumps / out)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [2, pytest.param(1, marks=SLOW)])
+def test_clumps_after_a_restart(hit_by_clumps, launch, ranks):
+    out = f"again{ranks}.npz"
+    more = "resume", "middle.sav"
+    run = launch.python(ranks, WORKER, "clumps", 1, STEPS, out, *more, cwd=hit_by_clumps, env=THREADS)
+    assert run.returncode == 0, run.stderr[-2000:]
+    same(hit_by_clumps / "alone.npz", hit_by_clumps / out)
