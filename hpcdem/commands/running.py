@@ -161,7 +161,7 @@ def time_step(sim: Simulation) -> float:
     if len(hertz):
         r = sim.largest_radius
         barely, pressed = (
-            max(tangent_normal_stiffness(model, a, 2.0 * r, part * r) for model, a, *_ in hertz) for part in (1e-6, 0.01)
+            max(tangent_normal_stiffness(model, a, 2.0 * r, u * r) for model, a, *_ in hertz) for u in (1e-6, 0.01)
         )
         touching = touching if touching > barely else pressed
     stiffest = max(stiffest, touching)

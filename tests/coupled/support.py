@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hpcdem import observe
 from hpcdem.blocks import Blocks
 from hpcdem.commands import particles, properties, running, settings
 from hpcdem.coupled import Coupled
@@ -62,9 +63,14 @@ def momentum(both: Coupled) -> np.ndarray:
     blocks, p = both.blocks, both.particles.particles
     blocks.close_model()
     both.particles.close()
-    m, inertia = both.particles.body[:, 0], both.particles.body[:, 1]
-    rows = [np.column_stack([m * p["vx"], m * p["vy"],
-                             m * (p["x"] * p["vy"] - p["y"] * p["vx"]) + inertia * p["spin"]])]  # fmt: skip
+    single = p.clump < 0 if both.particles.clumps else np.ones(len(p), bool)
+    bodies = {"mass": both.particles.body[single, 0], "inertia": both.particles.body[single, 1],
+              **{name: p[name][single] for name in ("x", "y", "vx", "vy", "spin")}}  # fmt: skip
+    rows = []
+    for of in (bodies, observe.clumps(both.particles)):
+        m = of["mass"]
+        about = m * (of["x"] * of["vy"] - of["y"] * of["vx"]) + of["inertia"] * of["spin"]
+        rows.append(np.column_stack([m * of["vx"], m * of["vy"], about]))
     mass, x, v = blocks.local.true_mass[blocks.owned], blocks.x[blocks.owned], blocks.v[blocks.owned]
     for k in range(3 if v.shape[1] == 6 else 4):
         mk, xk, yk, uk, vk = mass[:, k], x[:, 2 * k], x[:, 2 * k + 1], v[:, 2 * k], v[:, 2 * k + 1]

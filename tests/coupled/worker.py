@@ -12,13 +12,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from hpcdem import observe
 from hpcdem.blocks import Blocks
 from hpcdem.budget import Budget
-from hpcdem.commands import particles, properties, running, settings, walls
+from hpcdem.commands import clumps, particles, properties, running, settings, walls
 from hpcdem.coupled import Coupled
+from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.simulation import Simulation
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 from tests.blocks.worker import communicator
+from tests.clumped import write_lattice
 
 WEAK = {**JOINT, "gf1": 0.05, "gf2": 0.2, "tensile_strength": 2e4, "cohesion": 6e4, "penalty_normal": 1e9}
 WIDTH, RADIUS = 2.4, 0.03
@@ -26,7 +29,8 @@ G = 9.81
 
 
 def make(kind: str, threads: int) -> Coupled:
-    """Both models. "drop": the block holds; "shatter": it falls apart; "flight": it also goes through many strips."""
+    """Both models. "drop": the block holds; "shatter": it falls apart; "flight": it also goes through many strips;
+    "clumps": it is hit by rigid bodies of discs; there is no account of energy for them."""
     comm = communicator()
     sim = Simulation(comm, threads, outdir=Path("."), balance_on=kind != "flight")
     particles.start(sim)
@@ -36,6 +40,13 @@ def make(kind: str, threads: int) -> Coupled:
     particles.gen_grid(sim, [RADIUS], (0.0, WIDTH), (0.0, 0.54))
     particles.gen(sim, 60, [0.02, 0.03], (0.0, WIDTH), (0.56, 0.7))
     properties.prop(sim, density=2000.0, kn=2e6, ks=1e6, fric=0.4)
+    if kind == "clumps":
+        if comm.rank == 0:
+            write_lattice(Path(f"bodies{comm.size}.txt"), 0.02, 4, 1)
+        comm.allgather(0)
+        clumps.clump(sim, f"bodies{comm.size}.txt", 0.7, 1.15, group="bodies")
+        fallen = parse_text("RES model\nDEL RANGE group bodies", "bodies").statements[1].selection
+        properties.prop(sim, fallen, density=2000.0, kn=2e6, ks=1e6, fric=0.4, yv=-12.0)
     running.prepare(sim)
     blocks = Blocks(comm, threads, balance_on=kind != "flight")
     blocks.take_mesh(joined(shaken(rectangle(8, 4, 0.8, 0.4, x0=0.7, y0=0.73, kind="mixed"), 0.15),
@@ -45,7 +56,8 @@ def make(kind: str, threads: int) -> Coupled:
         blocks.joint_model(None, "classic_intrinsic_cohesive_interface", WEAK)
     blocks.set_velocity(None, vx=6.0 if kind == "flight" else 0.5, vy=-5.0)
     blocks.gravity(0.0, -G)
-    blocks.account_energy()
+    if kind != "clumps":
+        blocks.account_energy()
     return Coupled(sim, blocks)
 
 
@@ -67,6 +79,7 @@ def state(both: Coupled) -> dict[str, np.ndarray]:
     rows = np.column_stack([p[name] for name in names] + [sim.lists.owned_forces()])
     rows = np.concatenate(sim.comm.allgather(rows))
     found["discs"] = rows[np.argsort(rows[:, 0])]
+    found.update({f"clump_{name}": values for name, values in observe.clumps(sim).items()})
     found.update({f"contact_{name}": values for name, values in both.contacts().items()})
     found.update({f"energy_{name}": np.array(value) for name, value in both.energies().items()})
     found["force"] = np.array(both.force_on_blocks())
@@ -81,9 +94,10 @@ def main() -> None:
         both.prepare()
     else:
         both = make(kind, int(threads))
-        both.particles.energy = Budget()
         both.settle_time_step()
-        both.particles.energy.begin(both.particles)
+        if kind != "clumps":
+            both.particles.energy = Budget()
+            both.particles.energy.begin(both.particles)
     most, searches, where = 0, set(), set()
     while both.blocks.clock.step < int(steps):
         if len(more) == 2 and more[0] != "resume" and both.blocks.clock.step == int(more[0]):

@@ -8,19 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.parallel import workers
+from tests.parallel.workers import equal, same
+
 WORKER = Path(__file__).resolve().parent.parent / "blocks" / "worker.py"
 STEPS = 1500
 SLOW = pytest.mark.slow
-THREADS = {"NUMBA_NUM_THREADS": "3", "OMP_WAIT_POLICY": "PASSIVE"}
-"""More threads than cores must not wait actively for each other."""
-
-
-def same(a: Path, b: Path) -> None:
-    with np.load(a) as one, np.load(b) as two:
-        assert set(one.files) == set(two.files)
-        for name in one.files:
-            if name != "about":
-                assert np.array_equal(one[name], two[name], equal_nan=True), name
 
 
 @pytest.fixture(
@@ -28,12 +21,8 @@ def same(a: Path, b: Path) -> None:
 )
 def alone(request, tmp_path_factory):
     """The run on one rank with one thread, with a checkpoint from the middle of it."""
-    from tests.conftest import Launcher
-
     folder = tmp_path_factory.mktemp(request.param)
-    run = Launcher().python(1, WORKER, request.param, 1, STEPS, "alone.npz", 701, "middle.sav", cwd=folder)
-    assert run.returncode == 0, run.stderr[-2000:]
-    return request.param, folder
+    return request.param, workers.alone(WORKER, request.param, STEPS, 701, folder)
 
 
 def test_much_happens(alone):
@@ -63,12 +52,9 @@ def test_much_happens(alone):
 )
 def test_ranks_and_threads_do_not_change_a_bit(alone, launch, ranks, threads):
     kind, folder = alone
-    out = f"r{ranks}t{threads}.npz"
-    run = launch.python(ranks, WORKER, kind, threads, STEPS, out, cwd=folder, env=THREADS)
-    assert run.returncode == 0, run.stderr[-2000:]
-    same(folder / "alone.npz", folder / out)
+    out = equal(launch, WORKER, kind, STEPS, folder, ranks, threads)
     if kind == "flight" and ranks > 1:
-        with np.load(folder / out) as found:
+        with np.load(out) as found:
             assert found["about"][3] > 20  # elements that came from another rank
 
 
@@ -79,10 +65,7 @@ def test_ranks_and_threads_do_not_change_a_bit(alone, launch, ranks, threads):
 )
 def test_a_restart_does_not_change_a_bit(alone, launch, ranks, threads):
     kind, folder = alone
-    out = f"again{ranks}{threads}.npz"
-    run = launch.python(ranks, WORKER, kind, threads, STEPS, out, "resume", "middle.sav", cwd=folder, env=THREADS)
-    assert run.returncode == 0, run.stderr[-2000:]
-    same(folder / "alone.npz", folder / out)
+    equal(launch, WORKER, kind, STEPS, folder, ranks, threads, "resume", "middle.sav")
 
 
 @pytest.mark.mpi

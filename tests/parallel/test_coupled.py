@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.parallel.test_blocks import THREADS, same
+from tests.parallel import workers
+from tests.parallel.workers import equal
 
 WORKER = Path(__file__).resolve().parent.parent / "coupled" / "worker.py"
 STEPS = 1200
@@ -18,12 +19,8 @@ SLOW = pytest.mark.slow
 @pytest.fixture(scope="module", params=["shatter", pytest.param("flight", marks=SLOW)])
 def alone(request, tmp_path_factory):
     """The run on one rank with one thread, with a checkpoint from the middle of it."""
-    from tests.conftest import Launcher
-
     folder = tmp_path_factory.mktemp(request.param)
-    run = Launcher().python(1, WORKER, request.param, 1, STEPS, "alone.npz", 701, "middle.sav", cwd=folder)
-    assert run.returncode == 0, run.stderr[-2000:]
-    return request.param, folder
+    return request.param, workers.alone(WORKER, request.param, STEPS, 701, folder)
 
 
 def test_much_happens(alone):
@@ -43,12 +40,9 @@ def test_much_happens(alone):
 )  # fmt: skip
 def test_ranks_and_threads_do_not_change_a_bit(alone, launch, ranks, threads):
     kind, folder = alone
-    out = f"r{ranks}t{threads}.npz"
-    run = launch.python(ranks, WORKER, kind, threads, STEPS, out, cwd=folder, env=THREADS)
-    assert run.returncode == 0, run.stderr[-2000:]
-    same(folder / "alone.npz", folder / out)
+    out = equal(launch, WORKER, kind, STEPS, folder, ranks, threads)
     if ranks > 1:
-        with np.load(folder / out) as found:
+        with np.load(out) as found:
             assert found["about"][4] > 0  # ranks that sent forces to others
 
 
@@ -56,7 +50,28 @@ def test_ranks_and_threads_do_not_change_a_bit(alone, launch, ranks, threads):
 @pytest.mark.parametrize("ranks, threads", [(2, 1), pytest.param(1, 1, marks=SLOW), pytest.param(4, 1, marks=SLOW)])
 def test_a_restart_does_not_change_a_bit(alone, launch, ranks, threads):
     kind, folder = alone
-    out = f"again{ranks}{threads}.npz"
-    run = launch.python(ranks, WORKER, kind, threads, STEPS, out, "resume", "middle.sav", cwd=folder, env=THREADS)
-    assert run.returncode == 0, run.stderr[-2000:]
-    same(folder / "alone.npz", folder / out)
+    equal(launch, WORKER, kind, STEPS, folder, ranks, threads, "resume", "middle.sav")
+
+
+@pytest.fixture(scope="module")
+def hit_by_clumps(tmp_path_factory):
+    """Rigid bodies of discs hit a jointed block, on one rank."""
+    folder = workers.alone(WORKER, "clumps", STEPS, 601, tmp_path_factory.mktemp("clumps"))
+    with np.load(folder / "alone.npz") as found:
+        of_clumps = np.flatnonzero(found["discs"][:, 0] >= found["clump_id"].min())
+        assert len(found["clump_id"]) == 4 and len(of_clumps) > 8
+        assert np.ptp(found["clump_spin"]) > 1.0 and found["clump_vy"].max() > -8.0  # they were braked, and turned
+        assert found["about"][1] == 0
+    return folder
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [3, pytest.param(2, marks=SLOW), pytest.param(4, marks=SLOW)])
+def test_clumps_on_other_ranks(hit_by_clumps, launch, ranks):
+    equal(launch, WORKER, "clumps", STEPS, hit_by_clumps, ranks, 1)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [2, pytest.param(1, marks=SLOW)])
+def test_clumps_after_a_restart(hit_by_clumps, launch, ranks):
+    equal(launch, WORKER, "clumps", STEPS, hit_by_clumps, ranks, 1, "resume", "middle.sav")

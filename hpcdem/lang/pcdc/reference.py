@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from hpcdem.lang.pages import escaped, wrapped
 from hpcdem.lang.pcdc.table import PCDC, RECORDED, Command, Model, Option, Table
 
 _TOP = """\
@@ -73,7 +74,7 @@ def _overview(table: Table) -> str:
     for command in table.commands:
         if not command.later:
             first = command.doc.split(". ")[0].rstrip(".")
-            rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {_cell(first)} |")
+            rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {escaped(first)} |")
     return "\n".join([*rows, ""])
 
 
@@ -103,13 +104,7 @@ def _syntax(command: Command) -> list[str]:
             words.append(word if option.required else f"[{word}]")
     if command.ranged:
         words.append("[ran{ge} ...]")
-    lines, line = [], ""
-    for word in words:
-        if line and len(line) + len(word) > 100:
-            lines.append(line)
-            line = "   "
-        line = f"{line} {word}" if line else word
-    return [*lines, line]
+    return wrapped(words)
 
 
 def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
@@ -131,7 +126,7 @@ def _row(option: Option, word: str, named: bool = False) -> str:
     several = "; may be repeated" if option.repeated else ""
     default = "required" if option.required and not named else option.default
     cells = [word, f"`{pattern}`" if pattern else "", option.unit, default, option.doc + several + also]
-    return "| " + " | ".join(_cell(cell) for cell in cells) + " |"
+    return "| " + " | ".join(escaped(cell) for cell in cells) + " |"
 
 
 def _pattern(option: Option) -> str:
@@ -170,15 +165,11 @@ def _later(table: Table) -> str:
     rows += ["| words | why |", "|---|---|"]
     for command in table.commands:
         if command.later:
-            rows.append(f"| `{command.notation}` | {_cell(command.later)} |")
-        rows += [f"| `{command.notation} {m.notation}` | {_cell(m.later)} |" for m in command.models if m.later]
-        rows += [f"| `{command.notation} ... {o.notation}` | {_cell(o.later)} |" for o in command.options if o.later]
-    rows += [f"| `ran{{ge}} ... {term.notation}` | {_cell(term.later)} |" for term in table.range_terms if term.later]
+            rows.append(f"| `{command.notation}` | {escaped(command.later)} |")
+        rows += [f"| `{command.notation} {m.notation}` | {escaped(m.later)} |" for m in command.models if m.later]
+        rows += [f"| `{command.notation} ... {o.notation}` | {escaped(o.later)} |" for o in command.options if o.later]
+    rows += [f"| `ran{{ge}} ... {term.notation}` | {escaped(term.later)} |" for term in table.range_terms if term.later]
     return "\n".join([*rows, ""])
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from hpcdem.lang.pages import escaped, wrapped
 from hpcdem.lang.zdem.table import COLORS, FLAG, SOURCES, ZDEM, Choice, Command, Option, Row, Table
 
 _TOP = """\
@@ -56,7 +57,7 @@ def _overview(table: Table) -> str:
     rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
     for command in table.commands:
         first_sentence = command.doc.split(". ")[0].rstrip(".")
-        rows.append(f"| [{command.name}](#{command.name.lower()}) | {_cell(first_sentence)} |")
+        rows.append(f"| [{command.name}](#{command.name.lower()}) | {escaped(first_sentence)} |")
     return "\n".join([*rows, ""])
 
 
@@ -86,13 +87,7 @@ def _syntax(command: Command) -> list[str]:
             words.append(word if option.required else f"[{word}]")
     if command.ranged and not command.same_as:
         words.append("[RANGE ...]")
-    lines, line = [], ""
-    for word in words:
-        if line and len(line) + len(word) > 100:
-            lines.append(line)
-            line = "   "
-        line = f"{line} {word}" if line else word
-    return [*lines, line]
+    return wrapped(words)
 
 
 def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
@@ -107,7 +102,7 @@ def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
             option.doc + _also(option) + ("" if option.executed else " (**not carried out yet**)"),
             option.source,
         ]
-        rows.append("| " + " | ".join(_cell(cell) for cell in cells) + " |")
+        rows.append("| " + " | ".join(escaped(cell) for cell in cells) + " |")
     return "\n".join(rows)
 
 
@@ -130,10 +125,6 @@ def _remarks(row: Row) -> str:
 
 def _also(row: Row) -> str:
     return f"; also read: {', '.join(f'`{word}`' for word in row.also)}" if row.also else ""
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
 
 
 def _colors() -> str:

@@ -427,17 +427,23 @@ def quad_forces(xy, vel, c, s0, small, force):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _mean_trace(overlay, xy, c, small):
+    """Mean by area of e11 + e22 over the two triangles of an overlay (0, 1) of a quad."""
+    mean, area = 0.0, 0.0
+    for p in (2 * overlay, 2 * overlay + 1):
+        _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
+        mean += c[Q_AREA + p] * (e11 + e22)
+        area += c[Q_AREA + p]
+    return mean / area
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def quad_stress(xy, c, s0, small, stress):
     """Mean stress (4,) xx, yy, xy, zz [Pa] of a quad over its four triangles by area, without the viscous part."""
     stress[:] = 0.0
     areas = 0.0
     for overlay in range(2):
-        mean, area = 0.0, 0.0
-        for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
-            mean += c[Q_AREA + p] * (e11 + e22)
-            area += c[Q_AREA + p]
-        mean /= area
+        mean = _mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
             _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c, small)
             shift, m = 0.5 * (mean - (e11 + e22)), c[Q_TWO_MU]
@@ -459,12 +465,7 @@ def quad_energy(xy, c, s0, small):
     """Elastic energy [J/m] of a quad: the mean of its two overlays."""
     total = 0.0
     for overlay in range(2):
-        mean, area = 0.0, 0.0
-        for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
-            mean += c[Q_AREA + p] * (e11 + e22)
-            area += c[Q_AREA + p]
-        mean /= area
+        mean = _mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
             _, _, _, _, _, _, e11, e22, e12 = _part_stretch(p, xy, c, small)
             shift = 0.5 * (mean - (e11 + e22))
