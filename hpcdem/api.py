@@ -341,6 +341,10 @@ class Simulation:
 
         if int(steps) != steps or steps < 1:
             raise ScriptError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
+        if self.engine.coupled:
+            raise ScriptError(
+                *_place(), "every: the blocks step these particles, and call nobody: look between two 'pcdc model step'"
+            )
         watcher = Watcher(int(steps), lambda: function(self))
         self.engine.watchers.append(watcher)
         return Call(self, watcher)

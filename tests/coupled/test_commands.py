@@ -21,6 +21,7 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.post import inventory
 from hpcdem.runtime.progress import BETWEEN, Log
+from hpcdem.simulation import Watcher
 from hpcdem.timers import Timers
 from tests.coupled.support import ROCK, discs
 
@@ -76,6 +77,10 @@ def test_refusals(tmp_path):
         coupling.couple(project, discs([(0.5, 0.9, 0.1)], tmp_path / "data", dt=5e-6))
     with pytest.raises(CommandError, match="time step must be positive"):
         coupling.couple(project, sim, dt=-1.0)
+    sim.watchers.append(Watcher(5, lambda: None))
+    with pytest.raises(CommandError, match="wait for steps of the particles"):
+        coupling.couple(project, sim)
+    sim.watchers.clear()
     inside = discs([(0.5, 0.31, 0.1)], tmp_path / "sand", dt=5e-6)
     with pytest.raises(CommandError, match="inside element"):
         coupling.couple(project, inside)

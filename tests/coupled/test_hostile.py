@@ -132,3 +132,21 @@ def test_blocks_that_are_replaced(tmp_path):
     both.blocks.element_model(None, "mech_iso_elastic", ROCK)
     both.settle_time_step()
     both.advance(2)
+
+
+def test_nobody_is_called_while_both_are_stepped(launch, tmp_path):
+    (tmp_path / "script.sc").write_text(
+        "import hpcdem\n"
+        "pcdc mesh structured (0,0) (1,1) cells 2 2\n"
+        "pcdc element c-model mech-iso-e property den 2000 y 1e9 p-r 0.2\n"
+        "sand = hpcdem.Simulation(outdir='sand')\n"
+        "sand.set(disk='on', dt=1e-6)\n"
+        "sand.box(-1.0, 3.0, -1.0, 4.0)\n"
+        "sand.ball(0.5, 1.5, 0.1)\n"
+        "sand.prop(density=2000.0, kn=1e7)\n"
+        "hpcdem.couple(sand)\n"
+        "sand.every(5, print)\n"
+    )
+    done = launch(1, "script.sc", cwd=tmp_path)
+    assert done.returncode != 0
+    assert "script.sc:10: " in done.stderr and "the blocks step these particles" in done.stderr

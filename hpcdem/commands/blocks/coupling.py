@@ -32,6 +32,11 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
         )
     if dt < 0.0:
         raise CommandError(f"the time step must be positive, got {dt:g}")
+    if particles.watchers:
+        raise CommandError(
+            f"{len(particles.watchers)} function(s) wait for steps of the particles (every): they are not called while "
+            "both are stepped; cancel them, and look between two 'pcdc model step'"
+        )
     blocks = project.ready()
     running.prepare(particles, dt_known=particles.settings.dt == 0.0)
     both = Coupled(particles, blocks, friction)
