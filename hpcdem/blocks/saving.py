@@ -108,6 +108,31 @@ def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
     return state["extra"]
 
 
+def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
+    """Take the blocks of a checkpoint that holds particles as well (hpcdem/coupled/saving.py), without the kernels of
+    these; returns `extra`, or None if the file is not one of both. Collective."""
+    found = None
+    if sim.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+        except HpcdemError:
+            found = None
+        if found is not None and found[0].get("kind") != checkpoint.BOTH:
+            found = None
+    text = sim.comm.bcast(None if found is None else json.dumps(found[0]))
+    if text is None:
+        return None
+    state = json.loads(text)
+    put(sim, state, without_particles(found[1]) if found is not None else None)
+    return state["extra"]
+
+
+def without_particles(tables: dict[str, Any]) -> dict[str, Any]:
+    """Those of the blocks among the tables of a checkpoint of both."""
+    others = checkpoint.OF_PARTICLES
+    return {name: table for name, table in tables.items() if not name.startswith(others) and name != checkpoint.LINKS}
+
+
 def read(
     comm: SerialComm, path: Path | str, kind: str, what: str
 ) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]] | None]:

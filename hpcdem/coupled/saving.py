@@ -6,7 +6,6 @@ before them, and what the contacts between the two remember. One file: the two c
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,12 +13,10 @@ from typing import TYPE_CHECKING, Any
 from hpcdem import saving as of_particles
 from hpcdem.blocks import saving as of_blocks
 from hpcdem.coupled.links import Touching
-from hpcdem.errors import HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.slabs import to_slabs
 
 if TYPE_CHECKING:
-    from hpcdem.blocks import Blocks
     from hpcdem.coupled import Coupled
 
 KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LINKS
@@ -39,28 +36,6 @@ def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
         checkpoint.write(path, state, tables, both.comm)
 
 
-def restore_blocks(blocks: Blocks, path: Path | str) -> dict[str, Any] | None:
-    """Take that of the blocks alone; returns `extra`, or None if the file is none of both. Collective."""
-    found = None
-    if blocks.comm.rank == 0:
-        try:
-            found = checkpoint.read(path)
-        except HpcdemError:
-            found = None
-        if found is not None and found[0].get("kind") != KIND:
-            found = None
-    text = blocks.comm.bcast(None if found is None else json.dumps(found[0]))
-    if text is None:
-        return None
-    state = json.loads(text)
-    of_blocks.put(blocks, state, _without_discs(found[1]) if found is not None else None)
-    return state["extra"]
-
-
-def _without_discs(tables: dict[str, Any]) -> dict[str, Any]:
-    return {n: t for n, t in tables.items() if not n.startswith(PREFIX) and n != CONTACTS}
-
-
 def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`; returns `extra`. Collective. CommandError if the file is missing,
     foreign or damaged; both models are then as they were."""
@@ -73,7 +48,7 @@ def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
     if tables is not None:
         rows = tables[CONTACTS]
         known = Touching(rows["gid"], rows["face"], rows["friction"])
-        tables = _without_discs(tables)
+        tables = of_blocks.without_particles(tables)
     of_blocks.put(both.blocks, state, tables)
     of_particles.apply_state(both.particles, state["particles"], of_the_discs)
     both.end_restore(state["coupled"], known)

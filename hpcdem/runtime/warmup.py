@@ -85,8 +85,11 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     numba.config.CACHE_DIR = str(building or folder)  # type: ignore[attr-defined]
     (_only_read.add if building is None else _only_read.discard)(building or folder)
     try:
+        count = len(late)
         with _rehearsing():
             warm()
+        if building is not None:
+            del late[count:]  # of other folders, within those that are compiled for this one
     except Exception:
         # numba passes on whatever a damaged file makes pickle or LLVM say. If it is no cache error it comes again.
         give_up_cache()
@@ -111,13 +114,13 @@ _plain_save: Any = None
 @contextlib.contextmanager
 def _rehearsing() -> Iterator[None]:
     """See to it that numba writes nothing into complete folders: neither now, when kernels that are compiled have those
-    of other folders in them, nor later, when many processes may do so at the same time."""
+    of other folders in them, nor later, when many processes may do so at the same time. A rehearsal that compiles with
+    its folder complete is late as well: its kernels were imported before their folder was known."""
     global _plain_save
     from numba.core.caching import FunctionCache
 
     if _plain_save is None:
         _plain_save = FunctionCache.save_overload
-    count = len(late)
 
     def save(cache: Any, signature: Any, kernel: Any) -> None:
         if _only_read.isdisjoint(Path(cache.cache_path).parents):
@@ -127,7 +130,6 @@ def _rehearsing() -> Iterator[None]:
 
     FunctionCache.save_overload = save  # type: ignore[method-assign]
     yield
-    del late[count:]
 
 
 def give_up_cache() -> None:

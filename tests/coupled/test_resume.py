@@ -48,7 +48,7 @@ def straight(tmp_path_factory) -> tuple[Path, list[str]]:
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     "before, after",
-    [(1, 3), pytest.param(3, 1, marks=pytest.mark.slow), pytest.param(2, 4, marks=pytest.mark.slow)],
+    [(1, 2), *(pytest.param(*ranks, marks=pytest.mark.slow) for ranks in ((1, 3), (3, 1), (2, 4)))],
 )
 def test_it_goes_on_on_other_ranks(launch, straight, tmp_path, before, after):
     folder, lines = straight

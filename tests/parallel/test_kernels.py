@@ -5,12 +5,13 @@ It must be, as nothing is ever added to it: each process would compile for itsel
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.clumped import write_lattice
-from tests.conftest import Launcher
+from tests.conftest import ROOT, Launcher
 from tests.pcdc.test_whole import SCRIPTS
 
 WATCHED = """\
@@ -139,6 +140,18 @@ def test_blocks_and_particles_in_any_order(late, tmp_path: Path, ranks: int, fir
     text = BOTH.format(first=SAND, then="") if first == "particles" else BOTH.format(first="", then=SAND)
     (tmp_path / "both.sc").write_text(text)
     assert late(ranks, "both.sc") == [NOTHING] * ranks
+
+
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=[MPI, SLOW])])
+def test_a_script_of_both_that_goes_on(launch: Launcher, tmp_path: Path, ranks: int) -> None:
+    """The checkpoint is read while only the kernels of blocks are there."""
+    (tmp_path / "watched.py").write_text(WATCHED)
+    shutil.copy(ROOT / "tests" / "coupled" / "fall.sc", tmp_path)
+    (tmp_path / "stop").touch()
+    assert launch.python(ranks, "watched.py", "fall.sc", "--no-figure", cwd=tmp_path).returncode == 85
+    (tmp_path / "stop").unlink()
+    done = launch.python(ranks, "watched.py", "fall.sc", "--no-figure", "--resume", cwd=tmp_path)
+    assert done.returncode == 0 and done.stdout.count(f"{NOTHING}\n") == ranks, done.stdout + done.stderr
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hpcdem.blocks import saving
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 
@@ -117,9 +118,7 @@ def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
         return project.coupled.restore(path)
     if not begins:
         return project.blocks.restore(path)
-    from hpcdem.coupled import saving
-
-    found = saving.restore_blocks(project.blocks, path)
+    found = saving.restore_part(project.blocks, path)
     if found is None:
         return project.blocks.restore(path)
     project.continues = path
