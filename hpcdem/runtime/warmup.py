@@ -17,7 +17,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,8 +86,8 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     (_only_read.add if building is None else _only_read.discard)(building or folder)
     try:
         count = len(late)
-        with _rehearsing():
-            warm()
+        _protect_complete_folders()
+        warm()
         if building is not None:
             del late[count:]  # of other folders, within those that are compiled for this one
     except Exception:
@@ -111,8 +111,7 @@ _only_read: set[Path] = set()
 _plain_save: Any = None
 
 
-@contextlib.contextmanager
-def _rehearsing() -> Iterator[None]:
+def _protect_complete_folders() -> None:
     """See to it that numba writes nothing into complete folders: neither now, when kernels that are compiled have those
     of other folders in them, nor later, when many processes may do so at the same time. A rehearsal that compiles with
     its folder complete is late as well: its kernels were imported before their folder was known."""
@@ -129,7 +128,6 @@ def _rehearsing() -> Iterator[None]:
             late.append(f"{kernel.fndesc.modname}.{kernel.fndesc.qualname}{signature}")
 
     FunctionCache.save_overload = save  # type: ignore[method-assign]
-    yield
 
 
 def give_up_cache() -> None:
