@@ -3,7 +3,7 @@
 # Three closed joints lie at 45 degrees to the load. Wing cracks grow from their tips towards the load, in tension; then
 # the bridges of rock between joints and surface fail. About 40 s on one core. Needs the extra [mesh] (Gmsh).
 #
-#   hpcdem jointed_specimen.sc        figure and histories in data/, curve.png beside the script
+#   hpcdem jointed_specimen.sc        figure, histories and curve.png in data/
 #   hpcdem movie data
 import math
 

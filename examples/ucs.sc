@@ -3,7 +3,7 @@
 # `hpcdem case ucs` writes all that UCS() does as a script; `hpcdem case ucs --help` lists its parameters. The specimen
 # breaks along steep bands of shear, and splits along the load. Two minutes on one core. Needs the extra [mesh].
 #
-#   hpcdem ucs.sc             ucs.png beside the script; figure, histories and frames in data/
+#   hpcdem ucs.sc             ucs.png, figure, histories and frames in data/
 #   hpcdem movie data
 from hpcdem.cases import UCS
 

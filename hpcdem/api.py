@@ -18,7 +18,7 @@ import numpy as np
 from hpcdem import session
 from hpcdem.errors import CommandError, ScriptError, UsageError
 from hpcdem.fields import FIELDS, FIX_BITS
-from hpcdem.lang.zdem.execute import Interpreter, Verbs, find
+from hpcdem.lang.zdem.execute import Interpreter, Verbs, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
 from hpcdem.model.materials import MATERIAL
@@ -41,23 +41,35 @@ def _place() -> tuple[str, int]:
     return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
 
 
-def _verb(method: Method) -> Method:
-    """Errors of a verb leave with file and line of the program; values of a wrong kind too."""
+def _verb(method: Method, edits: bool = True) -> Method:
+    """Errors of a verb leave with file and line of the program; values of a wrong kind too. edits: it may change the
+    particles."""
 
     @functools.wraps(method)
     def call(self: Simulation, *values: Any, **options: Any) -> Any:
         place = _place()
         self.engine.line = place[1]
-        try:
-            return self._asked(lambda: method(self, *values, **options))
-        except CommandError as error:
-            raise ScriptError(*place, f"{method.__name__}: {error}") from error
-        except (TypeError, ValueError) as error:
-            if _raised_by_the_user(error):
-                raise
-            raise ScriptError(*place, f"{method.__name__}: {error}; see help(hpcdem.Simulation)") from error
+
+        def carried_out() -> Any:
+            try:
+                value = method(self, *values, **options)
+            except CommandError as error:
+                raise ScriptError(*place, f"{method.__name__}: {error}") from error
+            except (TypeError, ValueError) as error:
+                if _raised_by_the_user(error):
+                    raise
+                raise ScriptError(*place, f"{method.__name__}: {error}; see help(hpcdem.Simulation)") from error
+            self.engine.edited |= edits
+            return value
+
+        return self._asked((method.__name__, values, options), carried_out)
 
     return call  # type: ignore[return-value]
+
+
+def _look(method: Method) -> Method:
+    """A verb that changes nothing."""
+    return _verb(method, edits=False)
 
 
 def _raised_by_the_user(error: BaseException) -> bool:
@@ -91,8 +103,12 @@ class Call:
 
     def cancel(self) -> None:
         """Do not call it any more."""
-        if self._watcher in self._sim.engine.watchers:
-            self._sim.engine.watchers.remove(self._watcher)
+
+        def remove() -> None:
+            if self._watcher in self._sim.engine.watchers:
+                self._sim.engine.watchers.remove(self._watcher)
+
+        self._sim._asked(("cancel", self._watcher.every), remove, again=True)
 
 
 class Simulation:
@@ -115,6 +131,8 @@ class Simulation:
         self.engine.outdir = self.engine.outdir.resolve()
         self.engine.goes_on_with = "Simulation.resume()"
         self._do = Verbs()
+        self._seen_alone = ""
+        self._asked(("Simulation", outdir, log), lambda: None, again=True)
 
     def __enter__(self) -> Simulation:
         return self
@@ -128,6 +146,7 @@ class Simulation:
     @_verb
     def start(self) -> None:
         """START: forget everything and begin a new, empty model."""
+        self._refuse_coupled("start")
         self._do.particles.start(self.engine)
 
     @_verb
@@ -205,7 +224,9 @@ class Simulation:
 
     @_verb
     def load(self, file: str | Path, scale: float = 1.0, x: Point | None = None, y: Point | None = None) -> int:
-        """LOAD: a new model from rows ``x y r [group]``; x, y: window in the numbers of the file; how many."""
+        """LOAD: a new model from rows ``x y r [group]``, or from a frame all_<step>.dat; x, y: window in the numbers of
+        the file; how many."""
+        self._refuse_coupled("load")
         return self._do.particles.load(self.engine, self._existing(file), scale, x, y)
 
     @_verb
@@ -233,7 +254,7 @@ class Simulation:
         """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
         return self._do.particles.delete(self.engine, _selection(where))
 
-    @_verb
+    @_look
     def export(self, file: str | Path, group: bool = False, where: Where = None) -> None:
         """EXP: rows ``x y r [group]`` in the order of ids."""
         self._do.particles.export(self.engine, self.directory / file, group, _selection(where))
@@ -258,11 +279,13 @@ class Simulation:
         spin: float | None = None,
         color: str | int | None = None,
         group: str | None = None,
+        xp: float | None = None,
+        yp: float | None = None,
     ) -> None:
         """PROP: properties, velocities, colour and group of particles; what is left out stays."""
         self._do.properties.prop(
             self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
-            hertz=hertz, kn=kn, ks=ks, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
+            hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
         )  # fmt: skip
 
     @_verb
@@ -279,11 +302,12 @@ class Simulation:
         tolerate: float | None = None,
         rext: float | None = None,
         fric: float | None = None,
+        rubber: bool = False,
     ) -> int:
         """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new."""
         return self._do.bonds.bond(
             self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
-            n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric,
+            n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
         )  # fmt: skip
 
     @_verb
@@ -303,11 +327,13 @@ class Simulation:
 
     @_verb
     def set(self, **options: Any) -> None:
-        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, wallside, outdir, and the
-        steps between outputs: print, ps, vtk, save, stepbar, energy."""
+        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, outdir,
+        and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
         for name, value in options.items():
-            value = self.directory / value if name == "outdir" else value
-            self._do.settings.set_option(self.engine, name, value)
+            if name == "outdir":
+                self._write_into(value)
+            else:
+                self._do.settings.set_option(self.engine, name, value)
 
     # ---- running ---------------------------------------------------------------------------------------------------
 
@@ -341,15 +367,17 @@ class Simulation:
 
         if int(steps) != steps or steps < 1:
             raise ScriptError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
-        if self.engine.coupled:
-            raise ScriptError(
-                *_place(), "every: the blocks step these particles, and call nobody: look between two 'pcdc model step'"
-            )
-        watcher = Watcher(int(steps), lambda: function(self))
+        running = self._session.interpreter
+
+        def call() -> object:
+            return function(self)
+
+        self._asked(("every", int(steps), function), lambda: None, again=True)
+        watcher = Watcher(int(steps), call if running is None else running.function(call))
         self.engine.watchers.append(watcher)
         return Call(self, watcher)
 
-    @_verb
+    @_look
     def save(self, file: str | Path) -> None:
         """SAV: the whole state to a checkpoint."""
         self._do.saving.save(self.engine, self.directory / file)
@@ -357,6 +385,7 @@ class Simulation:
     @_verb
     def restore(self, file: str | Path) -> None:
         """RES: the whole state of a checkpoint, written on any number of ranks."""
+        self._refuse_coupled("restore")
         self._do.saving.restore(self.engine, self._existing(file))
 
     @_verb
@@ -365,6 +394,7 @@ class Simulation:
         is none. Functions of `every` must have been given before."""
         from hpcdem import saving
 
+        self._refuse_coupled("resume")
         found = saving.restore_newest(self.engine, [self.engine.outdir])
         if found is None:
             return False
@@ -372,13 +402,13 @@ class Simulation:
         self._do.running.resume(self.engine)
         return True
 
-    @_verb
+    @_look
     def hist(self, id: int, interval: int, what: str) -> None:
-        """HIST: append kinetic, step, time, unbalanced, contacts, bonds or energy to hist_<id>.dat every `interval`
-        steps."""
+        """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
+        a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv."""
         self._do.history.hist(self.engine, id, interval, what)
 
-    @_verb
+    @_look
     def plot(self, y: int, x: int) -> None:
         """PLOT: at `finish`, write history y against history x."""
         self._do.history.plot_hist(self.engine, y, x)
@@ -391,6 +421,7 @@ class Simulation:
         try:
             script = parse_text(text if begins else "RES model\n" + text, str(self.directory / "command"))
             interpreter = Interpreter(script, self._do)
+            tell_warnings(script, self.engine)
             for index in range(0 if begins else 1, len(script.statements)):
                 interpreter.carry_out(self.engine, index)
         except ScriptError as error:
@@ -398,7 +429,7 @@ class Simulation:
         finally:
             self.engine.script, self.engine.position = self._session.text, 0
 
-    @_verb
+    @_look
     def finish(self) -> None:
         """The end: histories closed, the table of stages printed, the last frame drawn. Without it, all this happens
         when the program ends."""
@@ -407,7 +438,7 @@ class Simulation:
 
     # ---- output of one moment --------------------------------------------------------------------------------------
 
-    @_verb
+    @_look
     def write_frame(self) -> None:
         """Write ``all_<step>.vtkhdf`` and ``.dat`` now."""
         from hpcdem import output
@@ -419,8 +450,7 @@ class Simulation:
 
     def __len__(self) -> int:
         """Particles of this rank."""
-        self._of_this_rank("len(...)")
-        return len(self.engine.particles)
+        return self._of_this_rank("len(...)", lambda: len(self.engine.particles))
 
     def __getitem__(self, name: str) -> np.ndarray:
         """A field of this rank's own particles (n,), read-only; valid until the next method that changes or steps.
@@ -429,8 +459,7 @@ class Simulation:
         of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump, which
         is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
         """
-        self._of_this_rank(f"['{name}']")
-        return self._field(name)
+        return self._of_this_rank(f"['{name}']", lambda: self._field(name))
 
     def _field(self, name: str) -> np.ndarray:
         p, engine = self.engine.particles, self.engine
@@ -460,7 +489,8 @@ class Simulation:
         """
         if name not in SETTABLE:
             raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(SETTABLE)}")
-        self._asked(lambda: self._set_field(name, values))
+        self._asked(("set field", name, values), lambda: self._set_field(name, values))
+        self.engine.edited = True
 
     def _set_field(self, name: str, values: Any) -> None:
         engine = self.engine
@@ -502,27 +532,27 @@ class Simulation:
             order = np.argsort(np.concatenate(self.engine.comm.allgather(np.array(self._field("gid")))))
             return columns[0][order] if len(columns) == 1 else tuple(c[order] for c in columns)
 
-        return self._asked(gathered)
+        return self._asked(("gather", names), gathered)
 
     @property
     def count(self) -> int:
         """Particles on all ranks."""
-        return self._asked(lambda: int(self.engine.count(len(self.engine.particles))))
+        return self._asked(("count",), lambda: int(self.engine.count(len(self.engine.particles))))
 
     @property
     def steps(self) -> int:
         """Number of the present step."""
-        return self._asked(lambda: int(self.engine.clock.step))
+        return self._asked(("steps",), lambda: int(self.engine.clock.step))
 
     @property
     def time(self) -> float:
         """Model time [s]."""
-        return self._asked(lambda: float(self.engine.clock.time))
+        return self._asked(("time",), lambda: float(self.engine.clock.time))
 
     @property
     def dt(self) -> float:
         """Time step of the last cycle [s]; 0 before the first."""
-        return self.engine.clock.dt
+        return self._asked(("dt",), lambda: float(self.engine.clock.dt))
 
     @property
     def rank(self) -> int:
@@ -541,7 +571,7 @@ class Simulation:
 
     @property
     def walls(self) -> dict[int, Wall]:
-        """The walls by id, those of BOX with ids -1 to -4 (left, right, bottom, top)."""
+        """The walls by id, those of BOX with ids 100 to 103 (bottom, right, top, left)."""
 
         def rows() -> dict[int, tuple[Any, ...]]:
             w = self.engine.walls
@@ -552,14 +582,14 @@ class Simulation:
                 for k in range(len(w))
             }  # fmt: skip
 
-        return {name: Wall(*row) for name, row in self._asked(rows).items()}
+        return {name: Wall(*row) for name, row in self._asked(("walls",), rows).items()}
 
-    @_verb
+    @_look
     def extents(self) -> dict[str, float]:
         """{left, right, bottom, top} of the particles that are not fixed in both x and y [m]."""
         return self.engine.extents()
 
-    @_verb
+    @_look
     def wall_force(self, id: int) -> Point:
         """Force on a wall (x, y) [N], exactly summed."""
         from hpcdem import observe
@@ -568,7 +598,7 @@ class Simulation:
         self._ready()
         return _point(observe.wall_forces(self.engine)[row])
 
-    @_verb
+    @_look
     def wall_forces(self) -> dict[int, Point]:
         """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
         from hpcdem import observe
@@ -577,7 +607,7 @@ class Simulation:
         force = observe.wall_forces(self.engine)
         return {int(i): _point(f) for i, f in zip(self.engine.walls.id, force, strict=True)}
 
-    @_verb
+    @_look
     def kinetic_energy(self) -> float:
         """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
         from hpcdem import observe
@@ -585,7 +615,7 @@ class Simulation:
         self._ready()
         return observe.kinetic_energy(self.engine)
 
-    @_verb
+    @_look
     def energy(self) -> dict[str, float]:
         """The energy budget since the first cycle after ``set(energy=n)`` [J]: the columns of energy.csv by name."""
         import dataclasses
@@ -594,7 +624,7 @@ class Simulation:
             raise CommandError("there is no account yet: set(energy=n) comes first, then a cycle")
         return dataclasses.asdict(self.engine.energy.look(self.engine))
 
-    @_verb
+    @_look
     def unbalanced(self) -> float:
         """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
         from hpcdem import output
@@ -615,7 +645,7 @@ class Simulation:
         """Contacts with walls: id1, wall (its id), fn fs, fx fy on the particle, x y, overlap."""
         return self._table("wall_contacts")
 
-    @_verb
+    @_look
     def clumps(self) -> dict[str, np.ndarray]:
         """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
         spin, angle, area, mass, inertia, members (how many)."""
@@ -627,39 +657,79 @@ class Simulation:
     @property
     def bonds_left(self) -> int:
         """Bonds that hold."""
-        return self._asked(lambda: int(self.engine.bonds_left()))
+        return self._asked(("bonds_left",), lambda: int(self.engine.bonds_left()))
 
     @property
     def bonds_broken(self) -> tuple[int, int]:
         """Bonds broken so far, in tension and in shear."""
-        return self._asked(self.engine.broken)
+        return self._asked(("bonds_broken",), self.engine.broken)
 
     # ---- ours ------------------------------------------------------------------------------------------------------
 
-    def _asked(self, make: Callable[[], Any]) -> Any:
-        """What `make` returns. Of particles that are stepped with the blocks of a script the journal of this keeps it:
-        a run that goes on from a checkpoint is told the same, and nothing is done before it has come there."""
+    def _asked(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool = False) -> Any:
+        """What `make` returns. In a PCDC script its journal keeps it, with a checksum of what was `told`, so that a run
+        that goes on from a checkpoint finds the way back: particles that come out of the checkpoint do nothing until
+        then, and are told the same as before. again: done in any case."""
         running = self._session.interpreter
-        return running.look(make) if running is not None and self.engine.coupled else make()
+        if running is None:
+            return make()
+        if not running.keeps_calls:
+            return running.look(make) if self.engine.coupled and not again else make()
+        asleep = self._asleep and not again
+        value = running.ask((self.engine.number, *told), make, None if asleep else make)
+        if asleep and told[0] == "set" and "outdir" in told[2]:
+            self._write_into(told[2]["outdir"])  # not part of the checkpoint
+        return value
 
-    def _of_this_rank(self, what: str) -> None:
-        """UsageError if a script asks for what another number of ranks would have otherwise, where the answer must be
-        that of the run before."""
+    @property
+    def _asleep(self) -> bool:
+        """These particles come out of the checkpoint to which the script is on its way back."""
         running = self._session.interpreter
-        if running is None or not self.engine.coupled:
-            return
-        if running.replays:
+        return running is not None and running.replays and running.project.asleep == self.engine.number
+
+    def _of_this_rank(self, what: str, make: Callable[[], Any]) -> Any:
+        """What `make` returns, which another number of ranks would have otherwise. UsageError if that cannot be asked
+        again, where the answer must be that of the run before."""
+        running = self._session.interpreter
+        if running is None:
+            return make()
+        place = f"{_place()[0]}:{_place()[1]}: {what}"
+        try:
+            if not running.keeps_calls:
+                if running.replays and self.engine.coupled:
+                    raise UsageError("no answer")
+                value = make()
+            else:
+                value = running.ask_alone((self.engine.number, what), make, not self._asleep)
+        except UsageError as error:
+            if not str(error).endswith("no answer"):
+                raise
             raise UsageError(
-                f"{_place()[0]}:{_place()[1]}: {what}: the particles of one rank, as they were when the run came here, "
-                "are not in the checkpoint, so --resume cannot pass this line: use gather(...) or count, which are; or "
-                "go on with a script of your own that begins with pcdc model restore"
-            )
-        if self.engine.log is not None and running.keeps:
-            self.engine.log.warn_once(
+                f"{place}: the particles of one rank, as they were when the run came here, are not in the checkpoint, "
+                "so --resume cannot pass this line: use gather(...) or count, which are; or go on with a script of "
+                "your own that begins with pcdc model restore"
+            ) from None
+        self._seen_alone = self._seen_alone or place
+        if self.engine.coupled:
+            self._warn_of_answers()
+        return value
+
+    def _warn_of_answers(self) -> None:
+        """Once: this script asked for what --resume may not be able to answer."""
+        running, log = self._session.interpreter, self.engine.log
+        if self._seen_alone and self.ranks > 1 and log is not None and running.keeps and not running.replays:
+            log.warn_once(
                 "of this rank",
-                f"{_place()[0]}:{_place()[1]}: {what} of particles that touch blocks: --resume will not be able to "
-                "pass this line (gather(...) and count can be passed)",
+                f"{self._seen_alone} of particles that touch blocks: --resume will not be able to pass this line "
+                "(gather(...) and count can be passed)",
             )
+
+    def _write_into(self, folder: str | Path) -> None:
+        self._do.settings.set_option(self.engine, "outdir", self.directory / folder)
+
+    def _refuse_coupled(self, what: str) -> None:
+        if self.engine.coupled:
+            raise CommandError(f"{what} would replace particles that touch blocks: part them first, Coupling.end()")
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
         from hpcdem import observe
@@ -674,7 +744,7 @@ class Simulation:
                 whole["wall"] = w.id[w.in_output_order()][whole["wall"]]
             return whole
 
-        return self._asked(table)
+        return self._asked((name,), table)
 
     def _ready(self) -> None:
         """Lists, ghosts and masses in place, as kernels that look at contacts need them."""
@@ -698,36 +768,45 @@ class Coupling:
     @property
     def dt(self) -> float:
         """Time step of both [s]."""
-        return self._asked(lambda: float(self.engine.particles.clock.dt))
+        return self._asked("dt", lambda: float(self.engine.particles.clock.dt))
 
     def contacts(self) -> dict[str, np.ndarray]:
         """Contacts of particles with faces of elements, on every rank, in the order of ids and faces: id, face (element
         * 4 + edge), fn, fs [N], x, y [m], overlap [m], energy [J]."""
-        return self._asked(self.engine.contacts)
+        return self._asked("contacts", self.engine.contacts)
 
     def force(self) -> tuple[float, float]:
         """Sum of the forces of all particles on the blocks [N]."""
-        return self._asked(self.engine.force_on_blocks)
+        return self._asked("force", self.engine.force_on_blocks)
 
     def energies(self) -> dict[str, float]:
         """Energy that went from one to the other [J], see docs/blocks.md; counts while either has an account."""
-        return self._asked(self.engine.energies)
+        return self._asked("energies", self.engine.energies)
 
     def end(self) -> None:
         """Part them: each may go on alone."""
         from hpcdem.commands.blocks import coupling
 
         if self._project.continues is not None:
-            file, line = _place()
-            raise UsageError(
-                f"{file}:{line}: end: particles that were parted from the blocks before the checkpoint are not in it, "
-                "so --resume cannot pass this line; go on with a script of your own that begins with pcdc model restore"
-            )
-        coupling.release(self._project)
+            raise _parted("end")
+        try:
+            self._asked("end", lambda: coupling.release(self._project))
+        except CommandError as error:
+            raise ScriptError(*_place(), f"end: {error}") from error
 
-    def _asked(self, make: Callable[[], Any]) -> Any:
+    def _asked(self, told: str, make: Callable[[], Any]) -> Any:
         running = session.current().interpreter
-        return running.look(make) if running is not None else make()
+        if running is None:
+            return make()
+        return running.ask(("coupling", told), make) if running.keeps_calls else running.look(make)
+
+
+def _parted(what: str) -> UsageError:
+    file, line = _place()
+    return UsageError(
+        f"{file}:{line}: {what}: particles that were parted from the blocks before the checkpoint are not in it, so "
+        "--resume cannot pass this line; go on with a script of your own that begins with pcdc model restore"
+    )
 
 
 def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupling:
@@ -744,11 +823,27 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
     try:
         if not isinstance(particles, Simulation):
             raise CommandError(f"expected an hpcdem.Simulation, got {particles!r}")
-        projects = session.current().projects
+        running, projects = session.current().interpreter, session.current().projects
         if not projects:
             raise CommandError("there are no blocks: it belongs into a PCDC script")
         session.current().prepare_coupling()
-        return Coupling(projects[-1], coupling.couple(projects[-1], particles.engine, friction, dt))
+
+        def both() -> Coupling:
+            return Coupling(projects[-1], coupling.couple(projects[-1], particles.engine, friction, dt))
+
+        if running is None or not running.keeps_calls:
+            return both()
+        made: list[Coupling] = []
+
+        def again() -> None:
+            if projects[-1].continues is None or projects[-1].asleep != particles.engine.number:
+                raise _parted("couple")
+            made.append(both())
+
+        told = "couple", particles.engine.number, friction, dt
+        running.ask(told, lambda: made.append(both()), again, fails_again=True)
+        particles._warn_of_answers()
+        return made[0]
     except CommandError as error:
         raise ScriptError(*place, f"couple: {error}") from error
     except TypeError as error:

@@ -11,6 +11,8 @@ EXIT_ERROR = 1
 """The run stopped on an error: physics (NaN, runaway particle), files, launch."""
 EXIT_USAGE = 2
 """Command line or script not understood; nothing was run and nothing was written."""
+EXIT_UNBALANCED = 3
+"""A script asked for equilibrium (model solve) and the model does not come to it."""
 EXIT_CHECKPOINT = 85
 """Stopped before the end on request (signal or time limit) after a checkpoint was written; run again with --resume.
 
@@ -47,6 +49,12 @@ class CommandError(HpcdemError):
 
 class PhysicsError(HpcdemError):
     """The state stopped making sense: a number is not finite, or a particle moves too far in one step."""
+
+
+class EquilibriumError(HpcdemError):
+    """Steps do not lead to the equilibrium that was asked for."""
+
+    exit_code = EXIT_UNBALANCED
 
 
 class StoppedWithCheckpoint(HpcdemError):

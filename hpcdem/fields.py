@@ -8,6 +8,7 @@ Integers are stored as int64 bits in the same rows.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,16 @@ FREE = -1
 
 FIX_X, FIX_Y, FIX_SPIN = 1, 2, 4
 FIX_BITS = {"x": FIX_X, "y": FIX_Y, "spin": FIX_SPIN}
+
+BOX_IDS = {"bottom": 100, "right": 101, "top": 102, "left": 103}
+"""Ids of the walls of BOX, in their order in frames: those of frames of ZDEM 2.2."""
+
+
+def sides_of_box(ids: Iterable[int]) -> set[int]:
+    """Which of the walls in a file are those of BOX: BOX_IDS; frames of earlier versions have -1 to -4 for them."""
+    found = {int(i) for i in ids}
+    old = {i for i in found if i < 0}
+    return old or (set(BOX_IDS.values()) if found.issuperset(BOX_IDS.values()) else set())
 
 
 @dataclass(frozen=True)

@@ -37,18 +37,21 @@ def places(particles: Particles, which: np.ndarray, comm: Any) -> str:
 
 
 def stop_on_runaway(
-    particles: Particles, origin: np.ndarray, dt: float, step: int, broken: bool, mixed_laws: bool, comm: Any
-) -> None:
+    particles: Particles, origin: np.ndarray, dt: float, step: int, broken: bool, mixed_laws: bool, comm: Any,
+    alone: np.ndarray,
+) -> None:  # fmt: skip
     """Name the particles that cannot be right, and stop on all ranks: raises PhysicsError. Collective.
 
     origin (n_own, 2): where they were when the lists were built; broken: a number is not finite somewhere; mixed_laws:
-    there are pairs of materials without a common law.
+    there are pairs of materials without a common law; alone (m,): owned particles that can meet nobody, however fast.
     """
     p = particles
     hot = p.hot[p.owned]
     speed = np.hypot(p["vx"], p["vy"])
     with np.errstate(invalid="ignore"):
-        bad = ~np.isfinite(hot[:, :5]).all(axis=1) | ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
+        too_fast = ~(speed * dt <= LARGEST_STRIDE * hot[:, RADIUS])
+    too_fast[alone] = False
+    bad = too_fast | ~np.isfinite(hot[:, :5]).all(axis=1)
     mine = []
     for c in _first(p, bad):
         known = np.isfinite(hot[c, :2]).all()  # else tell where it was when the lists were built

@@ -13,7 +13,7 @@ import numpy as np
 from hpcdem.fields import ANGLE, FIELDS, FIX, GID, MATERIAL, RADIUS
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.physics.dem import contacts, mass, modes, rigid, totals
+from hpcdem.physics.dem import contacts, laws, mass, modes, rigid, totals
 from hpcdem.physics.dem import walls as wall_kernels
 from hpcdem.physics.dem.motion import CLUMPED, INERTIA, MASS
 from hpcdem.physics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
@@ -333,8 +333,63 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     remembered = [column[once] for column in (owner, hist.partner, hist.fs, hist.extra, hist.bond)]
     sums = np.array([of_rows(list(columns.values())), of_rows(remembered)], np.uint64)
     sim.comm.sum_into(sums)  # integers without sign go round, as they should
-    walls = of_rows([w.id, *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric])
+    walls = of_rows([w.ids_of_earlier_versions(), *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric])
     return {"particles": as_text(sums[0]), "contacts": as_text(sums[1]), "walls": as_text(walls)}
+
+
+def _storage_rows(sim: Simulation, gid: np.ndarray) -> np.ndarray:
+    """Rows of the hot table, ghosts among them, of particles with these ids."""
+    known = sim.particles.ihot[:, GID]
+    order = np.argsort(known)
+    return order[np.searchsorted(known, gid, sorter=order)]
+
+
+def _law_columns(law: np.ndarray, poisson: np.ndarray, out: np.ndarray, opened: np.ndarray) -> dict[str, np.ndarray]:
+    """What frames of ZDEM say of the law of each contact: kn, ks of linear pairs, the smaller friction, 1 where it
+    slips, secant normal and tangent shear stiffness [N/m].
+
+    law (m, 4): rows of a law table; poisson (m,): mean of the two; out: as contact_rows; opened (m,): bonds in tension,
+    whose stiffness is that of the bond. Of Hertz pairs ks = 3 (1 - nu) / (2 - nu) K sqrt(U) (Mindlin).
+    """
+    hertz = law[:, 0] == laws.HERTZ
+    fn, u = out[:, FN], out[:, OVERLAP]
+    secant = np.divide(fn, u, out=np.zeros(len(out)), where=u != 0.0)
+    shear = np.where(hertz, 3.0 * (1.0 - poisson) / (2.0 - poisson) * secant, law[:, 2])
+    slip = (np.abs(out[:, FS]) >= law[:, 3] * np.maximum(fn, 0.0)) & ~opened
+    return {
+        "law_kn": np.where(hertz, 0.0, law[:, 1]), "law_ks": np.where(hertz, 0.0, law[:, 2]), "law_fric": law[:, 3],
+        "law_slip": slip.astype(np.int8), "law_realkn": secant, "law_realks": shear,
+    }  # fmt: skip
+
+
+def _pair_laws(
+    sim: Simulation, out: np.ndarray, iout: np.ndarray, types: np.ndarray
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """The same of pairs, and the forces at which their bonds break in tension and in shear [N]; types: of bonds."""
+    p, rows, n = sim.particles, sim.materials.rows, len(sim.materials)
+    a, b = (_storage_rows(sim, iout[:, k]) for k in (0, 1))
+    first, second = p.ihot[a, MATERIAL], p.ihot[b, MATERIAL]
+    bonded, opened = iout[:, 2] > 0, (iout[:, 2] > 0) & (out[:, OVERLAP] < 0.0)
+    law = sim.pair_laws[first * n + second]
+    poisson = 0.5 * (rows["poiss"][first] + rows["poiss"][second])
+    columns = _law_columns(law, poisson, out, bonded)
+    elastic = types["kind"] == laws.ELASTIC_BOND
+    ratio = np.divide(types["gbmod"], types["ebmod"], out=np.zeros(len(types)), where=types["ebmod"] > 0.0)
+    tangent = np.where(law[:, 0] == laws.HERTZ, 2.0 * (1.0 - poisson) / (2.0 - poisson), 0.0)
+    in_tension = np.where(elastic, ratio, tangent) * columns["law_realkn"]
+    use = opened & (elastic | (law[:, 0] == laws.HERTZ))
+    columns["law_realks"] = np.where(use, in_tension, columns["law_realks"])
+    ra, rb = p.hot[a, RADIUS], p.hot[b, RADIUS]
+    mean = 2.0 * ra * rb / (ra + rb)
+    area = np.where(elastic, math.pi * mean * mean if mass.SPHERES[sim.settings.disk] else 2.0 * mean, 1.0)
+    return columns, {"law_tension": types["tstrength"] * area, "law_shear": types["sstrength"] * area}
+
+
+def _wall_laws(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> dict[str, np.ndarray]:
+    """The same of wall contacts."""
+    material = sim.particles.ihot[_storage_rows(sim, iout[:, 0]), MATERIAL]
+    law = sim.wall_laws[iout[:, 1] * len(sim.materials) + material]
+    return _law_columns(law, sim.materials.rows["poiss"][material], out, np.zeros(len(out), bool))
 
 
 def frame(sim: Simulation) -> Frame:
@@ -349,6 +404,8 @@ def frame(sim: Simulation) -> Frame:
     rows = sim.materials.rows
     for name in ("density", "fric", "shear", "poiss", "kn", "ks", "damp"):
         columns[name] = rows[name][p["material"]]
+    if rows["xp"].any() or rows["yp"].any():
+        columns["push_x"], columns["push_y"] = sim.pressed().T
     columns["hertz"] = rows["hertz"][p["material"]].astype(np.int8)
     columns["fix"] = p["fix"].astype(np.uint8)
     if sim.clumps:
@@ -363,7 +420,10 @@ def frame(sim: Simulation) -> Frame:
     }  # fmt: skip
     touching, bonded = np.flatnonzero(out[:, OVERLAP] >= 0.0), np.flatnonzero(iout[:, 2] > 0)
     types = sim.bond_types.rows[iout[:, 2]]
-    bond_columns = pair_columns | {"kind": types["kind"].astype(np.int8)}
+    bond_columns = pair_columns | {"kind": types["kind"].astype(np.int8), "rubber": types["rubber"].astype(np.int8)}
+    pair_laws, bond_laws = _pair_laws(sim, out, iout, types)
+    pair_columns |= pair_laws
+    bond_columns |= pair_laws | bond_laws
     for name in ("ebmod", "gbmod", "tstrength", "sstrength"):
         bond_columns[name] = types[name]
 
@@ -374,6 +434,7 @@ def frame(sim: Simulation) -> Frame:
     wall_contacts = {
         "id1": wiout[:, 0], "wall": place[wiout[:, 1]], "fn": wout[:, FN], "fs": wout[:, FS], "fx": wout[:, FORCE_X],
         "fy": wout[:, FORCE_Y], "x": wout[:, AT_X], "y": wout[:, AT_Y], "overlap": wout[:, OVERLAP],
+        **_wall_laws(sim, wout, wiout),
     }  # fmt: skip
     tables: dict[str, Table] = {
         "particles": to_slabs(comm, ("gid",), columns),

@@ -16,13 +16,14 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from hpcdem import budget, guards, observe, saving
 from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.io.agreed import on_first
+from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.behind import under_way as _under_way
 from hpcdem.io.columns import append_rows
 from hpcdem.io.dat import write_dat
@@ -33,6 +34,7 @@ from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.platens import OF_PARTS
 from hpcdem.runtime import launch, run_folder
 from hpcdem.runtime.progress import StepStatus
 from hpcdem.simulation import Simulation
@@ -122,7 +124,8 @@ def folder(sim: Simulation) -> Path:
     """The output folder, made and locked on the first call."""
     path = Path(sim.outdir)
     if not sim.folder_made:
-        locked = run_folder.enter(path, sim.comm, sim.job or run_folder.Job(), launch.version(), sim.resumed)
+        job = sim.job or run_folder.Job()
+        locked = run_folder.enter(path, sim.comm, job, launch.version(), sim.resumed, sim.restored)
         sim.folder_made = True
         if not locked and sim.log is not None:
             sim.log.warn_once(
@@ -137,7 +140,7 @@ def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool
     with sim.timers("output"):
         settle(sim)
         path = folder(sim) / run_folder.checkpoint_name(sim.clock.step, automatic)
-        on_first(sim.comm, lambda: _to_disk([path.with_name(name) for name in sorted(sim.series_open)]))
+        secure_series(sim)
     saving.save(sim, path)
     run_folder.retire(path.parent, sim.comm, sim.clock.step, sim.keep)
     return path
@@ -171,15 +174,26 @@ HISTORIES = {
 """What HIST can follow: unit and function of the simulation."""
 
 
+def unit_of(what: str) -> str:
+    """The unit of what a HIST follows."""
+    name = what.split()[0]
+    return OF_PARTS[name].unit if name in OF_PARTS else HISTORIES[what][0]
+
+
 def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
-    """Append (step, time, value) to `hist_<id>.dat`."""
+    """Append (step, time, value) to `hist_<id>.csv`, and (step, value) to `hist_id_<id>.dat`.
+
+    The layout of the latter is that of which public readers of ZDEM's histories take the numbers: a line with the word
+    hist, two lines of headings, rows, and a last line that is passed over (written by `finish`).
+    """
     what = sim.history_wishes[ident][1]
-    unit, measure = HISTORIES[what]
+    step, time = sim.clock.step, sim.clock.time
     with sim.timers("output"):
-        value = measure(sim)
-        header = f"# step time[s] {what}[{unit}]"
-        row = f"{sim.clock.step} {sim.clock.time!r} {value!r}"
-        _append(sim, f"hist_{ident}.dat", header, [row])
+        name, unit = what.split()[0], unit_of(what)
+        value = OF_PARTS[name].value(sim, what, ident) if name in OF_PARTS else HISTORIES[what][1](sim)
+        _append(sim, f"hist_{ident}.csv", f"step,time [s],{what} [{unit}]", [f"{step},{time!r},{value!r}"])
+        header = f"hpcdem\nhist id {ident}\n{what} [{unit}]\nstep value"
+        _append(sim, f"hist_id_{ident}.dat", header, [f"{step} {value!r}"])
 
 
 def report(sim: Simulation, _: Snapshot | None = None) -> None:
@@ -195,9 +209,10 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
             rows.append(",".join([str(clock.step), time, str(w.id[k]), *rest]))
         if rows:
             _append(sim, "walls.csv", WALL_COLUMNS, rows)
+        own = w.side == 0
         wanted = sim.log is not None and sim.log.wants(clock.step)
         if sim.comm.bcast(wanted):
-            walls = [(int(i), float(fx), float(fy)) for i, (fx, fy) in zip(w.id, force, strict=True) if i >= 0]
+            walls = [(int(i), float(fx), float(fy)) for i, (fx, fy) in zip(w.id[own], force[own], strict=True)]
             sim.log.step(status(sim, walls))
 
 
@@ -293,35 +308,68 @@ def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
     """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
     restarted one cuts what lies after its step."""
     path = folder(sim) / name
-    since = None if name in sim.series_open else sim.restart_step
+    since = None
+    if name not in sim.series_open:  # a row of this step, if there is one, was written after the checkpoint
+        since = min(sim.restart_step, sim.clock.step - 0.5) if sim.restart_step else 0
     append_rows(path, header, rows, since, sim.comm)
     sim.series_open.add(name)
 
 
-def _to_disk(series: list[Path]) -> None:
-    """A restart takes rows up to its step for granted, so they must be as safe as the checkpoint."""
-    for path in series:
-        with suppress(FileNotFoundError):
-            to_disk(str(path))
+def secure_series(sim: Simulation) -> None:
+    """A restart takes rows up to its step for granted, so they must be as safe as the checkpoint. Collective."""
+
+    def flush() -> None:
+        for name in sorted(sim.series_open):
+            with suppress(FileNotFoundError):
+                to_disk(str(Path(sim.outdir) / name))
+
+    on_first(sim.comm, flush)
+
+
+def close_histories(sim: Simulation) -> None:
+    """The last line of each `hist_id_<id>.dat`, which its readers pass over; once. Collective."""
+    for ident in sim.history_wishes:
+        name = f"hist_id_{ident}.dat"
+        if name in sim.series_open and name not in sim.series_closed:
+            append_rows(folder(sim) / name, "", ["end"], None, sim.comm)
+            sim.series_closed.add(name)
 
 
 def finish(sim: Simulation) -> None:
-    """At STOP: the curves asked for by PLOT, `hist_<y>_vs_<x>.txt`."""
+    """At STOP: the last line of histories, and the curves asked for by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
+    close_histories(sim)
     for y, x in sim.plots:
         missing = [i for i in (y, x) if i not in sim.history_wishes]
         if missing:
             raise CommandError(f"PLOT {y} {x}: there is no HIST {missing[0]}")
-        text = ""
+        text, names = "", [""]
+        pairs: list[tuple[str, str]] = []
         if sim.comm.rank == 0:
             columns = []
             for ident in (x, y):
-                path = Path(sim.outdir) / f"hist_{ident}.dat"
+                path = Path(sim.outdir) / f"hist_{ident}.csv"
                 lines = path.read_text().splitlines()[1:] if path.exists() else []
-                columns.append({line.split()[0]: line.split()[2] for line in lines})
+                columns.append({line.split(",")[0]: line.split(",")[2] for line in lines})
             names = [sim.history_wishes[i][1] for i in (x, y)]
-            rows = [f"{columns[0][s]} {columns[1][s]}" for s in columns[0] if s in columns[1]]
-            text = "\n".join([f"# {names[0]} {names[1]}", *rows]) + "\n"
-        write_sections(folder(sim) / f"hist_{y}_vs_{x}.txt", sim.comm, partial(_sections, text))
+            pairs = [(columns[0][s], columns[1][s]) for s in columns[0] if s in columns[1]]
+            text = "\n".join([f"# {names[0]} {names[1]}", *(f"{a} {b}" for a, b in pairs)]) + "\n"
+        path = folder(sim) / f"hist_{y}_vs_{x}.txt"
+        write_sections(path, sim.comm, partial(_sections, text))
+        points = [(float(a), float(b)) for a, b in pairs]
+        on_first(sim.comm, partial(_draw_curve, sim, path.with_suffix(".png"), names, points))
+
+
+def _draw_curve(sim: Simulation, path: Path, names: list[str], points: list[tuple[float, float]]) -> None:
+    """The picture of PLOT, on one rank; a run without matplotlib says that it has none."""
+    if find_spec("matplotlib") is None:
+        if sim.log is not None:
+            sim.log.warn(f"{path.name} is not drawn: matplotlib is not installed")
+        return
+    from hpcdem.post import charts
+
+    x, y = (name if unit_of(name) == "1" else f"{name} ({unit_of(name)})" for name in names)
+    with atomic_path(path) as temporary:
+        charts.draw(Path(temporary), "png", "", x, y, [("", "line" if len(points) > 1 else "points", points)])
 
 
 def _sections(text: str) -> list[bytes]:

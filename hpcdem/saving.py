@@ -35,11 +35,11 @@ from hpcdem.fields import (
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
-from hpcdem.model.materials import PropertyTable
 from hpcdem.model.particles import free_rows
 from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
 from hpcdem.physics.dem.contacts import LONGEST2
+from hpcdem.physics.dem.fast import Fast
 from hpcdem.physics.dem.neighbours import Histories
 from hpcdem.runtime.checkpoints import newest_first
 from hpcdem.simulation import Lattice, Simulation
@@ -66,6 +66,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "clock": dataclasses.asdict(sim.clock),
         "settings": dataclasses.asdict(sim.settings),
         "lattice": dataclasses.asdict(sim.lattice),
+        "fast": sim.fast.state(),
         "closed": closed,
         "longest2": float(sim.comm.max_into(longest2)[0]),
         "walls": walls,
@@ -73,14 +74,17 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "bond_types": sim.bond_types.as_floats().tolist(),
         "groups": sim.groups,
         "next_gid": sim.next_gid,
+        "makers": sim.makers,
         "streams": sim.streams,
         "breaks": sim.comm.sum_into(breaks).tolist(),
         "bonds": sim.bonds_left(),
         "clumps": {"number": sim.clumps.number, "reach": sim.clumps.reach},
         "lost": sim.lost,
+        "rows": sim.rows,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
         "rebuilds": sim.rebuilds,
         "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
+        "history_origins": {str(k): list(v) for k, v in sim.history_origins.items()},
         "progress": sim.progress,
         "position": sim.position,
         "script": sim.script,
@@ -216,22 +220,22 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[s
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
     sim.lattice = Lattice(**state["lattice"])
-    for name in Walls.COLUMNS:
-        like = getattr(sim.walls, name)
-        values = np.array(state["walls"][name], dtype=like.dtype)
-        setattr(sim.walls, name, values.reshape(len(state["walls"]["id"]), *like.shape[1:]))
+    sim.fast = Fast.restored(state.get("fast", []))
+    sim.walls.take_columns(state["walls"])
     for name in ("materials", "bond_types"):
-        dtype = getattr(sim, name).rows.dtype
-        rows = np.array(state[name], dtype=np.float64)
-        setattr(sim, name, PropertyTable(dtype, rows.view(dtype).reshape(-1)))
+        getattr(sim, name).take_floats(np.array(state[name], dtype=np.float64))
     for name in ("groups", "next_gid", "streams"):
         setattr(sim, name, state[name])
     sim.history_wishes = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
+    sim.makers = [(int(first), int(line)) for first, line in state.get("makers", [])]
+    origins = state.get("history_origins", {})
+    sim.history_origins = {int(k): (int(v[0]), float(v[1])) for k, v in origins.items()}
     sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
     if state.get("drawing") is not None:
         sim.drawing = int(state["drawing"][0]), tuple(state["drawing"][1])
     sim.bonds = state["bonds"]
     sim.lost = state.get("lost", 0)
+    sim.rows = [(int(first), int(end)) for first, end in state.get("rows", [])]
     if state.get("energy") is not None:
         sim.energy = Budget.restored(state["energy"], sim.comm.rank == 0)
     sim._longest2 = state["longest2"]

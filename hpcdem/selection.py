@@ -221,19 +221,32 @@ class Chain(Selection):
         return Chain(tuple(term.resolve(extents) for term in self.terms), self.joins)
 
 
+def _sides(first: Selection, second: Selection) -> bool:
+    """Whether these are the two sides of a rectangle."""
+    both = isinstance(first, Interval) and isinstance(second, Interval)
+    return both and first.axis != second.axis  # type: ignore[attr-defined]
+
+
 def chain(terms: Sequence[Selection], joins: Sequence[str]) -> Selection:
-    """One selection from RANGE terms as written: ``len(joins) == len(terms) - 1``, each "and" or "or".
+    """One selection from RANGE terms as written: ``len(joins) == len(terms) - 1``, each "and", "or", or "" where two
+    terms follow each other without a word.
+
+    ``x (a b) y (c d)`` is one shape, the rectangle of the manual, before "and" and "or" are evaluated from left to
+    right; other terms without a word between them are joined by "and".
 
     A particle has one group, so ``group a and group b`` could only be empty; scripts mean "both groups" with it
     (ductile base of the ZDEM manual, section 5.8). Group terms next to each other joined by "and" are therefore taken
     as one term that selects all these groups.
     """
-    merged_terms, merged_joins = [terms[0]], []
+    merged_terms: list[Selection] = [terms[0]]
+    merged_joins: list[str] = []
     for join, term in zip(joins, terms[1:]):
         previous = merged_terms[-1]
-        if join == "and" and isinstance(term, Group) and isinstance(previous, Group):
+        if join != "or" and isinstance(term, Group) and isinstance(previous, Group):
             merged_terms[-1] = Group(*previous.names, *term.names)
+        elif not join and _sides(previous, term) and "or" in merged_joins:
+            merged_terms[-1] = previous & term
         else:
             merged_terms.append(term)
-            merged_joins.append(join)
+            merged_joins.append(join or "and")
     return merged_terms[0] if len(merged_terms) == 1 else Chain(tuple(merged_terms), tuple(merged_joins))

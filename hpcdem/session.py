@@ -54,6 +54,7 @@ class Session:
     kernels_ready: bool = False
     blocks_ready: bool = False
     coupling_ready: bool = False
+    made: int = 0
     unfinished: list[Simulation] = field(default_factory=list)
     projects: list[Project] = field(default_factory=list)
     interpreter: Any = None
@@ -70,6 +71,7 @@ class Session:
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
         sim.script, sim.draws, sim.job, sim.keep = self.text, self.draws, self.job, self.keep
+        sim.number, self.made = self.made, self.made + 1
         run_folder.claim(Path(outdir), self.comm, self.job)
         if self.reproduction is not None:
             watch_states(sim, self.reproduction)
@@ -111,6 +113,10 @@ class Session:
             return
         if sim in self.unfinished:
             self.unfinished.remove(sim)
+        if sim.plots and self.job.language != "zdem":  # a script of that says STOP
+            from hpcdem import output
+
+            output.finish(sim)
         if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
             from hpcdem import output
 
@@ -211,9 +217,11 @@ def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
 
 
 def report_end(sim: Simulation) -> None:
-    """Collective: what became of the energy, and of particles that got lost."""
+    """Collective: what became of the energy, and of particles that got lost; the last line of histories, as a program
+    need not say STOP."""
     from hpcdem import output
 
+    output.close_histories(sim)
     output.tell_energy(sim)
     if sim.log is not None and sim.lost:
         sim.log.info(f"{sim.lost} particles left the BOX and were deleted in all; the lines above name them")

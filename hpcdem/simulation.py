@@ -8,6 +8,7 @@ see `Lattice`.
 
 from __future__ import annotations
 
+import bisect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from hpcdem.clock import Clock
 from hpcdem.clumps import Clumps
 from hpcdem.decomp import strips
 from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.fields import CLUMP, FX, TORQUE, WIDTH
+from hpcdem.fields import CLUMP, FX, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
@@ -32,9 +33,10 @@ from hpcdem.model.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.model.particles import Particles
 from hpcdem.model.settings import Settings
 from hpcdem.model.walls import Walls
-from hpcdem.physics.dem import contacts, mass, motion, neighbours, pair_forces
+from hpcdem.physics.dem import contacts, fast, mass, motion, neighbours, pair_forces, slips
 from hpcdem.physics.dem import walls as wall_kernels
-from hpcdem.physics.dem.neighbours import Histories
+from hpcdem.physics.dem.fast import Fast
+from hpcdem.physics.dem.neighbours import NO_ROWS, Histories
 from hpcdem.timers import Timers
 
 NARROW, WIDE = 0.3, 0.6
@@ -51,7 +53,7 @@ class Lattice:
     """What the order of particles and the moment of the next rebuild depend on; global, saved in checkpoints.
 
     side h of the cells [m], skin [m], longest bond [m] as last seen, steps since the lists were built, steps to the
-    next look at the motion, steps between the last two looks, lists that came late.
+    next look at the motion, steps between the last two looks, lists that came late, columns partners may lie apart.
     """
 
     side: float = 0.0
@@ -62,6 +64,7 @@ class Lattice:
     countdown: int = 1
     pace: int = 1
     late: int = 0
+    columns: int = 1
 
 
 @dataclass
@@ -80,8 +83,9 @@ class Simulation:
 
     comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
     stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
-    draws: DRAW makes pictures; lost: particles that left the BOX so far; energy: the account of SET energy
-    (budget.Budget), or None.
+    draws: DRAW makes pictures; lost: particles that left the BOX so far; rows: first id of each row of GLINE and the
+    one after its last; fast: particles with a reach of their own in the lists (physics/dem/fast.py); energy: the
+    account of SET energy (budget.Budget), or None.
     """
 
     def __init__(
@@ -99,9 +103,11 @@ class Simulation:
         self.folder_made = False
         self.job: Any = None  # runtime.run_folder.Job: what was started
         self.resumed = False  # goes on from a checkpoint that lies where it writes
+        self.restored: tuple[Path, int] | None = None  # the checkpoint that the script named, and its step
         self.keep = 0  # numbered checkpoints that are kept, 0: all
         self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
+        self.number = 0  # of the simulations of a program, in the order in which they were made
         self.coupled = False  # to blocks, which step them both (hpcdem/coupled)
         self.goes_on_with = "--resume"
         self.draws = False
@@ -125,19 +131,28 @@ class Simulation:
         self.clumps = Clumps()
         self.groups: list[str] = ["***"]
         self.next_gid = 0
+        self.makers: list[tuple[int, int]] = []  # particles from this id on were made in this line of the script
         self.streams = 0
         self.breaks = np.zeros(2, np.int64)
         self.bonds = 0
         self.lost = 0
+        self.rows: list[tuple[int, int]] = []
+        self._named: set[int] = set()
         self.energy: Any = None
         self.history_wishes: dict[int, tuple[int, str]] = {}
+        self.history_origins: dict[int, tuple[int, float]] = {}  # axis and distance of strains
         self.plots: list[tuple[int, int]] = []
         self.drawing: tuple[int, tuple[str, ...]] | None = None
         self.progress: dict | None = None
         self.last_frame: tuple[int, bool] | None = None
+        self.edited = True  # by a command, since the last `_ini` frame of a coupled run
         self.series_open: set[str] = set()
+        self.series_closed: set[str] = set()
         self.restart_step = 0
         self.lattice = Lattice()
+        self.fast = Fast.none()
+        self._fast_rows, self._fast_at = self.fast.among(NO_ROWS)
+        self._drift: np.ndarray | None = None
         self._hist: Histories | None = Histories.empty(0)
         self._lists: neighbours.ContactLists | None = None
         self.ownership = Ownership(self.comm, self.balance_on)
@@ -145,6 +160,7 @@ class Simulation:
         self.rebuilds = 0
         self._longest2 = 0.0
         self._tables_stale = True
+        self._pushed, self._push = np.empty(0, np.int64), np.empty((0, 2))
 
     def release(self) -> None:
         """Give back what MPI holds for this simulation."""
@@ -207,6 +223,8 @@ class Simulation:
         if len(lists.slot_row):
             self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
             self._wall_forces(lists.n_blocks, *self._wall_args)
+        if len(self._pushed):
+            lists.force[self._pushed, :2] += self._push
         if self.clumps:
             self.clumps.sum_forces(self.particles, self.halo, lists)
 
@@ -216,32 +234,46 @@ class Simulation:
         Returns (lists must be rebuilt now, request from outside). One reduction; only global maxima enter.
         """
         lattice, dt = self.lattice, self.clock.dt
-        found = np.zeros(5)
+        found = np.zeros(9)
         p = self.particles
-        motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, found)
+        # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
+        fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
+        motion.survey(p.hot, p.n_left, p.n_own, self.origin, dt, self._fast_rows, found[:4])
         found[4] = self.stop.local_request() if self.stop is not None else 0
+        self._look_at_fast(fall, found[5:])
         self.comm.max_into(found)
-        if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
-            broken = bool(found[motion.BROKEN])
-            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, self._mixed_laws(), self.comm)
-        wall_speed = float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
+        broken = bool(found[motion.BROKEN] or found[5 + fast.FAST_BROKEN])
+        if broken or max(found[motion.STRIDE], found[5 + fast.FAST_STRIDE]) > guards.LARGEST_STRIDE:
+            alone = self._fast_rows[self.fast.alone[self._fast_at]]
+            guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, self._mixed_laws(), self.comm, alone)
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
-        stride = max(math.sqrt(found[motion.SPEED2]), wall_speed) * dt
+        stride = max(math.sqrt(found[motion.SPEED2]), self._wall_speed()) * dt
         room = 0.5 * lattice.skin - path
         if room < 0.0 and self.largest_radius > 0.0:  # without particles nothing can be late
             lattice.late += 1
-        stale = room < stride
+        lattice.late += int(found[5 + fast.DUE] == fast.LATE)
+        stale = room < stride or found[5 + fast.DUE] > 0.0
         if stale:
             room = 0.5 * lattice.skin
-        # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
-        fall = 2.0 * math.hypot(self.settings.gx, self.settings.gy) * dt * dt
-        wait = min(LONGEST_WATCH, 2 * lattice.pace)
-        if stride > 0.0:
-            wait = int(min(wait, 0.5 * room / stride))  # the quotient may be infinite
-        if fall > 0.0:
-            wait = int(min(wait, math.sqrt(0.5 * room / fall)))
-        lattice.pace = lattice.countdown = max(1, wait)
+        wait = min(LONGEST_WATCH, 2 * lattice.pace, fast.wait(room, stride, fall))
+        if not stale and found[5 + fast.HURRY] > 0.0:
+            wait = min(wait, 1.0 / found[5 + fast.HURRY])
+        lattice.pace = lattice.countdown = max(1, int(wait))
         return stale, int(found[4])
+
+    def _look_at_fast(self, fall: float, found: np.ndarray) -> None:
+        """What fast.survey says of the owned ones into found (4,)."""
+        if not len(self._fast_rows):
+            return
+        p, at = self.particles, self._fast_at
+        fast.survey(
+            p.hot, p.n_left, self.origin, self._fast_rows, self.fast.reach[at], self.fast.alone[at], self.clock.dt,
+            fall, (None if self.clumps else self.walls.box()) or EVERYWHERE, found,
+        )  # fmt: skip
+
+    def _wall_speed(self) -> float:
+        """Speed of the fastest wall [m/s]."""
+        return float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
 
     def look_soon(self) -> None:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
@@ -275,6 +307,9 @@ class Simulation:
     def rebuild(self) -> None:
         """New ownership, order, ghosts and lists at the present positions. Forces are not kept."""
         with self.timers("neighbour"):
+            p, age = self.particles, self.lattice.age
+            if 0 < age < fast.FLEETING or (age and len(self.fast)):
+                self._drift = fast.drift(p.hot, p.n_left, p.n_own, self.origin, age)
             self._open_lists()
         self._close()
 
@@ -287,6 +322,7 @@ class Simulation:
 
     def _open_lists(self) -> None:
         p = self.particles
+        self._name_slipped()
         self._harvest()
         self._longest2 = self.lists.longest_bond2()
         self._hist = self.lists.histories(p.ihot)
@@ -294,6 +330,33 @@ class Simulation:
         p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p))
         self.clumps.open()
         self._lists = None
+
+    def _name_slipped(self) -> None:
+        """A line in the log for particles that have slipped through a row of GLINE or a wall, each once. Collective."""
+        p, walls = self.particles, self.walls
+        mine = walls.side == 0
+        if not self.rows and not mine.any():
+            return
+        origin = np.empty((len(p.hot), 2))
+        origin[p.owned] = self.origin
+        if self.rows:
+            self.halo.fill(origin)
+        ways = np.where(mine[:, None], walls.travel, np.nan)
+        kinds = slips.found(self.lists, p.hot, origin, self.rows, np.hstack([walls.p1, walls.p2]), ways)
+        if not self.comm.any(bool(kinds.any())):
+            return
+        for kind, what in ((slips.ROW, "a row of GLINE"), (slips.WALL, "a wall")):
+            which = kinds == kind
+            which[which] = ~np.isin(p["gid"][which], list(self._named))
+            gids = np.concatenate(self.comm.allgather(p["gid"][which].copy())).tolist()
+            if gids:
+                self._named.update(gids)
+                names = guards.places(p, which, self.comm)
+                more = f"; and {len(gids) - guards.NAMED} more" if len(gids) > guards.NAMED else ""
+                if self.log is not None:
+                    self.log.warn(
+                        f"step {self.clock.step}: {len(gids)} particles slipped through {what}: {names}{more}"
+                    )
 
     def _harvest(self) -> None:
         """Take over what the force loops counted."""
@@ -326,7 +389,7 @@ class Simulation:
             order = strips.global_order(cell, p["gid"])
             cell = cell[order]
         with self.timers("halo"):
-            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads)
+            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads, lattice.columns)
             rigid = self.clumps.storage(p, order, self.halo, self.threads)
             clump = None if rigid is None else rigid.view(np.int64)[:, CLUMP].copy()
         with self.timers("neighbour"):
@@ -340,8 +403,9 @@ class Simulation:
             bond_reach = min(lattice.side, lattice.bond_reach + lattice.skin) if self.bonds else 0.0
             self._lists = neighbours.build(
                 storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, lattice.side, self.largest_radius,
-                lattice.skin, bond_reach, self.threads, clump,
+                lattice.skin, bond_reach, self.threads, clump, self.fast, lattice.columns,
             )  # fmt: skip
+            self._fast_rows, self._fast_at = self.fast.among(p["gid"])
             self.clumps.close(p, halo, self._lists, self.clock.step, lattice.side)
             self._count_bonds(hist)
             self._hist = None
@@ -379,7 +443,11 @@ class Simulation:
         if frozen:
             return outside
         lattice.bond_reach = math.sqrt(seen[1])
-        if 0 < lattice.age < SHORT_LIVED:
+        limit = 0.5 * NARROW * self.largest_radius / fast.LIFE
+        first_class = self._first_fast_class(limit)
+        if first_class is not None:
+            lattice.skin_factor = NARROW if fast.LIFE / 2**first_class >= SHORT_LIVED else WIDE
+        elif 0 < lattice.age < SHORT_LIVED:
             lattice.skin_factor = WIDE
         elif lattice.age > LONG_LIVED:
             lattice.skin_factor = NARROW
@@ -388,7 +456,62 @@ class Simulation:
         while 0.0 < side < max(lattice.bond_reach + lattice.skin, 1.000001 * self.clumps.reach):
             side *= 1.05  # in steps, so that the lattice seldom changes
         lattice.side = side if side > 0.0 else 1.0
+        self._choose_fast(first_class, limit)
         return outside
+
+    def _first_fast_class(self, limit: float) -> int | None:
+        """The class of speed (fast.classes) from which on particles get a reach of their own; None: nobody does.
+        limit [m]: way per step from which on one is faster than lists of usual skin can bear."""
+        if self._drift is None:
+            return None
+        p, dt = self.particles, self.clock.dt
+        before, _ = self.fast.among(p["gid"])  # who was fast remains so till it is slow in both respects
+        self._drift[before] = np.maximum(self._drift[before], fast.strides(p.hot[before], dt))
+        _, classes = fast.classes(self._drift, limit)
+        counts = np.append(np.bincount(classes, minlength=fast.CLASSES), len(p))
+        self.comm.sum_into(counts)
+        return fast.slowest_class(counts[:-1], int(counts[-1]), self._wall_speed() * dt, limit)
+
+    def _choose_fast(self, first_class: int | None, limit: float) -> None:
+        """Reach of the fast particles, and how many columns it spans; arguments as in `_first_fast_class`."""
+        lattice, p, dt = self.lattice, self.particles, self.clock.dt
+        before, drift = len(self.fast), self._drift
+        self.fast, lattice.columns, self._drift = Fast.none(), 1, None
+        if drift is None or first_class is None:
+            if before:
+                self.look_soon()
+            return
+        which, classes = fast.classes(drift, limit)
+        which = which[classes >= first_class]
+        hot = p.hot[which]
+        way = np.maximum(drift[which], fast.strides(hot, dt))
+        rows = np.column_stack([hot[:, X], hot[:, Y], hot[:, RADIUS], way])
+        parts = self.comm.allgather((p["gid"][which], p.clump[which], rows))
+        gid, clump, rows = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        order = np.argsort(gid)
+        gid, clump, rows = gid[order], clump[order], rows[order]
+        half, gravity = 0.5 * lattice.skin, math.hypot(self.settings.gx, self.settings.gy)
+        most = fast.NEARLY * (0.5 * fast.MOST_COLUMNS * lattice.side - self.largest_radius)
+        wanted = fast.wanted_reach(rows[:, 3], gravity, dt)
+        asked = np.argsort(-rows[:, 3], kind="stable")[: fast.ASKED]
+        # Nothing is known here of the faces of blocks: beside them nobody is alone.
+        asked = asked[(wanted[asked] > most) & (not self.coupled)]
+        slow, gaps = np.ones(len(p), bool), np.empty(len(asked))
+        slow[which] = False
+        fast.nearest(p.hot, slow, rows[asked, :2], gaps)
+        self.comm.min_into(gaps)
+        walls = np.hstack([self.walls.p1, self.walls.p2])
+        free = fast.free_way(asked, gaps, rows[:, :3], clump, walls, half)
+        reach = np.clip(wanted, half, max(half, most))
+        alone = free >= reach
+        widest = float(reach[~alone].max(initial=half))
+        lattice.columns = max(1, math.ceil(2.0 * (self.largest_radius + widest) / lattice.side))
+        self.fast = Fast(gid, np.where(alone, free, reach), alone)
+        room = np.append(self.fast.reach, half)
+        pace = np.append(rows[:, 3], limit * 2.0**first_class)
+        fall = 2.0 * gravity * dt * dt
+        wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(room, pace, strict=True))
+        lattice.pace = lattice.countdown = max(1, min(lattice.countdown, int(min(wait, LONGEST_WATCH))))
 
     def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
         """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;
@@ -407,12 +530,12 @@ class Simulation:
         far in a step. Collective."""
         p, found = self.particles, np.zeros(4)
         places, hot = p.positions()[which], p.hot[p.owned][which]
-        motion.survey(hot, 0, len(hot), places, self.clock.dt, found)
+        motion.survey(hot, 0, len(hot), places, self.clock.dt, NO_ROWS, found)
         self.comm.max_into(found)
         if found[motion.BROKEN] or found[motion.STRIDE] > guards.LARGEST_STRIDE:
             broken = bool(found[motion.BROKEN])
             guards.stop_on_runaway(
-                p, p.positions(), self.clock.dt, self.clock.step, broken, self._mixed_laws(), self.comm
+                p, p.positions(), self.clock.dt, self.clock.step, broken, self._mixed_laws(), self.comm, NO_ROWS
             )
 
     def _mixed_laws(self) -> bool:
@@ -448,7 +571,9 @@ class Simulation:
         with self.timers("balance"):
             box = self.walls.box()
             room = None if box is None else (box[0], box[1])
-            self.ownership.renew(columns(cell), side, self.clock.step, self.timers.seconds(), room)
+            self.ownership.renew(
+                columns(cell), side, self.clock.step, self.timers.seconds(), room, least=self.lattice.columns
+            )
         with self.timers("migrate"):
             leave = strips.strays(cell, self.ownership.borders, self.comm.rank)
             migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
@@ -509,6 +634,7 @@ class Simulation:
         self.pair_laws = contacts.pair_table(rows)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
         self.bond_laws = self.bond_types.as_floats()
+        self._pushed, self._push = self._pressures()
         self._wall_table = self.walls.table()
         self._walls_move = bool(self.walls.v.any())
         threaded = lists.n_blocks > 1
@@ -527,6 +653,22 @@ class Simulation:
             lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,
         )  # fmt: skip
         self._tables_stale = False
+
+    def pressed(self) -> np.ndarray:
+        """Forces (n_own, 2) [N] of PROP xp, yp on the owned particles: pressure 2 R thickness."""
+        p, rows = self.particles, self.materials.rows
+        force = np.stack([rows["xp"], rows["yp"]], axis=1)[p["material"]]
+        return force * (2.0 * p["radius"] * self.settings.thickness)[:, None]
+
+    def _pressures(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the force table that PROP xp, yp push on, and their forces (n, 2) [N]. They are few, the particles of
+        a side of the model, and usually none."""
+        rows = self.materials.rows
+        if not (rows["xp"].any() or rows["yp"].any()):
+            return np.empty(0, np.int64), np.empty((0, 2))
+        force = self.pressed()
+        which = np.flatnonzero(force.any(axis=1))
+        return self.lists.force_rows()[which], force[which]
 
     def used(self, column: np.ndarray, table: PropertyTable) -> np.ndarray:
         """Which rows of a property table occur among these owned row numbers, on any rank; (rows,) bool. Collective."""
@@ -551,6 +693,11 @@ class Simulation:
             raise CommandError("{left}, {right}, {bottom}, {top} need at least one free particle")
         left, right, bottom, top = (float(v) for v in ends * (-1.0, 1.0, -1.0, 1.0))
         return {"left": left, "right": right, "bottom": bottom, "top": top}
+
+    def note_maker(self, first_gid: int) -> None:
+        """The present line of the script makes the particles from this id on."""
+        if not self.makers or self.makers[-1][1] != self.line or self.makers[-1][0] > first_gid:
+            bisect.insort(self.makers, (first_gid, self.line))
 
     def group_number(self, name: str) -> int:
         """Row of a group name, made if need be (on all ranks alike)."""

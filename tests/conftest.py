@@ -21,6 +21,9 @@ BIN = Path(sys.executable).parent
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `nohup ... &`: programs that are started would ignore it too
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# A ZDEM script that runs alone takes all cores unless this is set; tests run side by side.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 # --- what this machine has -------------------------------------------------------------------------------------
 
 

@@ -13,9 +13,9 @@ from typing import Any
 from hpcdem.blocks import saving
 from hpcdem.blocks.equilibrium import Balanced, Equilibrium
 from hpcdem.blocks.looking import QUANTITIES, Quantity
-from hpcdem.blocks.solving import Solved
+from hpcdem.blocks.solving import Moving, Solved, Watch
 
-__all__ = ["Balanced", "Blocks", "QUANTITIES", "Quantity", "Solved"]
+__all__ = ["Balanced", "Blocks", "Moving", "QUANTITIES", "Quantity", "Solved", "Watch"]
 
 
 class Blocks(Equilibrium):

@@ -304,18 +304,22 @@ def edges_now(slots, face, at, kind, state, memory, where, cells, x, table, beyo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stresses(x, triangle_rows, quad_rows, c, q, s0, quad_s0, small, first, stress, energy):
-    """Stress (n_own, 4) [Pa] and elastic energy (n_own,) [J/m] of the owned elements; first: storage row of the first.
+    """Stress (n_own, 4) [Pa] and elastic energy (n_own,) [J/m], or (0,): not wanted, of the owned elements; first:
+    storage row of the first.
 
     Energy: (s0 + sigma / 2) : epsilon A, of a quad the mean of its overlays.
     """
     for i in range(len(triangle_rows)):
         r = triangle_rows[i]
         triangle_stress(x[r], c[i], s0[i], small, stress[r - first])
-        energy[r - first] = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2]) * triangle_energy(x[r], c[i], s0[i], small)
+        if len(energy):
+            area = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
+            energy[r - first] = area * triangle_energy(x[r], c[i], s0[i], small)
     for i in range(len(quad_rows)):
         r = quad_rows[i]
         quad_stress(x[r, :8], q[i], quad_s0[i], small, stress[r - first])
-        energy[r - first] = quad_energy(x[r], q[i], quad_s0[i], small)
+        if len(energy):
+            energy[r - first] = quad_energy(x[r], q[i], quad_s0[i], small)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

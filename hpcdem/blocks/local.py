@@ -11,13 +11,14 @@ import numpy as np
 
 from hpcdem.blocks import build
 from hpcdem.blocks.memories import FIRST, KEY, WORDS, Memories, joint_rows
-from hpcdem.blocks.pairs import ContactPairs, Surfaces
+from hpcdem.blocks.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.errors import PhysicsError
 from hpcdem.model.blocks import connectivity
 from hpcdem.model.blocks.properties import Rows
+from hpcdem.physics.exact_sum import exact_sum
 from hpcdem.physics.fdem import elements, energy, joints, laws, limits
 from hpcdem.physics.fdem import nodes as moving
-from hpcdem.physics.fdem.joints import BROKEN, MEMORY, NONE
+from hpcdem.physics.fdem.joints import BROKEN, INTACT, MEMORY, NONE
 
 if TYPE_CHECKING:
     from hpcdem.blocks.simulation import Core
@@ -53,6 +54,15 @@ def joint_tables(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
     return law, beyond
 
 
+def element_table(rows: Rows) -> np.ndarray:
+    """The table of element models (rows, 5) of build.py."""
+    names = ("density", "bulk", "shear", "young", "damp_factor")
+    models = np.ascontiguousarray(np.array([rows.column(name) for name in names]).T)
+    bulk, shear = models[:, 1].copy(), models[:, 2].copy()
+    models[:, build.LAME], models[:, build.MU2] = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+    return models
+
+
 @dataclass
 class Evaluation:
     """Forces at the present positions, as the next step will see them [N/m].
@@ -74,7 +84,10 @@ class Evaluation:
 
 
 class Local:
-    """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective."""
+    """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
+
+    passes: how often the forces of a step were computed.
+    """
 
     def __init__(self, sim: Core) -> None:
         self.sim = sim
@@ -88,6 +101,7 @@ class Local:
         fill = triangles[-1:] if self.count else np.zeros(1, np.int64)
         self.triangle_rows = np.concatenate([triangles, np.repeat(fill, 3)]).astype(np.int32)
         self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
+        self.passes = 0
         self._make_constants()
         self._make_joints()
         sim.memories.put_into_joints(self)
@@ -98,19 +112,21 @@ class Local:
         self._bind()
 
     @cached_property
-    def surfaces(self) -> Surfaces:
+    def shapes(self) -> Shapes:
         """What contact needs to know of the elements held here, by storage row."""
-        return Surfaces(self.sim, self.sim.number)
+        return Shapes(self.sim, self.sim.number)
+
+    @cached_property
+    def kinds(self) -> Kinds:
+        """What tells properties of faces in contact apart."""
+        return Kinds.of(self.sim)
 
     # ---- tables --------------------------------------------------------------------------------------------------
 
     def _make_constants(self) -> None:
         """Reference geometry, moduli, true masses, initial stress."""
-        sim, mesh, count = self.sim, self.sim.the_mesh(), self.count
-        names = ("density", "bulk", "shear", "young", "damp_factor")
-        models = np.ascontiguousarray(np.array([sim.element_rows.column(name) for name in names]).T)
-        bulk, shear = models[:, 1].copy(), models[:, 2].copy()
-        models[:, build.LAME], models[:, build.MU2] = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+        sim, mesh, count = self.sim, self.sim.reference, self.count
+        models = element_table(sim.element_rows)
         self.true_mass = np.zeros((len(sim.number), 4))
         build.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self.true_mass)
         self.c = np.zeros((count + 3, elements.TRIANGLE))
@@ -122,8 +138,8 @@ class Local:
         self.c[count:] = self.c[count - 1] if count else 1.0
         self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 4))
         if sim.stress0 is not None:
-            self.s0[:count] = sim.stress0[sim.number[self.triangle_rows[:count]]]
-            self.quad_s0[:] = sim.stress0[sim.number[self.quad_rows]]
+            self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
+            self.quad_s0[:] = sim.initial_stresses(sim.number[self.quad_rows])
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -241,9 +257,9 @@ class Local:
 
     # ---- masses and time step ------------------------------------------------------------------------------------
 
-    def springs(self) -> np.ndarray:
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
-        contact of its free faces can have.
+        contact of its free faces can have. And the dashpots (n_own, 4) [N s/m per m] of these contacts.
 
         Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
         altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
@@ -259,24 +275,26 @@ class Local:
         penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)
         closed = sim.closed_faces()[faces] & real
         tied = closed & (sim.joint_row[faces] > 0)
-        each = np.where(tied, 0.5 * penalty[sim.joint_row[faces]], 0.0)
+        each, drag = np.where(tied, 0.5 * penalty[sim.joint_row[faces]], 0.0), np.zeros(faces.shape)
         if sim.options.collision:
-            surfaces = self.surfaces
-            length, double_area = surfaces.length[own], surfaces.double_area[own]
+            length, double_area = self.shapes.length[own], self.shapes.double_area[own]
+            surfaces = Surfaces(sim, self.shapes, faces.reshape(-1), np.repeat(np.arange(own.start, own.stop), 4))
             highest = float(np.max(length.max(axis=1) / double_area, initial=0.0))
-            others = bool((np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal))[own].any())
+            others = bool((np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal))[real.reshape(-1)].any())
             highest, some = sim.comm.max_into(np.array([highest, float(others)])).tolist()
-            most = surfaces.most_penalty(some == 0.0)[own][:, None]
+            most = surfaces.most_penalty(some == 0.0).reshape(-1, 4)
             contact = 1.5 * most * (length * length / double_area[:, None] + length * highest)
             may_touch = real & ~closed
             if sim.options.dynamic:
                 may_touch |= tied  # once they break
             each = np.maximum(each, np.where(may_touch, contact, 0.0))
-        out = each.copy()
+            # Half of 2 xi sqrt(k m) L, with k L = 2 `contact` and m L no more than two corners of the element have.
+            ratio = float(sim.comm.max_into(np.array([surfaces.ratio.max(initial=0.0)]))[0])
+            heavy = 2.0 * self.true_mass[own].max(axis=1, initial=0.0)[:, None]
+            drag = np.where(may_touch, ratio * np.sqrt(2.0 * contact * heavy), 0.0)
         before = np.where(np.arange(4) > 0, np.arange(4) - 1, corners[:, None] - 1)
-        out += np.take_along_axis(each, before, axis=1)
-        out[~real] = 0.0
-        return out
+        springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
+        return np.where(real, springs, 0.0), np.where(real, dashpots, 0.0)
 
     def critical_time_step(self, target: float = 0.0, mass: np.ndarray | None = None) -> float:
         """Stability limit times the safety factor [s]; infinite in static mode. target: raise `mass` (n, 4) until this
@@ -285,10 +303,16 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = limits.time_step(
-            self.c, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, self.springs(), o.safety,
-            target, self.true_mass.copy() if mass is None else mass,
+            self.c, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
+
+    def added_mass(self) -> float:
+        """Mass that mass scaling has added, over the true mass. Collective."""
+        comm, own = self.sim.comm, self.sim.owned
+        true = exact_sum(self.true_mass[own], comm)
+        return exact_sum(self.mass[own] - self.true_mass[own], comm) / true
 
     def _set_masses(self) -> None:
         """Masses of the corners that the motion sees, and the time step. Collective."""
@@ -298,7 +322,7 @@ class Local:
         own = sim.owned
         if not o.dynamic:
             limits.static_masses(
-                self.c, self.q, triangles, self.quad_rows, own.start, self.springs(), ALPHA, self.mass
+                self.c, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
@@ -308,7 +332,7 @@ class Local:
                 if wanted:
                     sim.lattice.dt = o.dt or o.mass_scaling or critical
                     sim.lattice.estimated = sim.clock.step
-                    sim.tell_time_step(sim.lattice.dt, critical)
+                    sim.tell_time_step(sim.lattice.dt, critical, self.added_mass() if o.mass_scaling > 0.0 else 0.0)
             sim.clock.dt = sim.lattice.dt
         if sim.comm.size > 1:
             sim.halo.fill(self.mass)
@@ -348,6 +372,7 @@ class Local:
     def forces(self) -> None:
         """Forces at the present positions, and the velocities that follow from them. Collective."""
         sim, timers = self.sim, self.sim.timers
+        self.passes += 1
         if len(self.pairs):
             with timers("contact"):
                 self.pairs.forces(sim.x, sim.v, sim.clock.dt)
@@ -405,10 +430,12 @@ class Local:
         kept = [
             (table, table.copy())
             for table in (
-                sim.v, pairs.memory, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.slot_memory,
-                self.head, self.follow, self.tally, self.outside, self.felt,
+                sim.v, pairs.memory, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
+                self.follow, self.tally, self.outside, self.felt,
             )
         ]  # fmt: skip
+        behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
+        remembered = self.slot_memory[behind]
         stored = self.force
         total = len(sim.number)
         self.force, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
@@ -425,29 +452,81 @@ class Local:
             self.felt.copy(), sim.v.copy(),
         )  # fmt: skip
         self.force = stored
+        self.slot_memory[self.slot_state > INTACT] = 0.0
+        self.slot_memory[behind] = remembered
         for table, values in kept:
             table[...] = values
         return found
 
     def first_corners(self) -> np.ndarray:
-        """Lowest corner (element * 4 + k) of each special node."""
+        """Lowest corner (element * 4 + k) of each special node. Not to be changed."""
+        return self._first_corners
+
+    @cached_property
+    def _first_corners(self) -> np.ndarray:
         out = self.node_lead.copy()
         several = self._start >= 0
         out[several] = self.sim.member[self._start[several]]
         return out
 
+    @cached_property
+    def my_nodes(self) -> np.ndarray:
+        """Special nodes whose lowest corner is on an element of this rank, bool."""
+        row, own = self.sim.where[self._first_corners // 4], self.sim.owned
+        return (row >= own.start) & (row < own.stop)
+
+    @cached_property
+    def leads(self) -> np.ndarray:
+        """(np,) lowest corner (element * 4 + k) of elements that are there at each point of the mesh, -1: none."""
+        sim, mesh = self.sim, self.sim.the_mesh()
+        corner = np.arange(mesh.cells.size).reshape(mesh.cells.shape)
+        use = (mesh.cells >= 0) & sim.alive[:, None]
+        out = np.full(len(mesh.points), -1, np.int64)
+        out[mesh.cells[use][::-1]] = corner[use][::-1]
+        return out
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Lower faces of all edges between two elements that are there, of all ranks."""
+        return np.flatnonzero(self.sim.joint_exists())
+
+    @cached_property
+    def lower_faces(self) -> np.ndarray:
+        """Lower faces of the owned elements that have a joint model."""
+        sim = self.sim
+        faces = (4 * sim.number[sim.owned][:, None] + np.arange(4)).reshape(-1)
+        return faces[sim.joint_exists()[faces] & (sim.joint_row[faces] > 0)]
+
+    @cached_property
+    def lower_slots(self) -> np.ndarray:
+        """Their slots."""
+        return self.slot_of(self.lower_faces)
+
     def alone(self) -> np.ndarray:
-        """(n_own, 4) bool: corners of owned elements that move by themselves."""
+        """(n_own, 4) bool: corners of owned elements that move by themselves. Not to be changed."""
+        return self._alone
+
+    @cached_property
+    def _alone(self) -> np.ndarray:
         return ~self.special & (self.sim.the_mesh().cells[self.sim.number[self.sim.owned]] >= 0)
 
-    def stresses(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stress (n_own, 4) xx, yy, xy, zz [Pa] and elastic energy (n_own,) [J/m] of the owned elements."""
+    def stresses(self, at: np.ndarray | None = None, energies: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Stress (n_own, 4) xx, yy, xy, zz [Pa] and, unless they are not wanted, elastic energies (n_own,) [J/m] of the
+        owned elements, or of some of them (at: the how-manieth)."""
         sim = self.sim
-        stress, energy = np.zeros((sim.n_own, 4)), np.zeros(sim.n_own)
-        build.stresses(
-            sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, self.s0, self.quad_s0,
-            not sim.options.large_strain, sim.n_left, stress, energy,
-        )  # fmt: skip
+        if at is None:
+            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, self.s0, self.quad_s0
+            n, first = sim.n_own, sim.n_left
+        else:
+            triangle = self.triangle_of_row[at]
+            three, n, first = triangle >= 0, len(at), 0
+            triangle, quad = triangle[three], np.searchsorted(self.quad_rows, at[~three] + sim.n_left)
+            places = np.flatnonzero(three).astype(np.int32), np.flatnonzero(~three).astype(np.int32)
+            rows = (
+                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], self.s0[triangle], self.quad_s0[quad],
+            )  # fmt: skip
+        stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
+        build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
         return stress, energy
 
     def stored_in_joints(self) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcdem.blocks.budget import Budget
 from hpcdem.blocks.memories import WORDS, Memories
+from hpcdem.blocks.simulation import Crack
 from hpcdem.clock import Clock
 from hpcdem.errors import CommandError, HpcdemError
 from hpcdem.io import checkpoint
@@ -76,7 +77,11 @@ def tables(sim: Solving) -> dict[str, Table]:
     for kind, names in ARRAYS.items():
         tables[kind] = _whole({name: getattr(sim, name).astype(np.int64) for name in names}, root)
     if sim.stress0 is not None:
-        tables["stress0"] = _whole({f"s{k}": sim.stress0[:, k] for k in range(4)}, root)
+        stress0 = {f"s{k}": sim.stress0[:, k] for k in range(4)}
+        tables["stress0"] = _whole({**stress0, "row": sim.stress0_row.astype(np.int64)}, root)
+    if len(sim.born):
+        born_at = sim.birthplace.reshape(-1, 8)
+        tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
     own = sim.owned
     number, x, v = sim.number[own], sim.x[own], sim.v[own]
     columns: dict[str, np.ndarray] = {"number": number.copy()}
@@ -185,10 +190,16 @@ def _apply(
                 array[:] = shared[kind][name].astype(array.dtype)
         if "stress0" in shared:
             sim.stress0 = np.column_stack([shared["stress0"][f"s{k}"] for k in range(4)])
+            # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
+            sim.stress0_row[:] = shared["stress0"].get("row", sim.element_row)
+        if "born" in shared:
+            born_at = np.column_stack([shared["born"][f"p{k}"] for k in range(8)])
+            sim.take_births(shared["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
     sim.take_scene_state(state["scene"])
     sim.clock = Clock(**state["clock"])
-    sim.lattice = type(sim.lattice)(**state["lattice"])
-    sim.event_rows = [tuple(row) for row in state["events"]]
+    sim.untouched = sim.clock.step == 0
+    sim.lattice = type(sim.lattice)(**{"step": sim.clock.step, "time": sim.clock.time, **state["lattice"]})
+    sim.event_rows = [Crack(*row) for row in state["events"]]
     sim._longest = state["longest"]
     if state["mesh"] is None:
         return

@@ -14,21 +14,22 @@ neither on ranks and threads nor on when the lists were rebuilt.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hpcdem.blocks import build
+from hpcdem.blocks import build, overlaps
 from hpcdem.blocks.local import Local
 from hpcdem.blocks.memories import Memories
 from hpcdem.blocks.pairs import cut_corner
-from hpcdem.blocks.scene import Fading, Scene
+from hpcdem.blocks.scene import Fading, Numbers, Scene
 from hpcdem.cells import columns, keys
 from hpcdem.clock import Clock
 from hpcdem.decomp import strips
-from hpcdem.errors import CommandError, PhysicsError
+from hpcdem.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
@@ -36,6 +37,7 @@ from hpcdem.halo.ownership import Ownership
 from hpcdem.memory import aligned
 from hpcdem.model.blocks import connectivity
 from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.model.blocks.tables import Value
 from hpcdem.physics.fdem import elements
 from hpcdem.physics.fdem.joints import BROKEN, MODE
 from hpcdem.physics.fdem.laws import SOFTENING_AREA
@@ -61,7 +63,8 @@ class Lattice:
 
     side of the cells [m]; skin: buffer of the contact search [m]; age: of the contact lists, stored: of the storage, in
     steps; steps to the next look, steps between the last two looks, lists that came late; dt: time step of the dynamic
-    mode [s], 0 if it must be estimated, and the step at which it was.
+    mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were made; dt
+    is the same since then.
     """
 
     side: float = 0.0
@@ -74,6 +77,22 @@ class Lattice:
     late: int = 0
     dt: float = 0.0
     estimated: int = 0
+    step: int = 0
+    time: float = 0.0
+
+
+class Crack(NamedTuple):
+    """A joint that broke. joint: its number; mode: from 1 (opened) to 2 (slid); step, time [s]: of the positions at
+    which it broke; kinetic: energy of the two elements then [J/m]; peak_step, peak_kinetic: when it had passed its
+    strength (-1 and NaN in checkpoints of earlier versions)."""
+
+    joint: int
+    mode: float
+    step: int
+    kinetic: float
+    time: float
+    peak_step: int = -1
+    peak_kinetic: float = math.nan
 
 
 class SurfaceLoads(Protocol):
@@ -144,12 +163,15 @@ class Core(Scene):
         self.lattice = Lattice()
         self.ownership = Ownership(self.comm, self.balance_on)
         self.rebuilds = 0
-        self.event_rows: list[tuple] = []
+        self.event_rows: list[Crack] = []
         self.closed = False
         self.budget: Any = None
         self._topology_stale = True
         self._longest = 0.0
         self._mean_edge = 0.0
+        self.untouched = True
+        """Nothing has moved since there is this mesh."""
+        self._told_step = 0.0
         self._empty()
 
     def _empty(self) -> None:
@@ -172,6 +194,11 @@ class Core(Scene):
         self._take(mesh)
         self._start_with(mesh)
 
+    def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
+        """Elements (n,) have come back, their corners at places (n, 4, 2) [m]."""
+        super().take_births(born, places)
+        self.areas = connectivity.areas(self.reference.points, self.reference.cells)
+
     def place_mesh(self, mesh: Mesh) -> None:
         """The same for a mesh that is known to be good."""
         self._put(mesh)
@@ -187,6 +214,7 @@ class Core(Scene):
         self.event_rows = []
         self._topology_stale = True
         self._longest = 0.0
+        self.untouched = True
         self.budget = None
         self.areas, self.cut = mesh.areas(), cut_corner(mesh)
         edges = mesh.edges().points
@@ -234,6 +262,21 @@ class Core(Scene):
         if stiffness:
             self.lattice.dt = 0.0
 
+    def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        before = self.element_row.copy()
+        super().element_model(elements, name, properties)
+        if self.log is None or self.stress0 is None:
+            return
+        at = np.flatnonzero((before != self.element_row) & (before > 0))
+        other = at[(self.initial_stresses(at) != self.stress0[at]).any(axis=1)]
+        if len(other):
+            self.log.warn_once(
+                "initial stress follows",
+                f"{len(other)} elements have other moduli than when their initial stress was said: it follows them, "
+                f"element {other[0]} has {_pascals(self.initial_stresses(other[:1])[0])} in place of "
+                f"{_pascals(self.stress0[other[0]])}; element initial after the models sets it for the present ones",
+            )
+
     # ---- one step ------------------------------------------------------------------------------------------------
 
     def step(self) -> int:
@@ -242,6 +285,8 @@ class Core(Scene):
         Returns what the outside asked for (0 nothing; else see runtime.stopping), agreed by all ranks.
         """
         self.close_model()
+        self.check_start()
+        self.untouched = False
         timers, halo, lattice, request = self.timers, self.halo, self.lattice, 0
         budget = self.budget if self.options.dynamic else None
         if budget is not None:
@@ -263,7 +308,11 @@ class Core(Scene):
         stale = outdated = False
         if lattice.countdown == 0:
             with timers("reduce"):
-                stale, outdated, request = self._look()
+                try:
+                    stale, outdated, request = self._look()
+                except EquilibriumError:
+                    halo.finish()  # the script may go on
+                    raise
         with timers("halo"):
             halo.finish()
         if self.options.auto and self.options.dynamic and self.clock.step - lattice.estimated >= AUTO:
@@ -274,6 +323,12 @@ class Core(Scene):
             if outdated:
                 self.open_model()
         return request
+
+    def check_start(self) -> None:
+        """CommandError if nothing has moved yet and bodies overlap, unless that was asked for; the model is closed.
+        Collective."""
+        if self.untouched:
+            overlaps.check(self)
 
     def _drift(self, first: int, last: int) -> None:
         """Move the owned elements first : last by dt."""
@@ -337,6 +392,12 @@ class Core(Scene):
             "an element is turned inside out" if inverted else "an element moves over half an edge per step"
         )  # fmt: skip
         text = "\n".join(f"  element {e} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g})" for e, x, y, vx, vy in named)
+        if not self.options.dynamic and not broken and not inverted:
+            e, x, y, vx, vy = named[0]
+            raise EquilibriumError(
+                f"step {self.clock.step}: {total} elements move over half an edge per static step, such as element {e} "
+                f"at ({x:g}, {y:g}) by ({vx:g}, {vy:g})"
+            )
         raise PhysicsError(
             f"step {self.clock.step}: {what} ({total} elements); the time step {self.clock.dt:g} s is probably too "
             f"large, or loads are\n{text}"
@@ -369,10 +430,9 @@ class Core(Scene):
         self.number, self.x, self.v = self.number[own].copy(), self.x[own].copy(), self.v[own].copy()
         self.closed = False
 
-    def waiting_events(self) -> list[tuple]:
-        """Joints that broke since the last rebuild: number, mode, step, kinetic energy, time; in order of steps.
-        Collective."""
-        local, clock = self.local, self.clock
+    def waiting_events(self) -> list[Crack]:
+        """Joints that broke since the last rebuild, in order of steps, see `Crack`. Collective."""
+        local, clock, lattice = self.local, self.clock, self.lattice
         slots = np.flatnonzero(local.slot_state == BROKEN)
         mine = np.column_stack([local.slot_face[slots].astype(float), local.slot_memory[slots, MODE:]])
         rows = np.concatenate(self.comm.allgather(mine)) if self.comm.size > 1 else mine
@@ -384,11 +444,13 @@ class Core(Scene):
         rows, lower = rows[order], lower[order]
         assert (lower[0::2] == lower[1::2]).all(), "a joint broke on one side only"
         first, joints = rows[0::2], lower[0::2]
-        kinetic = rows[0::2, 3] + rows[1::2, 3]
+        both = rows[0::2] + rows[1::2]
         dt = clock.dt if self.options.dynamic else 0.0
         return [
-            (int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(kinetic[k]),
-             clock.time - (clock.step - float(first[k, 2])) * dt)
+            Crack(
+                int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(both[k, 3]),
+                lattice.time + (int(first[k, 2]) - lattice.step) * dt, int(first[k, 4]), float(both[k, 5]),
+            )
             for k in np.lexsort((joints, first[:, 2])).tolist()
         ]  # fmt: skip
 
@@ -406,7 +468,11 @@ class Core(Scene):
             self.local.renew_contacts(handed_over)
             self.listed = self.x[self.owned].copy()
             self.lattice.age = 0
+            self._note_time()
             self.rebuilds += 1
+
+    def _note_time(self) -> None:
+        self.lattice.step, self.lattice.time = self.clock.step, self.clock.time
 
     def _skin(self) -> float:
         """Buffer of the next contact lists [m], from global values only."""
@@ -460,6 +526,7 @@ class Core(Scene):
                 self.origin = self.x[self.owned].copy()
                 self.listed = self.origin.copy()
                 self.lattice.age = self.lattice.stored = 0
+                self._note_time()
             self.rebuilds += 1
         if self.surface_loads is not None:
             self.surface_loads.made_anew()
@@ -578,31 +645,52 @@ class Core(Scene):
         way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
         longest = np.zeros(len(self.joint_rows))
         np.maximum.at(longest, self.joint_row[faces], np.hypot(way[:, 0], way[:, 1]))
-        for row in np.flatnonzero(longest).tolist():
-            values = self.joint_rows.values(row)
-            for strength, penalty, energy in (
-                ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
-            ):  # fmt: skip
-                elastic = 2.0 * longest[row] * values[strength] / values[penalty]
-                if values[strength] > 0.0 and values[energy] / (SOFTENING_AREA * values[strength]) < 0.1 * elastic:
-                    self.log.warn_once(
-                        f"snap back {row} {energy}",
-                        f"joints with {strength} {values[strength]:g} Pa, {energy} {values[energy]:g} N/m break "
-                        f"within a tenth of their elastic way, {elastic:.3g} m at an edge of {longest[row]:.3g} m: "
-                        "what the body stores is set free at once; smaller elements or a higher penalty help",
-                    )
-
-    def tell_time_step(self, dt: float, critical: float) -> None:
-        """A line in the log about the time step [s] and its limit."""
-        if self.log is None:
-            return
-        self.log.info(f"time step {dt:.4g} s, {dt / critical:.2f} of the stable one ({critical:.4g} s)")
-        if dt > critical:
+        for strength, penalty, energy in (
+            ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
+        ):  # fmt: skip
+            t, p, g = (self.joint_rows.column(name) for name in (strength, penalty, energy))
+            rows = np.flatnonzero((longest > 0.0) & (t > 0.0))
+            elastic = 2.0 * longest[rows] * t[rows] / p[rows]
+            softening = g[rows] / (SOFTENING_AREA * t[rows])
+            brittle = softening < 0.1 * elastic
+            if not brittle.any():
+                continue
+            worst = np.argmin(softening / elastic)
+            row = rows[worst]
+            others = f", and {int(brittle.sum()) - 1} other sets of properties," if brittle.sum() > 1 else ""
             self.log.warn_once(
-                "critical time step",
-                f"the time step {dt:g} s is {dt / critical:.2f} times the stable one, {critical:.4g} s; a run that "
-                "blows up should be repeated with a smaller one",
+                f"snap back {row} {energy}",
+                f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
+                f"elastic way, {elastic[worst]:.3g} m at an edge of {longest[row]:.3g} m: what the body stores is set "
+                "free at once; smaller elements or a higher penalty help",
             )
+
+    def tell_time_step(self, dt: float, critical: float, added: float) -> None:
+        """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
+        that mass scaling adds, over the true mass. A step that is followed (auto) is told again when it has changed by
+        a tenth."""
+        o = self.options
+        if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
+            return
+        self._told_step = dt
+        limit = critical / o.safety
+        scaled = f"by mass scaling, which adds {added:.3g} times the mass"
+        how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
+        self.log.info(
+            f"time step {dt:.4g} s ({how}), {dt / limit:.2f} of the stability limit {limit:.4g} s; safety factor "
+            f"{o.safety:g}: {critical:.4g} s"
+        )
+        if dt > critical * (1.0 + 1e-9):
+            self.log.warn_once(
+                f"critical time step {dt > limit}",
+                f"the time step {dt:g} s is {dt / limit:.2f} of the stability limit {limit:.4g} s, more than the "
+                f"safety factor {o.safety:g} allows ({critical:.4g} s); a run that blows up should be repeated with a "
+                "smaller one",
+            )
+
+
+def _pascals(stress: np.ndarray) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in zip(("xx", "yy", "xy", "zz"), stress)) + " Pa"
 
 
 def _turn(x: np.ndarray, a: int, b: int, c: int) -> np.ndarray:

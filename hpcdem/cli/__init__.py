@@ -16,7 +16,7 @@ import click
 
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
 from hpcdem.cli.resume import resume, resumed_options
-from hpcdem.cli.run import Options, hpcdem, run
+from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
 from hpcdem.session import Session, greet, prepare
@@ -61,7 +61,8 @@ def main() -> NoReturn:
             options = resumed_options(read_command_line(resume, "hpcdem resume", words[1:]))
         else:
             options = Options(**read_command_line(hpcdem, "hpcdem", words))
-        threads, warnings = launch.prepare_environment(options.threads or launch.threads_by_default())
+        wanted = options.threads or launch.threads_by_default(as_zdem=speaks_zdem(options.script))
+        threads, warnings = launch.prepare_environment(wanted)
         comm = launch.start_mpi()
 
     def work() -> None:

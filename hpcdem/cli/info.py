@@ -85,7 +85,7 @@ def _text(value: Any) -> str:
 def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
     """Facts about the run that wrote into a folder. every: look into all files, not only the last two checkpoints and
     the last frame."""
-    from hpcdem.io.frames import list_frames, list_mesh_frames
+    from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
     from hpcdem.post import inventory
 
     facts: dict[str, Any] = {"kind": "folder", "whole": True, "why": ""}
@@ -103,8 +103,14 @@ def of_folder(folder: Path, every: bool = False) -> dict[str, Any]:
             facts["state"] = "killed (nobody holds its lock)"
     if holder is not None:
         facts["state"] = f"running: process {holder.get('pid', '?')} on {holder.get('host', '?')}"
-    saved = sorted(folder.glob("*.sav"), key=lambda path: (_step(path.name), path.name))
+    every_saved = sorted(folder.glob("*.sav"), key=lambda path: (_step(path.name), path.name))
+    saved = [path for path in every_saved if not run_folder.is_older(path, record)]
+    older = [path for path in every_saved if path not in saved]
     frames = [*list_frames(folder), *list_mesh_frames(folder)]
+    if older:
+        facts["older_checkpoints"] = _range(older, [_step(p.name) for p in older]) + ", of an earlier run"
+    if others := left_out(folder):
+        facts["older_frames"] = others
     facts["checkpoints"] = _range(saved, [_step(p.name) for p in saved])
     facts["frames"] = _range(frames, [f.step for f in frames])
     facts["unfinished"] = sorted(p.name for p in folder.glob("*.tmp"))

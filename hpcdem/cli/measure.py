@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
+WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission")
 FORMATS = ("png", "jpg", "pdf", "svg")
 
 
@@ -80,7 +80,7 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 @click.option("-o", "--output", type=PATH, metavar="DIR", help="Folder for the results [DIR/measure].")
 @click.option("--wall", "walls", type=int, multiple=True, metavar="ID", help="Wall that pushes (wedge, shortening); "
               "walls of wallforce, may be given again [the one that goes farthest; all walls].")  # fmt: skip
-@click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles of these groups.")
+@click.option("--groups", type=Words(), default="", metavar="A,B", help="Only particles, or elements, of these groups.")
 @click.option("--colors", "--colours", type=Words(), default="", metavar="A,B", help="Only particles of these colours, "
               "by name or number.")  # fmt: skip
 @click.option("--from", "first", type=click.IntRange(0), metavar="STEP", help="First step [where the wall that "
@@ -102,6 +102,16 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
 @click.option("--number", type=click.IntRange(1), default=1, metavar="N", help="tracks: so many to each point [1].")
 @click.option("--log", type=PATH, metavar="FILE", help="cracks: log of the run, which counts breaks in tension and in "
               "shear.")  # fmt: skip
+@click.option("--history", metavar="NAME", help="emission: history that is drawn with the events, or none [the first "
+              "of a reaction, else of a stress].")  # fmt: skip
+@click.option("--bins", type=click.IntRange(1), default=100, metavar="N", help="emission: parts of the time in which "
+              "events are counted [100].")  # fmt: skip
+@click.option("--completeness", type=float, callback=finite, metavar="M", help="emission: magnitude from which the "
+              "b-value is taken [that of most events].")  # fmt: skip
+@click.option("--energy", type=click.Choice(("kinetic", "released")), default="kinetic", help="emission: kinetic "
+              "energy when a joint broke, or by how much it grew since the joint's peak [kinetic].")  # fmt: skip
+@click.option("--joule", type=float, default=1.0, callback=positive, metavar="F", help="emission: J per unit of energy "
+              "in the files, thickness of the model included [1].")  # fmt: skip
 def measure(**options: Any) -> None:
     """Measure the frames in DIR: tables (CSV) and figures of
 
@@ -112,7 +122,9 @@ def measure(**options: Any) -> None:
     wallforce  forces on walls over their way, and work
     tracks     paths of particles: --ids, --near, all of --groups or --colors, or some spread over the bed
     layers     areas of colours and groups
-    cracks     broken bonds and damage
+    cracks     broken bonds or joints, by mode and time, and damage
+    fragments  of blocks: number, areas, distribution of sizes
+    emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value
     """
 
 
@@ -143,5 +155,7 @@ def request(options: dict[str, Any]) -> Any:
         first=options["first"], last=options["last"], xmove=options["xmove"], ymove=options["ymove"],
         width=options["width"], formats=tuple(options["formats"]), strain=options["strain"], length=options["length"],
         skin=options["skin"], increment=options["increment"], ids=tuple(options["ids"]), points=options["points"],
-        number=options["number"], log=options["log"], color_names={number: name for name, number in COLORS.items()},
+        number=options["number"], log=options["log"], history=options["history"], bins=options["bins"],
+        completeness=options["completeness"], released=options["energy"] == "released", joule=options["joule"],
+        color_names={number: name for name, number in COLORS.items()},
     )  # fmt: skip

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, positive, style_of
-from hpcdem.runtime import launch
+from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, positive, processes, style_of
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -47,14 +46,13 @@ def movie(**options: Any) -> None:
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: make the film. Raises HpcdemError on all ranks."""
     from hpcdem.io.agreed import on_first
-    from hpcdem.post import movie as films
 
     options["lines"] = False
 
     def begin() -> tuple[list[tuple[str, Path]], list[Path]]:
         goals = targets(options)
         if options["source"] == "ss":
-            return goals, films.pages(options["folder"] / "ss")
+            return goals, _pages(options["folder"], log)
         return goals, []
 
     goals, pictures = on_first(comm, begin)
@@ -71,6 +69,18 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     finally:
         if scratch is not None and comm.rank == 0:
             shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _pages(folder: Path, log: Log) -> list[Path]:
+    """The pages of zdemss, without those of frames that an earlier run has left in the folder."""
+    from hpcdem.io.frames import earlier_stems, left_out
+    from hpcdem.post import movie as films
+
+    earlier = earlier_stems(folder)
+    pages = films.pages(folder / "ss", earlier)
+    if earlier:
+        log.warn(left_out(folder))
+    return pages
 
 
 def write(kind: str, pictures: list[Path], path: Path, options: dict[str, Any]) -> None:
@@ -113,12 +123,14 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
     """Collective: the pictures of all frames, at one view."""
     from hpcdem.errors import HpcdemError
     from hpcdem.io.agreed import on_first
-    from hpcdem.io.frames import list_frames, list_mesh_frames
+    from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
     from hpcdem.post.series import Job, draw_all
 
     def plan() -> list[Job]:
         folder: Path = options["folder"]
         files = [] if options["name"] else [file.path for file in list_frames(folder)]
+        if others := left_out(folder):
+            log.warn(others)
         if not files:
             of_blocks = [file.path for file in list_mesh_frames(folder, options["name"])]
             if of_blocks:
@@ -132,8 +144,7 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
         return [Job(file, scratch / f"{k:06d}.png", style, seen) for k, file in enumerate(files)]
 
     jobs = on_first(comm, plan)
-    workers = launch.cores() if options["max_workers"] is None else max(1, int(options["max_workers"]))
-    draw_all(jobs, comm, workers, log.info)
+    draw_all(jobs, comm, processes(options), log.info)
     return [job.picture for job in jobs]
 
 

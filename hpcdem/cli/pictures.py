@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hpcdem.runtime import launch
+
 if TYPE_CHECKING:
     from hpcdem.io.axes import View
     from hpcdem.post.plots import Style
@@ -23,6 +25,25 @@ class ManualCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         names = {name for parameter in self.params for name in parameter.opts if name.startswith("--")}
         return super().parse_args(ctx, as_usual(args, names))
+
+
+class Formats(click.ParamType):
+    """Words of `known` with commas between them; eps is ps, jpeg is jpg, tif is tiff."""
+
+    name = "formats"
+
+    def __init__(self, known: Sequence[str]) -> None:
+        self.known = tuple(known)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        words = str(value).lower().replace(" ", "").replace(".", "").split(",")
+        words = [{"eps": "ps", "jpeg": "jpg", "tif": "tiff"}.get(word, word) for word in words]
+        for word in words:
+            if word not in self.known:
+                self.fail(f"{word!r} is not a format of pictures; expected some of {', '.join(self.known)}", param, ctx)
+        return tuple(dict.fromkeys(words))
 
 
 def as_usual(words: Sequence[str], names: set[str]) -> list[str]:
@@ -98,6 +119,11 @@ def looks(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(OPTIONS):
         function = option(function)
     return function
+
+
+def processes(options: dict[str, Any]) -> int:
+    """How many processes draw at a time."""
+    return launch.cores() if options["max_workers"] is None else max(1, int(options["max_workers"]))
 
 
 def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> Style:

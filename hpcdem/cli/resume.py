@@ -20,9 +20,7 @@ from hpcdem.runtime import run_folder
     "SCRIPT; 0 also if the run is done.",
 )
 @click.argument("folder", type=PATH, metavar="[DIR]", required=False)
-@click.option(
-    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
-)
+@click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [as for hpcdem SCRIPT].")
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )

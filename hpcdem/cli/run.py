@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import traceback
 from dataclasses import dataclass
@@ -229,6 +230,21 @@ def reproduction(session: Session, options: Options) -> Reproduction | None:
     return Reproduction(options.check_reproducible, session.log, expected, str(options.against or ""))
 
 
+_BEGINS_ZDEM = re.compile(rb"(star?t?|res(t(o(r(e)?)?)?)?\b[^=]*|load?\b[^=]*)\s*([#!;].*)?", re.IGNORECASE)
+
+
+def speaks_zdem(path: Path) -> bool:
+    """Whether a script begins as a ZDEM script must, with START, RESTORE or LOAD: a look at it before anything is
+    loaded (lang/detect.py decides later). False if it cannot be read."""
+    try:
+        with open(path, "rb") as file:
+            lines = (line.strip().removeprefix(b"\xef\xbb\xbf").strip() for line in file)
+            first = next((line for line in lines if line and line[:1] not in b"#!;"), b"")
+    except OSError:
+        return False
+    return _BEGINS_ZDEM.fullmatch(first) is not None
+
+
 def read_script(comm: SerialComm, path: Path) -> bytes:
     """Collective: the script, read once. UsageError on all ranks if rank 0 cannot read it."""
     source, error = b"", None
@@ -257,6 +273,7 @@ STRESS_AND_STRAIN = (
     (("--addball",), None),
     (("--delball",), None),
     (("--increment",), None),
+    (("--smooth",), None),
 )
 """Options that go with -s DIR (cli/strain_stress.py), with the name of their value."""
 
@@ -305,23 +322,46 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
         raise click.UsageError(str(error)) from None
 
 
+class RunCommand(click.Command):
+    """`hpcdem SCRIPT`; its help lists the options of `hpcdem -s DIR`, too, as the manual's `zdem -h` does."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        super().format_options(ctx, formatter)
+        from hpcdem.cli.strain_stress import strain_stress
+
+        hidden = [parameter for parameter in self.get_params(ctx) if getattr(parameter, "hidden", False)]
+        shown = {option for parameter in self.get_params(ctx) if parameter not in hidden for option in parameter.opts}
+        rows = [
+            row for parameter in strain_stress.params
+            if not shown & {*parameter.opts} and (row := parameter.get_help_record(ctx)) is not None
+        ]  # fmt: skip
+        with formatter.section("Stress and strain of a finished run"):
+            formatter.write_dl(rows)
+
+
 @other_options
 @click.command(
+    cls=RunCommand,
     context_settings=HELP,
     no_args_is_help=True,
-    epilog="Also: `hpcdem -s DIR` computes stress and strain of a finished run (hpcdem -s DIR --help), `hpcdem "
-    "measure DIR` measures it, `hpcdem movie DIR` makes a film, `hpcdem grade FILE` makes grains from a grading curve, "
+    epilog="Also: `hpcdem measure DIR` measures a finished run, `hpcdem movie DIR` makes a film, "
+    "`hpcdem grade FILE` makes grains from a grading curve, "
     "`hpcdem case` writes scripts of ready-made models, "
     "`hpcdem warmup` compiles all kernels for later runs, "
     "`hpcdem console` takes PCDC commands and Python line by line, "
     "`hpcdem doctor` says what is wrong with this machine or job. "
-    "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 85 stopped on request with a "
-    "checkpoint (go on with --resume).",
+    "Exit codes: 0 done, 1 the run failed, 2 command line or script not understood, 3 no equilibrium (model "
+    "solve), 85 stopped on request with a checkpoint (go on with --resume).",
 )
 @click.argument("script", type=PATH)
 @click.argument("arguments", nargs=-1, metavar="[-- ARGUMENTS]")
 @click.option(
-    "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
+    "-j",
+    "threads",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Threads per rank [what srun -c gives, else 1; of a ZDEM "
+    "script that one process runs alone OMP_NUM_THREADS, else all cores].",
 )
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     "-s", "--strain-stress", "--strin-stres", "folder", type=PATH, metavar="DIR", required=True,
     help="Stress and strain of the frames in DIR, into DIR/ss/data.",
 )  # fmt: skip
-@click.option("-g", "--grid", "size", type=float, default=200.0, metavar="SIZE", help="Spacing of the grid in m [200].")
+@click.option(
+    "-g", "--grid", "size", type=float, default=200.0, metavar="SIZE",
+    help="Length in m over which stress is averaged, and spacing of the grid of --smooth [200].",
+)  # fmt: skip
 @click.option("--addball", is_flag=True, help="Particles were added between frames (sedimentation).")
 @click.option("--delball", is_flag=True, help="Particles were deleted between frames (erosion).")
 @click.option("--leftwallid", type=int, metavar="ID", help="Leave out the particles to the left of this wall.")
@@ -27,6 +30,9 @@ if TYPE_CHECKING:
 @click.option("--xmove", type=float, default=0.0, metavar="X", help="Add X [m] to all x [0].")
 @click.option("--ymove", type=float, default=0.0, metavar="Y", help="Add Y [m] to all y [0].")
 @click.option("--increment", is_flag=True, help="Strain since the frame before, not since the first one.")
+@click.option(
+    "--smooth", is_flag=True, help="Strain fitted and averaged on the grid, not by the nearest neighbours of particles."
+)
 @click.option(
     "-j", "threads", type=click.IntRange(1), metavar="N", help="Threads per rank [what srun -c gives, else 1]."
 )
@@ -49,6 +55,7 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
             folder=Path(options["folder"]), size=options["size"], left_wall=options["leftwallid"],
             right_wall=options["rightwallid"], xmove=options["xmove"], ymove=options["ymove"],
             addball=options["addball"], delball=options["delball"], increment=options["increment"],
+            smooth=options["smooth"],
         ),
     )  # fmt: skip
 

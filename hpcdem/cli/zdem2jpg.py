@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import ManualCommand, looks, number, positive, style_of
+from hpcdem.cli.pictures import Formats, ManualCommand, looks, number, positive, processes, style_of
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
@@ -16,15 +16,22 @@ if TYPE_CHECKING:
     from hpcdem.runtime.progress import Log
 
 
+FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
+
+
 @click.command(cls=ManualCommand, context_settings=HELP, no_args_is_help=True)
 @click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
 @looks
 @number("dpi", 600.0, "Dots per inch [600].", positive)
 @number("pagesize", 14.0, "Width of the picture, cm [14].", positive)
+@click.option(
+    "--format", "formats", type=Formats(FORMATS), default="jpg", metavar="LIST",
+    help=f"Some of {', '.join(FORMATS)} with commas between them [jpg].",
+)  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdem2jpg", message="%(prog)s %(version)s")
 def zdem2jpg(**options: Any) -> None:
-    """Draw every frame all_*.vtkhdf or all_*.dat in DIR as a JPG of the same name beside it.
+    """Draw every frame all_*.vtkhdf or all_*.dat in DIR as a picture of the same name beside it.
 
     Under mpiexec or srun the ranks share the frames.
     """
@@ -34,18 +41,18 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw all frames of the folder. Raises HpcdemError on all ranks."""
     from hpcdem.errors import HpcdemError
     from hpcdem.io.agreed import on_first
-    from hpcdem.io.frames import list_frames
+    from hpcdem.io.frames import left_out, list_frames
     from hpcdem.post.series import Job, draw_all
 
     def plan() -> list[Job]:
         folder: Path = options["folder"]
         style = style_of(options, folder, options["pagesize"], options["dpi"])
         files = [file.path for file in list_frames(folder)]
+        if others := left_out(folder):
+            log.warn(others)
         if not files:
             raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {folder}")
-        return [Job(file, file.with_suffix(".jpg"), style) for file in files]
+        return [Job(file, file.with_suffix(f".{kind}"), style) for file in files for kind in options["formats"]]
 
     jobs = on_first(comm, plan)
-    wanted = options["max_workers"]
-    workers = launch.cores() if wanted is None else max(1, int(wanted))
-    draw_all(jobs, comm, workers, log.info)
+    draw_all(jobs, comm, processes(options), log.info)

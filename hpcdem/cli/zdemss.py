@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
+from hpcdem.cli.pictures import Formats, ManualCommand, number, positive, processes
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-FORMATS = ("jpg", "png", "pdf", "svg", "ps")
+FORMATS = ("jpg", "png", "tiff", "pdf", "svg", "ps")
+_MEANT = {word: True for word in ("ON", "TRUE", "YES", "1")} | {word: False for word in ("OFF", "FALSE", "NO", "0")}
 
 
 class Switch(click.ParamType):
-    """ON or OFF in any case, and further words that an option takes."""
+    """ON or OFF in any case, or true or false as zdem2jpg has them; and further words that an option takes."""
 
     name = "switch"
 
@@ -32,27 +34,12 @@ class Switch(click.ParamType):
         if isinstance(value, bool):
             return value
         word = str(value).strip().upper()
-        if word in ("ON", "OFF"):
-            return word == "ON"
+        if word in _MEANT:
+            return _MEANT[word]
         for other in self.words[2:]:
             if word == other.upper():
                 return other
         self.fail(f"{value!r} is none of {', '.join(self.words)}", param, ctx)
-
-
-class Formats(click.ParamType):
-    """Words of FORMATS with commas between them; eps is ps, jpeg is jpg."""
-
-    name = "formats"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        if isinstance(value, tuple):
-            return value
-        words = [{"eps": "ps", "jpeg": "jpg"}.get(w, w) for w in str(value).lower().replace(" ", "").split(",")]
-        for word in words:
-            if word not in FORMATS:
-                self.fail(f"{word!r} is not a format of pictures; expected some of {', '.join(FORMATS)}", param, ctx)
-        return tuple(dict.fromkeys(words))
 
 
 SWITCH, POSITIVE = Switch(), click.FloatRange(0.0, min_open=True)
@@ -68,22 +55,31 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
 
 
 @click.command(
-    context_settings=HELP, no_args_is_help=True, epilog="`hpcdem -s DIR` comes first: it computes what is drawn here."
+    cls=ManualCommand,
+    context_settings=HELP,
+    no_args_is_help=True,
+    epilog="`hpcdem -s DIR` comes first: it computes what is drawn here.",
 )
 @click.option("-d", "--dir", "folder", type=PATH, required=True, metavar="DIR", help="Folder of the frames.")
 @_switch("--addball", "OFF", "Particles were added between the frames")
 @_switch("--delball", "OFF", "Particles were removed between the frames")
 @_switch("--strainvol", "ON", "Draw volumetric strain")
-@_switch("--strainshear", "ON", "Draw distortional strain")
+@click.option(
+    "--strainshear", type=Switch("root"), default="ON",
+    help="Draw distortional strain as the manual's pages do, the second invariant J2; root: its square root [ON].",
+)  # fmt: skip
 @_switch("--stressmean", "ON", "Draw mean stress")
-@_switch("--stressshear", "ON", "Draw maximum shear stress")
+@click.option(
+    "--stressshear", type=Switch("half"), default="ON",
+    help="Draw shear stress as the manual's pages do, sigma1 - sigma3; half: (sigma1 - sigma3)/2 [ON].",
+)  # fmt: skip
 @_switch("--sigma1", "OFF", "Draw the largest principal stress as bars over the distortional strain")
 @_length("--scale", 1.0, "Length of these bars: gridsize times this where the stress is largest")
 @_length("--gridsize", 600.0, "Side of the squares over which they are averaged (m)")
 @_switch("--showcolorbar", "ON", "Draw colour bars")
 @click.option(
-    "--showlable", "--showable", "--showlabel", "labels", type=Switch("abc"), default="OFF",
-    help="Name the panels; abc: by letters only [OFF].",
+    "--showlable", "--showable", "--showlabel", "labels", type=Switch("abc"), default="ON",
+    help="Name the panels; abc: by letters only [ON].",
 )  # fmt: skip
 @click.option(
     "--straincolormap",
@@ -98,9 +94,10 @@ def _length(name: str, default: float | None, text: str, said: str | None = None
     "--width", type=click.FloatRange(5.0, 100.0), default=14.0, metavar="VALUE", help="Width of the pictures (cm) [14]."
 )
 @click.option(
-    "--format", "formats", type=Formats(), default="jpg,ps", metavar="LIST",
+    "--format", "formats", type=Formats(FORMATS), default="jpg,ps", metavar="LIST",
     help=f"Some of {', '.join(FORMATS)} with commas between them [jpg,ps].",
 )  # fmt: skip
+@number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdemss", message="%(prog)s %(version)s")
 def zdemss(**options: object) -> None:
     """Draw stress and strain of the frames in DIR, after `hpcdem -s DIR`.
@@ -119,7 +116,11 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
         panels.MEAN: "stressmean",
         panels.SHEAR: "stressshear",
     }
-    kinds = tuple(kind for kind in panels.KINDS if kind is panels.DEFORMATION or options[switches[kind]])
+    kinds = tuple(kind for kind in panels.KINDS if kind == panels.DEFORMATION or options[switches[kind]])
+    others = {("stressshear", "half"): panels.HALF_SHEAR, ("strainshear", "root"): panels.ROOT}
+    for (name, word), other in others.items():
+        if options[name] == word:
+            kinds = tuple(other if kind.key == other.key else kind for kind in kinds)
     colormap = options["straincolormap"]
     request = draw.Request(
         folder=options["folder"],
@@ -137,4 +138,4 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
         maxstress=options["maxstress"],
     )
     draw.refuse(request)
-    draw.draw_folder(request, comm, log)
+    draw.draw_folder(request, comm, log, processes(options))

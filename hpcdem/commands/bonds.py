@@ -6,11 +6,12 @@ import numpy as np
 
 from hpcdem.commands.properties import chosen, prop
 from hpcdem.errors import CommandError
-from hpcdem.physics.dem import contacts, laws
+from hpcdem.physics.dem import contacts, laws, mass
 from hpcdem.selection import Selection
 from hpcdem.simulation import Simulation
 
 ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
+KEPT = (*ELASTIC, "rubber")
 TOLERATE = 1e-6
 FARTHEST = 10.0
 """Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
@@ -30,12 +31,14 @@ def bond(
     tolerate: float | None = None,
     rext: float | None = None,
     fric: float | None = None,
+    rubber: bool = False,
 ) -> int:
     """Bond the pairs with both particles in `where` and d - (Ra + Rb) rext <= tolerate; returns the bonds made.
 
     Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in
     `where` that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m]
-    defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP.
+    defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP. rubber
+    marks the bonds as those of a membrane, without any effect on the motion.
     """
     values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
     elastic = any(v is not None for v in values.values())
@@ -50,6 +53,10 @@ def bond(
     for name, value in given.items():
         if value < 0.0:
             raise CommandError(f"{name} must not be negative, got {value:g}")
+    if rubber:
+        given["rubber"] = 1.0
+        if sim.log is not None:
+            sim.log.warn_once("rubber", "rubber: the mark is kept and written, it has no effect on the motion")
     gap = TOLERATE if tolerate is None else tolerate
     scale = 1.0 if rext is None else rext
     if scale <= 0.0:
@@ -85,7 +92,29 @@ def bond(
     sim.tables_changed()
     total = sim.count(made)
     sim.bonds += total
+    _warn_of_overstretched(sim, which)
     return total
+
+
+def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
+    """A warning if bonds with both ends in which (n,) bool, per storage row, will break at once: their tension counts
+    from where the particles just touch, wherever they are bonded. Collective."""
+    lists, p = sim.lists, sim.particles
+    number, widest = 0, np.zeros(1)
+    for t in range(lists.n_blocks):
+        n, gap = contacts.overstretched(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            sim.bond_types.as_floats(), len(sim.materials), mass.SPHERES[sim.settings.disk], which,
+        )  # fmt: skip
+        number += n
+        widest[0] = max(widest[0], gap)
+    number = sim.count(number)
+    sim.comm.max_into(widest)
+    if number and sim.log is not None:
+        sim.log.warn(
+            f"{number} of these bonds are past their tensile limit where they are and will break in the next step: a "
+            f"gap counts as strain, tolerate or not; the widest gap at which one of them would hold is {widest[0]:g} m"
+        )
 
 
 def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
@@ -119,7 +148,7 @@ def _renewed(sim: Simulation, kind: int, given: dict[str, float]) -> np.ndarray:
     used[0] = False
     mapping = np.arange(len(table))
     for m in np.flatnonzero(used):
-        values = {name: float(table.rows[name][m]) for name in ELASTIC} if table.rows["kind"][m] == kind else {}
+        values = {name: float(table.rows[name][m]) for name in KEPT} if table.rows["kind"][m] == kind else {}
         mapping[m] = table.row(kind=kind, **{**values, **given})
     return mapping
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from hpcdem.errors import CommandError
 from hpcdem.output import HISTORIES
+from hpcdem.platens import OF_PARTS
 from hpcdem.simulation import Simulation
 
 DRAW_INTERVAL = 1000
@@ -11,11 +14,21 @@ DRAW_INTERVAL = 1000
 
 
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
-    """HIST: append `what` to hist_<id>.dat every `interval` steps."""
-    if what not in HISTORIES:
-        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join(HISTORIES)}")
+    """HIST: write `what` to hist_id_<id>.dat and hist_<id>.csv every `interval` steps. Collective.
+
+    what: one of output.HISTORIES, or of platens.OF_PARTS with the parts meant: ``gstress group a``, ``gstrain group
+    a|b``, ``ystress wall 3``, ``ystrain wall 0|3``; strains begin at 0 here.
+    """
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
+    sim.history_origins.pop(id, None)
+    name = what.split()[0] if what.split() else ""
+    if name in OF_PARTS:
+        origin = OF_PARTS[name].begin(sim, what)
+        if origin is not None:
+            sim.history_origins[id] = origin
+    elif what not in HISTORIES:
+        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join((*HISTORIES, *OF_PARTS))}")
     sim.history_wishes[id] = (interval, what)
 
 
@@ -24,17 +37,20 @@ def plot_hist(sim: Simulation, y: int, x: int) -> None:
     sim.plots.append((y, x))
 
 
-def draw(sim: Simulation, interval: int | None, what: list[str]) -> None:
+def draw(sim: Simulation, interval: int | None, what: list[str], off: Sequence[str] = ()) -> None:
     """DRAW: `draw_<step>.jpg` every `interval` steps (in an IMPLE from its start), if the run was started with --draw.
 
-    what: bfill ball wall bondc cforce bang bid mesh, by default filled particles and walls.
+    what: bfill bline ball wall bondc cforce bang bid mesh, by default filled particles and walls; off: words of these
+    that are not wanted.
 
     Scripts draw far more often than pictures are looked at, so without --draw it is noted in the log only.
     """
     if interval is not None and interval <= 0:
         raise CommandError(f"DRAW INTERVAL must be positive, got {interval}")
-    words = tuple(what) or ("bfill", "wall")
+    words = [*(what or ("bfill", "wall"))]
     # ZDEM draws particles as circles unless they are to be filled.
-    sim.drawing = (interval or DRAW_INTERVAL, words if "bfill" in words else ("ball", *words))
+    if "bline" in words or ("bfill" not in words and "bline" not in off):
+        words.append("ball")
+    sim.drawing = (interval or DRAW_INTERVAL, tuple(word for word in words if word not in (*off, "bline")))
     if not sim.draws and sim.log is not None:
         sim.log.info("DRAW: no pictures without the option --draw; zdem2jpg draws the frames of a finished run")

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem import limits
+from hpcdem.commands.frame_state import load_frame
 from hpcdem.commands.properties import chosen
 from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io.dat import is_frame
 from hpcdem.io.files import write_sections
 from hpcdem.pre import packing
 from hpcdem.pre.rows import row
@@ -32,10 +34,16 @@ def load(
     x: tuple[float, float] | None = None,
     y: tuple[float, float] | None = None,
 ) -> int:
-    """LOAD: a new model from rows "x y r [group]" [m]; returns the number of particles.
+    """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all that
+    it holds (commands/frame_state.py); returns the number of particles.
 
-    x, y: keep only centres in these ranges (of the file's numbers); then everything is multiplied by `scale`.
+    x, y: keep only centres in these ranges (of the file's numbers); then everything is multiplied by `scale`, which is
+    for rows.
     """
+    if sim.comm.bcast(is_frame(path) if sim.comm.rank == 0 else None):
+        if scale != 1.0:
+            raise CommandError(f"scale {scale:g} is for files of x y r; {path} is a frame, with stiffnesses and forces")
+        return load_frame(sim, path, x, y)
     rows, groups = sim.comm.bcast(_read_xyr(sim, Path(path)))
     keep = np.ones(len(rows), bool)
     for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
@@ -164,6 +172,7 @@ def gline(
     centres = row(p1, p2, rad, cratio)
     material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
     rows = np.column_stack([centres, np.full(len(centres), rad)])
+    sim.rows.append((sim.next_gid, sim.next_gid + len(rows)))
     return add(sim, rows, sim.group_number(group), color, material=sim.materials.row(**material))
 
 
@@ -223,6 +232,7 @@ def add(
     sim.open()
     first = sim.next_gid if first_gid is None else first_gid
     sim.next_gid = max(sim.next_gid, first + len(rows))
+    sim.note_maker(first)
     mine = slice(None) if sim.comm.rank == 0 else slice(0)
     count = len(rows[mine])
     if count:

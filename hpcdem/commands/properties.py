@@ -9,7 +9,7 @@ from hpcdem.fields import FIX_BITS
 from hpcdem.selection import Chain, Group, Selection, has_expressions
 from hpcdem.simulation import Simulation
 
-MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks")
+MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "xp", "yp")
 NOT_NEGATIVE = ("density", "fric", "shear", "damp", "kn", "ks")
 
 
@@ -50,6 +50,8 @@ def prop(
     hertz: bool = False,
     kn: float | None = None,
     ks: float | None = None,
+    xp: float | None = None,
+    yp: float | None = None,
     xv: float | None = None,
     yv: float | None = None,
     spin: float | None = None,
@@ -59,11 +61,15 @@ def prop(
     """Set properties of the particles in `where`; keys left out keep their values.
 
     SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving
-    kn or ks without it the linear one. Existing contacts use the new values from the next step. Velocities of a clump
-    are those of its centre; its members follow.
+    kn or ks without it the linear one. xp, yp [Pa] push each particle with pressure 2 R thickness (decision: the source
+    shows the words only; published scripts press the particles of a freed side wall with them).
+    Existing contacts use the new values from the next step. Velocities of a clump are those of its centre; its members
+    follow.
     """
     given = {
-        k: v for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks), strict=True) if v is not None
+        k: v
+        for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks, xp, yp), strict=True)
+        if v is not None
     }
     for name in NOT_NEGATIVE:
         if not given.get(name, 0.0) >= 0.0:
@@ -74,6 +80,12 @@ def prop(
         given["hertz"] = 1.0
     elif kn is not None or ks is not None:
         given["hertz"] = 0.0
+    if (xp or yp) and sim.log is not None:
+        sim.log.warn_once(
+            "pressure",
+            f"xp, yp: the force on each particle is pressure 2 R thickness, thickness {sim.settings.thickness:g} m "
+            "(SET thickness)",
+        )
     p = sim.particles
     which = chosen(sim, where)
     if given:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -12,6 +13,7 @@ import numpy as np
 from hpcdem import observe, output
 from hpcdem.budget import Budget
 from hpcdem.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.guards import NAMED
 from hpcdem.physics.dem.contacts import MODEL
 from hpcdem.physics.dem.laws import tangent_normal_stiffness
 from hpcdem.simulation import Simulation
@@ -23,6 +25,7 @@ NEAR = 0.5
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
 KINDS = ("print", "vtk", "ps", "save")
+LATE = "contacts that began late"
 
 
 def cycle(sim: Simulation, n: int) -> None:
@@ -79,6 +82,8 @@ def resume(sim: Simulation) -> None:
 def stop(sim: Simulation) -> None:
     """STOP: the end of the script; histories are closed."""
     output.finish(sim)
+    if sim.log is not None and sim.log.has_warned(LATE):
+        sim.log.info(f"in all, particles outran the contact search {sim.lattice.late} times in {sim.clock.step} steps")
 
 
 def _nearest(steps: float) -> int:
@@ -106,12 +111,46 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
 
 
 def _check_materials(sim: Simulation) -> None:
-    p = sim.particles
-    light = (sim.materials.rows["density"][p["material"]] <= 0.0) & (p["fix"] != 7)
+    p, rows = sim.particles, sim.materials.rows
+    if (sim.settings.energy > 0 or sim.energy is not None) and (rows["xp"].any() or rows["yp"].any()):
+        raise CommandError("the account of SET energy does not know the work of xp and yp; use one of them")
+    free = p["fix"] != 7
+    light = (rows["density"][p["material"]] <= 0.0) & free
     if sim.comm.any(bool(light.any())):
-        raise CommandError(
-            f"{sim.count(int(light.sum()))} particles that are free to move have no density (PROP density)"
+        raise CommandError(_described(sim, light, "that are free to move have no density (PROP density)"))
+    hertz = rows["hertz"] != 0.0
+    lawful = np.where(hertz, rows["shear"], rows["kn"]) > 0.0
+    in_use = sim.used(p["material"], sim.materials) & lawful
+    if not in_use.any():  # nobody has one: particles that fly through each other, which is meant
+        return
+    cure = "(PROP shear, poiss and hertz, or kn and ks, after the line that makes them)"
+    lawless = ~lawful[p["material"]]
+    if sim.comm.any(bool((lawless & free).any())):
+        raise CommandError(_described(sim, lawless & free, f"have no contact law, while others have {cure}"))
+    # Fixed ones may be out of reach; if not, Hertz particles have no common law with them.
+    if (in_use & hertz).any() and sim.comm.any(bool(lawless.any())):
+        text = _described(
+            sim, lawless, f"that are fixed have no contact law {cure}; a touch of Hertz particles is an error"
         )
+        if sim.log is not None:
+            sim.log.warn_once(f"lawless {text}", text)
+
+
+def _described(sim: Simulation, which: np.ndarray, what: str) -> str:
+    """``9 particles WHAT: 9 of group sed, made in line 7``, for the flagged owned particles (n_own,). Collective."""
+    p = sim.particles
+    firsts = np.array([first for first, _ in sim.makers], np.int64)
+    lines = np.array([0, *(line for _, line in sim.makers)], np.int64)
+    made_in = lines[np.searchsorted(firsts, p["gid"][which], side="right")]
+    total: Counter[tuple[int, int]] = Counter()
+    for part in sim.comm.allgather(dict(Counter(zip(p["group"][which].tolist(), made_in.tolist())))):
+        total.update(part)
+    parts = [
+        f"{number} of group {sim.groups[group]}{f', made in line {line}' if line else ''}"
+        for (group, line), number in sorted(total.items(), key=lambda item: (item[0][1], item[0][0]))
+    ]
+    more = f"; and {len(parts) - NAMED} more" if len(parts) > NAMED else ""
+    return f"{sum(total.values())} particles {what}: {'; '.join(parts[:NAMED])}{more}"
 
 
 def _check_laws(sim: Simulation) -> None:
@@ -181,21 +220,37 @@ def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str,
             f"{name} would leave the blocks behind that these particles touch: `pcdc model step` steps both"
         )
     prepare(sim)
+    start(sim, name, n, origin, intervals, final_frame)
+    _run(sim)
+
+
+def start(
+    sim: Simulation,
+    name: str,
+    steps: int | None,
+    origin: int,
+    intervals: dict[str, int],
+    final_frame: bool = False,
+    initial_frame: bool = True,
+) -> None:
+    """What every command that steps particles begins with: sim.progress, the account of energy, the `_ini` frame.
+    steps: None if their number is not known beforehand. The model is ready to step. Collective."""
     if sim.settings.energy > 0 and sim.energy is None:
         sim.energy = Budget()
+    first = sim.clock.step
     sim.progress = {
-        "name": name, "first": sim.clock.step, "last": sim.clock.step + n, "origin": origin,
+        "name": name, "first": first, "last": None if steps is None else first + steps, "origin": origin,
         "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
     }  # fmt: skip
     _warn_about_the_time_step(sim)
-    sim.last_frame = None  # the model may have been changed since, at the same step
-    output.Snapshot(sim, initial=True, waits=False).write_print()
+    if initial_frame:
+        sim.last_frame = None  # the model may have been changed since, at the same step
+        output.Snapshot(sim, initial=True, waits=False).write_print()
     if sim.energy is not None:
         new = sim.energy.start is None
         sim.energy.begin(sim)
         if new:
             output.write_energy(sim)
-    _run(sim)
 
 
 def _warn_about_the_time_step(sim: Simulation) -> None:
@@ -215,9 +270,14 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
         )
         if 0.5 * dt * highest > 1.0:
             sim.log.warn_once("unstable time step", f"{text}; beyond it the undamped step is unstable")
+        elif dt > critical and not sim.log.has_warned("critical time step"):
+            sim.log.warn_once(
+                "critical time step",
+                f"{text}. Beyond the estimate results may be noisy; if the run blows up, repeat it with a smaller one",
+            )
         else:
             sim.log.info(text)
-    if dt > critical:
+    elif dt > critical:
         sim.log.warn_once(
             "critical time step",
             f"the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
@@ -242,28 +302,77 @@ class Task:
         return min(regular, self.also) if self.also > step else regular
 
 
-def _tasks(sim: Simulation) -> list[Task]:
-    """What is due during the running command, checkpoints last, so that they know everything else was written."""
-    progress = sim.progress
-    assert progress is not None
-    origin, intervals = progress["origin"], progress["intervals"]
-    tasks: list[Task] = []
-    for ident, (every, _) in sorted(sim.history_wishes.items()):
-        tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
-    bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
-    tasks.append(Task(bar, progress["first"], partial(output.report, sim), also=progress["last"]))
-    shot = output.Snapshot
-    for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
-        if intervals[kind] > 0:
-            tasks.append(Task(intervals[kind], origin, write))
-    if sim.drawing is not None and sim.draws:
-        every, what = sim.drawing
-        tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))
-    if sim.energy is not None and sim.settings.energy > 0:
-        tasks.append(Task(sim.settings.energy, 0, partial(output.write_energy, sim)))
-    if intervals["save"] > 0:
-        tasks.append(Task(intervals["save"], origin, partial(output.write_checkpoint, sim)))
-    return tasks
+class Due:
+    """What is due while the running command (sim.progress) steps the particles; used by every loop that does.
+
+    checkpoint: writes one at the SET save intervals, last of all, so that it knows everything else was written; None:
+    somebody else does. at_reports: is called where rows of walls.csv are written.
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        checkpoint: Callable[[Simulation], object] | None = output.write_checkpoint,
+        at_reports: Callable[[], object] = lambda: None,
+    ) -> None:
+        self.sim, self._checkpoint, self._at_reports = sim, checkpoint, at_reports
+        self._bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
+        self._tasks = self._listed()
+        if sim.log is not None:
+            sim.log.set_interval(explicit=sim.settings.stepbar > 0)
+
+    def _listed(self) -> list[Task]:
+        sim, progress = self.sim, self.sim.progress
+        assert progress is not None
+        origin, intervals = progress["origin"], progress["intervals"]
+        tasks: list[Task] = []
+        for ident, (every, _) in sorted(sim.history_wishes.items()):
+            tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
+        last = -1 if progress["last"] is None else progress["last"]
+        tasks.append(Task(self._bar, progress["first"], self._report, also=last))
+        shot = output.Snapshot
+        for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
+            if intervals[kind] > 0:
+                tasks.append(Task(intervals[kind], origin, write))
+        if sim.drawing is not None and sim.draws:
+            every, what = sim.drawing
+            tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))
+        if sim.energy is not None and sim.settings.energy > 0:
+            tasks.append(Task(sim.settings.energy, 0, partial(output.write_energy, sim)))
+        if intervals["save"] > 0 and self._checkpoint is not None:
+            write_checkpoint = self._checkpoint
+            tasks.append(Task(intervals["save"], origin, lambda _: write_checkpoint(sim)))
+        return tasks
+
+    def _report(self, _: object = None) -> None:
+        output.report(self.sim)
+        self._at_reports()
+
+    def next(self) -> int:
+        """The next step at which something is due, or a function waits."""
+        step = self.sim.clock.step
+        return min(task.next_after(step) for task in [*self._tasks, *_calls(self.sim)])
+
+    def finish(self) -> None:
+        """At the end of a command of which the end was not known: the report that is due then. Collective."""
+        sim, progress = self.sim, self.sim.progress
+        assert progress is not None
+        step, first = sim.clock.step, progress["first"]
+        if progress["last"] is None and step > first and (step - first) % self._bar:
+            self._report()
+
+    def serve(self) -> None:
+        """Call the functions that wait for this step and write what is due at it. If one of them wants the command to
+        end here, progress["last"] is this step. Collective."""
+        sim, step = self.sim, self.sim.clock.step
+        assert sim.progress is not None
+        if _call_watchers(sim):
+            sim.progress["last"] = step
+            self._tasks = self._listed()
+        moment = output.Snapshot(sim, waits=False)
+        for task in self._tasks:
+            if task.next_after(step - 1) == step:
+                task.run(moment)
 
 
 def _run(sim: Simulation) -> None:
@@ -272,12 +381,13 @@ def _run(sim: Simulation) -> None:
     assert progress is not None
     last = progress["last"]
     if sim.log is not None:
-        sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step)
-    tasks = _tasks(sim)
+        before = sim.clock.step - progress["first"]
+        sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step, before)
+    due = Due(sim)
     clock, counted = sim.clock, sim.clock.step
     try:
         while clock.step < last:
-            event = min([last, *(task.next_after(clock.step) for task in [*tasks, *_calls(sim)])])
+            event = min(last, due.next())
             request = 0
             while clock.step < event:
                 request = sim.step()
@@ -285,13 +395,8 @@ def _run(sim: Simulation) -> None:
                     break
             sim.timers.count(clock.step - counted, len(sim.particles))
             counted = clock.step
-            if _call_watchers(sim):
-                last = progress["last"] = clock.step
-                tasks = _tasks(sim)
-            moment = output.Snapshot(sim, waits=False)
-            for task in tasks:
-                if task.next_after(clock.step - 1) == clock.step:
-                    task.run(moment)
+            due.serve()
+            last = progress["last"]
             if request:
                 _answer(sim, request)
     except PhysicsError:
@@ -308,7 +413,7 @@ def _run(sim: Simulation) -> None:
     if progress["final_frame"]:
         output.Snapshot(sim).write_print()
     output.settle(sim)
-    _warn_about_late_lists(sim, progress)
+    warn_about_late_lists(sim, progress)
 
 
 def _calls(sim: Simulation) -> list[Task]:
@@ -358,10 +463,12 @@ def _answer(sim: Simulation, request: int) -> None:
         sim.log.info(f"step {sim.clock.step}: checkpoint {path} written {why}")
 
 
-def _warn_about_late_lists(sim: Simulation, progress: dict) -> None:
+def warn_about_late_lists(sim: Simulation, progress: dict) -> None:
+    """At the end of a command that stepped. Only the first time; `stop` says how often it was in all."""
     late = sim.lattice.late - progress["late"]
     if late and sim.log is not None:
-        sim.log.warn(
+        sim.log.warn_once(
+            LATE,
             f"between steps {progress['first']} and {sim.clock.step} particles outran the contact search {late} times; "
-            "a contact may have begun a few steps late. A smaller time step avoids it"
+            "a contact may have begun a few steps late. A smaller time step avoids it. Later ones are counted only",
         )

@@ -16,5 +16,6 @@ def save(sim: Simulation, path: Path | str) -> None:
 def restore(sim: Simulation, path: Path | str) -> None:
     """RES: go on from a file written by SAV; the place in the present script stays."""
     saving.restore(sim, path)
+    sim.restored = Path(path), sim.clock.step
     if sim.energy is not None and sim.energy.running:
         sim.energy.pause(sim)  # the CYC in which the file was written is not taken up

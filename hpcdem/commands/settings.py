@@ -11,7 +11,7 @@ from hpcdem.physics.dem.mass import SPHERES
 from hpcdem.simulation import Simulation
 
 INTERVALS = ("stepbar", "save", "print", "ps", "vtk", "energy")
-POSITIVE = ("dt", "frac", "gentry")
+POSITIVE = ("dt", "frac", "gentry", "thickness")
 CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both")}
 
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from hpcdem import limits
 from hpcdem.errors import CommandError
-from hpcdem.model.walls import BOX_IDS
 from hpcdem.simulation import Simulation
 
 
@@ -28,6 +27,9 @@ def wall(
         raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
     if nodes is not None:
         limits.check_nodes(*nodes, name=f"wall {id}")
+        at_box = sim.walls.find(id)
+        if at_box is not None and sim.walls.side[at_box]:
+            raise CommandError(f"wall {id} is a side of BOX, which BOX alone can place; give this wall another id")
         forget(sim, sim.walls.find(id))
         sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
     at = sim.walls.row(id)
@@ -66,8 +68,8 @@ def box(
     for side, nodes in corners.items():
         limits.check_nodes(*nodes, name=f"the {side} side of the BOX")
     for side, (p1, p2) in corners.items():
-        forget(sim, sim.walls.find(BOX_IDS[side]))
-        _set(sim, sim.walls.put(BOX_IDS[side], p1, p2, one_sided=True), kn, ks, fric)
+        forget(sim, sim.walls.of_side(side))
+        _set(sim, sim.walls.put_side(side, p1, p2), kn, ks, fric)
 
 
 def forget(sim: Simulation, row: int | None) -> None:

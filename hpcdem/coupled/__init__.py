@@ -11,7 +11,7 @@ on as they were, new ones begin at its end, as contacts of new particles do.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +21,12 @@ from hpcdem import observe
 from hpcdem.blocks import Blocks, build
 from hpcdem.budget import EMPTIED
 from hpcdem.coupled import saving
-from hpcdem.coupled.links import Link, Touching
+from hpcdem.coupled.links import Link, Touching, face_frictions
 from hpcdem.errors import CommandError, PhysicsError
 from hpcdem.fields import GID, X, Y
 from hpcdem.physics import disc_faces
 from hpcdem.physics.dem import laws, motion
+from hpcdem.physics.dem.neighbours import NO_ROWS
 from hpcdem.physics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.simulation import Simulation
 
@@ -68,6 +69,7 @@ class Coupled:
         self._done = [0, 0]
         self._booked = 0
         self._stored_at_start: float | None = None
+        self._settled = 0.0, 0.0, 0.0
         self._law_key: Any = None
         blocks.open_model()
         blocks.surface_loads = self
@@ -90,7 +92,7 @@ class Coupled:
     def _step(self) -> int:
         """Advance both by one dt. Returns what the outside asked for (0: nothing), agreed by all ranks."""
         particles, blocks = self.particles, self.blocks
-        self.prepare()
+        self._close()
         books = self.accounted
         if books:
             self._book_discs(kick=True)
@@ -117,12 +119,18 @@ class Coupled:
         return request
 
     def prepare(self) -> None:
-        """Both models closed, one time step, contacts found: ready to step."""
+        """Both models closed, one time step, contacts found, with the laws of the present materials: ready to step."""
+        self._close()
+        if self._renew_laws():
+            self._replay()
+
+    def _close(self) -> None:
         self.particles.close()
         self.blocks.close_model()
         if self._link_holds() and not self._changed and self.particles.clock.dt == self.blocks.clock.dt:
             return
         self._check()
+        self.blocks.check_start()
         self._connect()
         self._link().refuse_discs_inside()
         self._replay()
@@ -130,13 +138,22 @@ class Coupled:
         if self._stored_at_start is None:
             self._stored_at_start = self._stored()
 
-    def _check(self) -> None:
-        """CommandError if the two cannot be stepped together."""
+    def _check_options(self) -> None:
+        """CommandError for options of the blocks that do not go with particles."""
         options = self.blocks.options
         if not options.dynamic:
             raise CommandError("particles move in time: blocks that are coupled to them need model option dynamic on")
         if options.auto:
             raise CommandError("blocks that are coupled to particles have one time step: time-step auto must be off")
+        if options.mass_scaling > 0.0:
+            raise CommandError(
+                "blocks that are coupled to particles keep their masses, which particles feel: time-step mass-scaling "
+                "must be 0"
+            )
+
+    def _check(self) -> None:
+        """CommandError if the two cannot be stepped together."""
+        self._check_options()
         one, other = self.particles.clock.dt, self.blocks.clock.dt
         if one != other:
             raise CommandError(
@@ -177,7 +194,7 @@ class Coupled:
         p, mesh, dt = particles.particles, blocks.the_mesh(), particles.clock.dt
         of_discs, of_blocks = np.zeros(4), np.zeros(4)
         with particles.timers("search"):
-            motion.survey(p.hot, p.n_left, p.n_own, link.origin, dt, of_discs)
+            motion.survey(p.hot, p.n_left, p.n_own, link.origin, dt, NO_ROWS, of_discs)
             build.survey(
                 blocks.x, blocks.v, link.corners, blocks.owned.start, len(link.corners), mesh.cells, blocks.number,
                 of_blocks,
@@ -240,15 +257,19 @@ class Coupled:
             "surface of an element; its stiffness is too small for this load, or the time step too large"
         )
 
-    def _renew_laws(self) -> None:
-        """The table of laws: element models by materials, see `law_table`."""
+    def _renew_laws(self) -> bool:
+        """The table of laws: kinds of faces by element models by materials, see `law_table`. Whether it is another
+        now."""
         rows, materials = self.blocks.element_rows, self.particles.materials.rows
-        key = len(rows), materials.tobytes()
-        if key != self._law_key:
-            self._laws = law_table(
-                np.array(rows.column("shear")), np.array(rows.column("poisson_ratio")), materials, self.friction
-            )
-            self._law_key = key
+        frictions = np.minimum(face_frictions(self.blocks), self.friction)
+        key = len(rows), frictions.tobytes(), materials.tobytes()
+        if key == self._law_key:
+            return False
+        self._laws = law_table(
+            np.array(rows.column("shear")), np.array(rows.column("poisson_ratio")), materials, frictions
+        )
+        self._law_key = key
+        return True
 
     # ---- called by the blocks ----------------------------------------------------------------------------------------
 
@@ -286,6 +307,7 @@ class Coupled:
         """Give both the same time step and return it [s]: `dt`; else what was said for one of them or for both alike
         (SET dt, model time-step); else `stable_time_step`. CommandError if they were told different ones."""
         particles, blocks = self.particles, self.blocks
+        self._check_options()
         said = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
         if dt <= 0.0 and len(set(said)) > 1:
             raise CommandError(
@@ -306,9 +328,29 @@ class Coupled:
             blocks.time_step(value=dt)
         blocks.close_model()
         self._changed = True
+        self._settled = self._said()
         if particles.log is not None:
             particles.log.info(f"particles and blocks: time step {dt:.4g} s, {dt / stable:.2f} of the stable one")
         return dt
+
+    def _said(self) -> tuple[float, float, float]:
+        settings = self.particles.settings
+        return settings.dt, settings.frac, self.blocks.options.dt
+
+    def heed_time_step(self, by_frac: Callable[[], float]) -> None:
+        """Settle the time step again if a command has said one, for particles or blocks, since that was done. by_frac:
+        what SET frac asks for [s], 0 without it. CommandError if the two were told different ones."""
+        if self._said() == self._settled:
+            return
+        (dt, _, value), (dt_before, _, value_before) = self._said(), self._settled
+        new = {one for one, before in ((dt, dt_before), (value, value_before)) if one > 0.0 and one != before}
+        if len(new) > 1:
+            raise CommandError(
+                f"the time steps differ: SET dt {dt:g} s of the particles, model time-step {value:g} s of the blocks"
+            )
+        if not new and value == value_before:  # SET frac: what was settled before counts no more
+            self.blocks.time_step(value=0.0)
+        self.settle_time_step(new.pop() if new else by_frac())
 
     def stable_time_step(self) -> float:
         """The time step [s] that is stable for the particles, the blocks and their contacts.
@@ -324,7 +366,7 @@ class Coupled:
         of_discs, of_blocks = observe.critical_dt(particles), local.critical_time_step()
         stiffness = np.zeros(1)
         used = np.flatnonzero(particles.used(p["material"], particles.materials))
-        table = self._laws.reshape(-1, len(particles.materials), 4)[1:, used].reshape(-1, 4)
+        table = self._laws.reshape(-1, len(particles.materials), 4)[1 : len(blocks.element_rows), used].reshape(-1, 4)
         radius = float(self.comm.max_into(np.array([p["radius"].max(initial=0.0)]))[0])
         for model, a, _, _ in table.tolist():
             stiffness[0] = max(stiffness[0], laws.tangent_normal_stiffness(model, a, 4.0 * radius, 0.01 * radius))
@@ -357,6 +399,33 @@ class Coupled:
         order = np.lexsort((face, gid))
         names = ("fn", "fs", "x", "y", "overlap", "energy")
         return {"id": gid[order], "face": face[order], **dict(zip(names, rows[order].T))}
+
+    def beyond_walls(self) -> list[tuple[int, int, float, float]]:
+        """Walls of the particles that cut an element, or BOX sides beyond which one is: their ids, the first such
+        element, and its first corner [m]. Collective."""
+        self.blocks.close_model()
+        walls, blocks = self.particles.walls, self.blocks
+        own = blocks.owned
+        number = blocks.number[own]
+        keep = blocks.alive[number]
+        number, x = number[keep], blocks.x[own][keep][:, :8]
+        # The first corner of a triangle stands twice, which makes its fourth edge one without length.
+        ends = np.stack([x.reshape(-1, 4, 2), np.roll(x.reshape(-1, 4, 2), -1, axis=1)], axis=2)
+        low, high = x.reshape(-1, 4, 2).min(axis=1), x.reshape(-1, 4, 2).max(axis=1)
+        found = []
+        box = walls.box()
+        sides = {} if box is None else {
+            "left": low[:, 0] < box[0], "right": high[:, 0] > box[1], "bottom": low[:, 1] < box[2],
+            "top": high[:, 1] > box[3],
+        }  # fmt: skip
+        for k in range(len(walls)):
+            wall = int(walls.id[k])
+            side = walls.side_of(k)
+            hit = sides[side] if side in sides else _cuts(ends, walls.p1[k], walls.p2[k])
+            first = int(number[hit].min(initial=np.iinfo(np.int64).max))
+            at = x[number == first][:1, :2]
+            found.append((wall, first, *(at[0].tolist() if len(at) else (0.0, 0.0))))
+        return [min(each) for each in zip(*self.comm.allgather(found)) if min(each)[1] < np.iinfo(np.int64).max]
 
     def force_on_blocks(self) -> tuple[float, float]:
         """Sum of the forces of all discs on the blocks [N]."""
@@ -469,6 +538,7 @@ class Coupled:
         self._bins[:] = 0
         self._law_key = None
         self._known, self._changed, self._asleep = known, True, False
+        self._settled = self._said()
 
     def release(self) -> None:
         """Part the two again; both may go on alone. Not collective."""
@@ -477,8 +547,21 @@ class Coupled:
         self.particles.coupled = False
 
 
-def law_table(shear: np.ndarray, poisson: np.ndarray, materials: np.ndarray, friction: float) -> np.ndarray:
-    """Laws of discs at faces, (element models * materials, 4) [MODEL, A, B, MU]; row 0 of the models is none.
+def _cuts(ends: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> np.ndarray:
+    """(n,) bool: elements, ends (n, 4, 2, 2) of their edges [m], of which an edge crosses the line from p1 to p2."""
+
+    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+        u, w = b - a, c - a
+        return u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]
+
+    a, b = ends[:, :, 0], ends[:, :, 1]
+    across = side(p1, p2, a) * side(p1, p2, b) < 0.0
+    return (across & (side(a, b, p1) * side(a, b, p2) < 0.0)).any(axis=1)
+
+
+def law_table(shear: np.ndarray, poisson: np.ndarray, materials: np.ndarray, frictions: np.ndarray) -> np.ndarray:
+    """Laws of discs at faces, (kinds of faces * element models * materials, 4) [MODEL, A, B, MU]; row 0 of the models
+    is none. frictions (kinds,): of the disc and of the face the smaller one counts.
 
     Linear discs: their own springs. Hertz discs: a sphere at a half-space of another material (Johnson 1985, ch. 4 and
     7), 1/E* = (1 - nu1)/(2 G1) + (1 - nu2)/(2 G2), F = 4/3 E* sqrt(R) U^1.5; 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,
@@ -487,11 +570,14 @@ def law_table(shear: np.ndarray, poisson: np.ndarray, materials: np.ndarray, fri
     table = np.zeros((len(shear), len(materials), 4))
     for e in range(1, len(shear)):
         for m, mat in enumerate(materials):
-            mu = min(float(mat["fric"]), friction)
+            mu = float(mat["fric"])
             if mat["hertz"]:
-                soft = (1.0 - mat["poiss"]) / (2.0 * mat["shear"]) + (1.0 - poisson[e]) / (2.0 * shear[e])
-                slack = (2.0 - mat["poiss"]) / mat["shear"] + (2.0 - poisson[e]) / shear[e]
+                with np.errstate(divide="ignore"):  # a modulus of zero: no force
+                    soft = (1.0 - mat["poiss"]) / (2.0 * mat["shear"]) + (1.0 - poisson[e]) / (2.0 * shear[e])
+                    slack = (2.0 - mat["poiss"]) / mat["shear"] + (2.0 - poisson[e]) / shear[e]
                 table[e, m] = laws.HERTZ, 2.0 / 3.0 / soft, 4.0 / slack, mu
             else:
                 table[e, m] = laws.LINEAR, mat["kn"], mat["ks"], mu
-    return table.reshape(-1, 4)
+    every = np.tile(table, (len(frictions), 1, 1, 1))
+    every[..., disc_faces.MU] = np.minimum(every[..., disc_faces.MU], frictions[:, None, None])
+    return every.reshape(-1, 4)

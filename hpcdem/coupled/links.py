@@ -61,6 +61,20 @@ class Touching:
         return every.take(keep)
 
 
+def face_frictions(blocks: Blocks) -> np.ndarray:
+    """Coefficients of friction of the kinds of faces (see `kinds`): inf, those of the contact models, of the joints."""
+    of = (np.tan(np.radians(rows.column("friction")[1:])) for rows in (blocks.face_rows, blocks.joint_rows))
+    return np.concatenate([[math.inf], *of])
+
+
+def kinds(blocks: Blocks, faces: np.ndarray) -> np.ndarray:
+    """Row of the table of laws for each face: that of the element model, plus the number of these for each kind of
+    face: without friction of its own, with a contact model, of what was a joint."""
+    model, joint = blocks.face_row[faces], blocks.joint_row[faces]
+    kind = np.where(model > 0, model, np.where(joint > 0, len(blocks.face_rows) - 1 + joint, 0))
+    return blocks.element_row[faces // 4] + len(blocks.element_rows) * kind
+
+
 class Link:
     """The contacts that can come about while discs and faces have not gone `room` [m] towards each other. Collective.
 
@@ -96,7 +110,7 @@ class Link:
         return self.comm.allgather(self._box())
 
     def _faces_near(self) -> tuple[np.ndarray, np.ndarray]:
-        """Free faces of all ranks in the box of this one: (n, 6) number, row of the element model, ends; and the rank
+        """Free faces of all ranks in the box of this one: (n, 6) number, row of the table of laws, ends; and the rank
         (n,) of each."""
         blocks = self.blocks
         own = blocks.owned
@@ -109,7 +123,7 @@ class Link:
         k2 = (k + 1) % corner_counts(cells)[i]
         x = blocks.x[own]
         ends = np.column_stack([x[i, 2 * k], x[i, 2 * k + 1], x[i, 2 * k2], x[i, 2 * k2 + 1]]).reshape(-1, 4)
-        table = np.column_stack([4 * number[i] + k, blocks.element_row[number[i]], ends]).reshape(-1, 6)
+        table = np.column_stack([4 * number[i] + k, kinds(blocks, 4 * number[i] + k), ends]).reshape(-1, 6)
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
         parts = [
             table[(high[:, 0] > left) & (low[:, 0] < right) & (high[:, 1] > bottom) & (low[:, 1] < top)]

@@ -37,8 +37,8 @@ def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
 
 
 def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
-    """Take the state of a file written by `save`; returns `extra`. Collective. CommandError if the file is missing,
-    foreign or damaged; both models are then as they were."""
+    """Take the state of a file written by `save`, progress of the particles included; returns `extra`. Collective.
+    CommandError if the file is missing, foreign or damaged; both models are then as they were."""
     state, tables = of_blocks.read(both.comm, path, KIND, "particles and blocks together")
     of_the_discs = None
     if tables is not None:
@@ -51,5 +51,6 @@ def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
         tables = of_blocks.without_particles(tables)
     of_blocks.put(both.blocks, state, tables)
     of_particles.apply_state(both.particles, state["particles"], of_the_discs)
+    both.particles.progress = state["particles"]["progress"]
     both.end_restore(state["coupled"], known)
     return state["extra"]

@@ -129,16 +129,17 @@ def owner_of(cx: np.ndarray, borders: np.ndarray) -> np.ndarray:
     return np.searchsorted(borders[1:-1], cx, side="right")
 
 
-def separate(borders: np.ndarray) -> np.ndarray:
-    """The nearest borders that leave every rank at least one column."""
-    steps = np.arange(len(borders))
+def separate(borders: np.ndarray, least: int = 1) -> np.ndarray:
+    """The nearest borders that leave every rank at least so many columns."""
+    steps = least * np.arange(len(borders))
     return np.maximum.accumulate(borders - steps) + steps
 
 
-def cut(weights: np.ndarray, first: int, ranks: int) -> np.ndarray:
-    """Borders that share out columns first, first + 1, ... of given cost as evenly as whole columns allow.
+def cut(weights: np.ndarray, first: int, ranks: int, least: int = 1) -> np.ndarray:
+    """Borders that share out columns first, first + 1, ... of given cost as evenly as whole columns allow, at least
+    `least` to each rank.
 
-    weights (columns,) f8. Returns (ranks + 1,) i8; with fewer columns than ranks the last ranks own empty columns.
+    weights (columns,) f8. Returns (ranks + 1,) i8; with too few columns the last ranks own empty ones.
     """
     columns = len(weights)
     total = np.concatenate(([0.0], np.cumsum(weights)))
@@ -147,8 +148,8 @@ def cut(weights: np.ndarray, first: int, ranks: int) -> np.ndarray:
     # Of the two borders around a goal take the nearer one.
     below = np.maximum(at - 1, 0)
     at = np.where(goals - total[below] < total[np.minimum(at, columns)] - goals, below, at)
-    borders = separate(np.concatenate(([0], at, [max(columns, ranks)])).astype(np.int64))
-    # Push back from the right end, so that the last ranks keep a column each.
-    room = borders[-1] if columns < ranks else columns
-    borders = np.minimum(borders, room - np.arange(ranks, -1, -1))
+    borders = separate(np.concatenate(([0], at, [max(columns, ranks * least)])).astype(np.int64), least)
+    # Push back from the right end, so that the last ranks keep theirs.
+    room = borders[-1] if columns < ranks * least else columns
+    borders = np.minimum(borders, room - least * np.arange(ranks, -1, -1))
     return borders + first

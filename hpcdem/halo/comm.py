@@ -68,6 +68,12 @@ class SerialComm:
         """Hand part p to rank p; returns what each rank handed to this one, in rank order. Rows stay whole."""
         return list(parts)
 
+    def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """Collective: hand parcels (n,) i8 to the ranks they are for (not to oneself); returns what came, by sender, in
+        order of ranks. Costs messages for these parcels only, however many ranks there are."""
+        assert not parcels, "there is no other rank"
+        return {}
+
     def agree(self, error: str | None) -> None:
         """Collective: raise HpcdemError on every rank if any rank hands in a message (the lowest rank's is used)."""
         if error is not None:
@@ -78,6 +84,8 @@ class SerialComm:
         raise SystemExit(code)
 
 
+PARCELS = 21
+"""Tag of messages of `exchange`; every other call uses the next one."""
 NAP = 2e-5
 """Sleep between two questions on a crowded host [s]; the kernel adds some 50 us."""
 
@@ -89,10 +97,13 @@ class MpiComm(SerialComm):
         from mpi4py import MPI
 
         self._wait_all, self._test_all = MPI.Request.Waitall, MPI.Request.Testall
+        self.start_all = MPI.Prequest.Startall
+        """Start the persistent requests of a list."""
         self.mpi = mpi
         self.rank = mpi.Get_rank()
         self.size = mpi.Get_size()
         self.crowded = _more_ranks_than_cores(mpi)
+        self._exchanges = 0
 
     def wait(self, *requests: Any) -> None:
         """Until all these requests are done."""
@@ -184,6 +195,31 @@ class MpiComm(SerialComm):
         finally:
             row.Free()
         return np.split(recv, np.cumsum(into)[:-1])
+
+    def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """Nobody knows who sends to it. So a rank takes what comes until its own parcels have been received, enters a
+        barrier that does not block, and goes on taking until all are there: then nothing is on its way any more
+        (Hoefler, Siebert & Lumsdaine 2010, NBX). A rank may be a call ahead of another, hence two tags in turn."""
+        from mpi4py import MPI
+
+        mpi, tag, status = self.mpi, PARCELS + self._exchanges % 2, MPI.Status()
+        self._exchanges += 1
+        sent = [mpi.Issend([parcel, MPI.INT64_T], to, tag) for to, parcel in parcels.items()]
+        arrived: dict[int, np.ndarray] = {}
+        all_received: Any = None
+        while True:
+            message = mpi.Improbe(MPI.ANY_SOURCE, tag, status)
+            if message is not None:
+                parcel = np.empty(status.Get_count(MPI.INT64_T), np.int64)
+                message.Recv([parcel, MPI.INT64_T])
+                arrived[status.Get_source()] = parcel
+            elif all_received is None:
+                if self._test_all(sent):
+                    all_received = mpi.Ibarrier()
+            elif all_received.Test():
+                return dict(sorted(arrived.items()))
+            elif self.crowded:
+                time.sleep(NAP)
 
     def agree(self, error: str | None) -> None:
         if not self.any(error is not None):

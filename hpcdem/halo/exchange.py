@@ -45,7 +45,6 @@ class Halo:
             return
         from mpi4py import MPI
 
-        self._start_all = MPI.Prequest.Startall
         self.left = comm.rank - 1 if comm.rank > 0 else MPI.PROC_NULL
         self.right = comm.rank + 1 if comm.rank + 1 < comm.size else MPI.PROC_NULL
         counts = np.zeros(2, np.int64)
@@ -99,7 +98,7 @@ class Halo:
     def start(self) -> None:
         """Begin to renew the ghosts. Until `finish` the rows of `border` must not change, ghosts must not be read."""
         if self.requests:
-            self._start_all(self.requests)
+            self.comm.start_all(self.requests)
 
     def finish(self) -> None:
         """Ghosts carry the owners' state of the moment of `start`; nothing comes out."""
@@ -114,7 +113,7 @@ class Halo:
     def refresh_more(self) -> None:
         """The ghost rows of the second array get the present ones of their owners."""
         if self.more:
-            self._start_all(self.more)
+            self.comm.start_all(self.more)
             self.comm.wait_all(self.more)
 
     def close(self) -> None:
@@ -129,17 +128,18 @@ def _bytes(rows: np.ndarray) -> np.ndarray:
 
 
 def connect(
-    comm: Any, hot: np.ndarray, order: np.ndarray, cell: np.ndarray, borders: np.ndarray, threads: int
+    comm: Any, hot: np.ndarray, order: np.ndarray, cell: np.ndarray, borders: np.ndarray, threads: int, columns: int = 1
 ) -> tuple[np.ndarray, Halo]:
     """Storage with ghosts for the owned rows hot[order] (n, w), and the halo that keeps it fresh.
 
-    cell (n,) i8: cells of the owned particles in this order, ascending.
+    cell (n,) i8: cells of the owned particles in this order, ascending; columns: how many of each neighbour are copied.
+    Every rank but the first and the last has at least as many.
     """
     first = last = 0
     if comm.rank > 0:
-        first = int(np.searchsorted(cell, (int(borders[comm.rank]) + 1) * COLUMN - COLUMN // 2))
+        first = int(np.searchsorted(cell, (int(borders[comm.rank]) + columns) * COLUMN - COLUMN // 2))
     if comm.rank + 1 < comm.size:
-        last = len(cell) - int(np.searchsorted(cell, (int(borders[comm.rank + 1]) - 1) * COLUMN - COLUMN // 2))
+        last = len(cell) - int(np.searchsorted(cell, (int(borders[comm.rank + 1]) - columns) * COLUMN - COLUMN // 2))
     halo = Halo(comm, len(order), first, last)
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)

@@ -41,11 +41,12 @@ class Ownership:
         busy: float,
         room: tuple[float, float] | None,
         cost: np.ndarray | float = 1.0,
+        least: int = 1,
     ) -> None:
         """Choose borders for particles (or elements) in columns cx (n,) i8 of this rank. Collective.
 
         busy: seconds of own work of this rank so far; room: x range [m] in which particles may be, if known; cost:
-        (n,), if it is known that some are dearer than others.
+        (n,), if it is known that some cost more than others; least: columns of a rank.
         UsageError when a new model has fewer columns than there are ranks. One that lost them on its way, or was
         restored so, goes on with ranks that wait.
         """
@@ -56,6 +57,8 @@ class Ownership:
         if not first_time and self.side != side:
             self.borders = strips.separate(np.rint(self.borders * (self.side / side)).astype(np.int64))
         self.side = side
+        if least > 1 and not first_time:
+            self.borders = strips.separate(self.borders, least)
         weight = cost
         if not (self.wanted or first_time):
             found = self._uneven(float(np.sum(np.broadcast_to(cost, len(cx)))), step, busy)
@@ -70,7 +73,7 @@ class Ownership:
         total = np.zeros(min(columns, MOST_COLUMNS))
         np.add.at(total, np.minimum(cx - first, len(total) - 1), weight)
         self.comm.sum_into(total)
-        self.borders = strips.cut(self.comm.bcast(total), first, self.comm.size)
+        self.borders = strips.cut(self.comm.bcast(total), first, self.comm.size, least)
         self.wanted = False
         self._busy, self._step = busy, step
 
@@ -81,11 +84,13 @@ class Ownership:
         """
         if not self.balance_on or step - self._step < balance.PATIENCE:
             return None
-        measured = np.array(self.comm.allgather((busy - self._busy, owned)))
+        mine = busy - self._busy
+        total = self.comm.bcast(self.comm.sum_into(np.array([mine, owned])))  # the same on all ranks, to the last bit
+        largest = float(self.comm.max_into(np.array([mine]))[0])
         self._busy, self._step = busy, step
-        if balance.imbalance(measured[:, 0]) < balance.TOLERANCE:
+        if balance.imbalance(largest, float(total[0]) / self.comm.size) < balance.TOLERANCE:
             return None
-        return float(balance.cost_per_particle(measured[:, 0], measured[:, 1])[self.comm.rank])
+        return balance.cost_per_particle(mine, owned, float(total[0]), float(total[1]))
 
     def _span(self, cx: np.ndarray) -> tuple[int, int]:
         """First occupied column and number of columns to the last one, over all ranks; (0, 0) without particles."""

@@ -12,6 +12,8 @@ from hpcdem.io.frame import Frame
 
 UNITS = ((1000.0, 1000.0, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (0.0, 0.001, "mm"))
 """Smallest longer side [m], length of the unit [m], its name."""
+MOST = 12.0
+"""Steps along an axis at most."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,9 @@ class View:
     def ticks(self, major: float | None = None, minor: float | None = None) -> tuple[Ticks, Ticks]:
         """The ticks of the x and the y axis.
 
-        Both go in the same steps, three to eight of them along the longer side; the other axis takes smaller steps
-        where it would have a single number. major, minor: steps [m] that are wanted instead, on both axes.
+        Both go in the same steps, three to eight of them along the longer side; up to MOST where the other axis would
+        have a single number. Only an axis that would have none takes steps of its own. major, minor: steps [m] that are
+        wanted instead, on both axes.
         """
         size = self.unit[0]
         sides = (self.left / size, self.right / size), (self.bottom / size, self.top / size)
@@ -64,7 +67,9 @@ class View:
             return x, y
         longer = max(self.width, self.height) / size
         common = next(step for step in _round_steps(longer) if longer / step <= 7.0)
-        x, y = (_ticks(low, high, common) for low, high in sides)
+        finer = [step for step in _round_steps(longer) if step <= common and longer / step <= MOST]
+        common = max((s for s in finer if min(len(_multiples(*side, s)) for side in sides) > 1), default=common)
+        x, y = (_ticks(*side, common) for side in sides)
         if minor is not None:
             x, y = (Ticks(t.major, _multiples(*side, minor / size)) for t, side in zip((x, y), sides))
         return x, y
@@ -126,7 +131,7 @@ def _round_steps(length: float) -> Iterator[float]:
 
 
 def _ticks(low: float, high: float, major: float) -> Ticks:
-    if len(_multiples(low, high, major)) < 2:
+    if not _multiples(low, high, major):
         major = max((s for s in _round_steps(high - low) if len(_multiples(low, high, s)) >= 2), default=major)
     minor = major / {"1": 10.0, "2": 4.0, "5": 5.0}[f"{major:e}"[0]]
     return Ticks(_multiples(low, high, major), _multiples(low, high, minor))

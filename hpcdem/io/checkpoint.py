@@ -13,6 +13,7 @@ A file of an earlier version of this layout is read by all later programs; one o
 | 2 | `crc` |
 | 3 | each word is mixed with its place before it is added up, so that rows that changed places are noticed too |
 | 4 | the seal; tables `clumps` and `clump_members`, where there are clumps |
+| 5 | ids 100 to 103 and a column `side` of BOX; pressures of materials, `rubber`; fast particles, rows of GLINE |
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to
 
 FORMAT = "hpcdem checkpoint"
-VERSION = 4
+VERSION = 5
 
 BLOCKS, BOTH = "blocks", "coupled"
 """`kind` in the state: a model of blocks, one of particles and blocks; particles alone have none."""
@@ -142,6 +143,25 @@ def _seal(path: str | os.PathLike, names: Sequence[str]) -> None:
     seal.put(path, rows)
 
 
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def _refuse_other_formats(path: str | os.PathLike) -> None:
+    """HpcdemError for a file that is not HDF5 at all; a .sav of ZDEM most likely."""
+    try:
+        with open(path, "rb") as file:
+            start = file.read(len(HDF5))
+    except OSError:
+        return  # `reading` says why
+    if start != HDF5:
+        raise HpcdemError(
+            f"{os.fspath(path)} is not an hpcdem checkpoint. If ZDEM wrote it: its .sav files are in a format of its "
+            "own, which only ZDEM reads. Begin with LOAD instead: of a frame all_<step>.dat of that run (particles and "
+            "their velocities and properties, walls, bonds as far as it has them), or of what EXP of ZDEM writes (x y "
+            "r). Or make the .sav with hpcdem"
+        )
+
+
 @contextmanager
 def _opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any], dict[str, int], Callable]]:
     """The open file, its state, the checksums of its datasets, and the function that makes them."""
@@ -151,6 +171,7 @@ def _opened(path: str | os.PathLike) -> Iterator[tuple[Any, dict[str, Any], dict
         raise HpcdemError(f"{os.fspath(path)} is damaged: {problem}") from None
     except OSError:
         sealed = False  # `reading` says why it cannot be opened
+    _refuse_other_formats(path)
     with reading(path) as file:
         try:
             if file.attrs.get("format") != FORMAT:

@@ -9,7 +9,7 @@ from typing import Any
 from hpcdem.io.disk import explain, publish, remove
 
 
-def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: int | None, comm: Any) -> None:
+def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: float | None, comm: Any) -> None:
     """Collective. Add rows to the file.
 
     since: None to append; at the first call of a run the step it starts from: what the file has after that step is cut
@@ -21,13 +21,13 @@ def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: in
             if since is not None:
                 _cut(path, header, since)
             with open(path, "a", encoding="utf-8") as file:
-                file.write("\n".join(rows) + "\n")
+                file.writelines(f"{row}\n" for row in rows)
         except OSError as problem:
             error = explain(path, problem)
     comm.agree(error)
 
 
-def _cut(path: str | os.PathLike, header: str, since: int) -> None:
+def _cut(path: str | os.PathLike, header: str, since: float) -> None:
     """Keep the rows up to a step. The last row may be a piece, as a full disk leaves it, and a piece of a number is a
     smaller number."""
     kept = [header]

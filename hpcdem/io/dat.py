@@ -1,17 +1,18 @@
 """Frames as the text files ``all_<step>.dat`` of ZDEM, written and read.
 
-The layout is that of ZDEM 2.2 as far as a public file of that version (`data/all_0000007000.dat` in the GitHub
-repository Phoenix0531-sudo/ZDEM_Area_Conservation) and the public readers show it: the same section lines, table
-headers, order of sections, and the same column names where a quantity is the same. What differs or is worth
+The layout is that of ZDEM 2.2 as a public file of that version shows it (`data/all_0000007000.dat` in the GitHub
+repository Phoenix0531-sudo/ZDEM_Area_Conservation): the same section lines, tables and order of columns. What is worth
 knowing:
 
-- Columns of ZDEM that hpcdem has no quantity for are left out; columns of hpcdem follow at the end of a row.
+- Columns of ZDEM that hpcdem has no quantity for (``safe_dist name fixp1 fixp2 bst``, ``spin`` of walls) are 0 or
+  ``***``; columns of hpcdem follow at the end of a row. Frames of earlier versions of hpcdem, which left the former
+  out, are read as well: columns are found by their names.
+- ``n_bond s_bond`` are the forces at which a bond breaks in tension and in shear without normal force.
 - ``globalFx globalFy`` is the force of particle id1 on id2, and of the particle on the wall, as in ZDEM; in a Frame
   (and in VTKHDF) fx, fy is the force on id1, the opposite.
 - ``wall contact data`` stands before ``ball data``: a public reader takes every line after the last table for bonds.
-- The third ball table has ten columns, no more: the same reader takes column 10 of a longer row for a group name.
-- x and y have 13 significant digits, all else 9. Each table ends with one blank line; header words need not stand
-  over their columns, since some headers must begin with fixed text.
+- x and y have 13 significant digits, what follows from other columns 6, all else 9. Each table ends with one blank
+  line; header words need not stand over their columns, since some headers must begin with fixed text.
 """
 
 from __future__ import annotations
@@ -49,10 +50,10 @@ def write_dat(path: str | os.PathLike, frame: Frame, comm: Any, later: Deliverie
 
     Columns a table does not have are written as nan (numbers) or 0 (flags, colours). Raises HpcdemError on all ranks.
     """
-    write_sections(path, comm, lambda: _sections(frame, comm), later)
+    write_sections(path, comm, lambda: _sections(frame, comm, os.path.basename(path)), later)
 
 
-def _sections(frame: Frame, comm: Any) -> list[Section]:
+def _sections(frame: Frame, comm: Any, file: str) -> list[Section]:
     walls, particles = frame.walls, frame.tables["particles"]
     n_walls = len(walls["id"])
     index = np.arange(n_walls)
@@ -67,12 +68,20 @@ def _sections(frame: Frame, comm: Any) -> list[Section]:
         "xv": walls["v"][:, 0],
         "yv": walls["v"][:, 1],
     }
+    nothing = np.zeros(n_walls, dtype=np.int64)
 
     def wall_columns(floats: Mapping[str, np.ndarray], digits: int) -> list[tuple[Column, np.ndarray]]:
         columns = [(Column("index", INT, 10), index[mine]), (Column("id", INT, 11), walls["id"][mine])]
         return columns + [(sci(name, digits), np.asarray(v, dtype=float)[mine]) for name, v in floats.items()]
 
-    wall_state_columns = [*wall_columns(wall_state, 9), (Column("color", INT, 6), walls["color"][mine])]
+    wall_place_columns = [
+        *wall_columns(wall_words, 13),
+        (Column("safe_dist", INT, 11), nothing[mine]),
+        (Column("name", WORD, 11), nothing[mine]),
+    ]
+    ends_fixed = [(Column(name, INT, 6), nothing[mine]) for name in ("fixp1", "fixp2")]
+    wall_state_columns = [*wall_columns(wall_state, 9), *ends_fixed, (Column("color", INT, 6), walls["color"][mine])]
+    wall_state_columns.append((Column("spin", INT, 6), nothing[mine]))
 
     get = _getter(particles)
     rows = particles.offset + np.arange(len(particles))
@@ -88,6 +97,7 @@ def _sections(frame: Frame, comm: Any) -> list[Section]:
         (Column("fix_y", INT, 7), fix >> 1 & 1),
         (Column("fix_w", INT, 7), fix >> 2 & 1),
         (Column("hertz", INT, 7), get("hertz", int)),
+        (Column("safe_dis", INT, 11), np.zeros(len(particles), dtype=np.int64)),
     ]
     words = {"m": "mass", "fric": "fric", "damp": "damp", "kn": "kn", "ks": "ks", "poiss": "poiss", "shear": "shear"}
     names = ["_".join(name.split()) or "***" for name in frame.group_names] or ["***"]
@@ -99,15 +109,19 @@ def _sections(frame: Frame, comm: Any) -> list[Section]:
         (group, get("group", int)),
     ]
     words = {"V[0]": "vx", "V[1]": "vy", "spin": "spin", "Fx": "fx", "Fy": "fy", "M": "torque"}
-    words |= {"angle": "angle", "density": "density"}
     ball_motion = [*ids, *[(sci(word), get(name)) for word, name in words.items()]]
+    none = np.zeros(len(particles))
+    for word, name in _PUSH_WORDS.items():
+        ball_motion.append((sci(word), get(name) if name in particles.columns else none))
+    ball_motion += [(Column("bst", INT, 6), none.astype(np.int64)), (sci("density"), get("density"))]
+    ball_motion.append((sci("angle"), get("angle")))
 
     get = _getter(frame.tables["wall_contacts"])
     wall_row = get("wall", int)
     wall_contact = [
         (Column("wall_id", INT, 10), np.asarray(walls["id"])[wall_row] if n_walls else wall_row),
         (Column("ball_id", INT, 11), get("id1", int)),
-        *_link_columns(get),
+        *_link_columns(get, ("x", "y", "Un")),
     ]
 
     def table(
@@ -116,37 +130,57 @@ def _sections(frame: Frame, comm: Any) -> list[Section]:
         columns = _wide_enough(columns, comm)
         return [_header([c for c, _ in columns], head), TextTable(columns, words or ()), b"\n"]
 
-    sections: list[Section] = [_parameters(frame), f"wall data ...\nwall num : {n_walls}\n".encode()]
-    sections += table(wall_columns(wall_words, 13), WALL_HEAD)
+    sections: list[Section] = [_parameters(frame, file), f"wall data ...\nwall num : {n_walls}\n".encode()]
+    sections += table(wall_place_columns, WALL_HEAD, ["***"])
     sections += table(wall_state_columns, WALL_FORCE_HEAD)
     sections += [b"wall contact data ...\n", *table(wall_contact)]
     sections += [f"ball data ...\nball num : {particles.total}\n".encode(), *table(ball, BALL_HEAD)]
     sections += table(ball_data, BALL_DATA_HEAD, names)
     sections += table(ball_motion)
-    for name in ("contacts", "bonds"):
-        get = _getter(frame.tables[name])
+    for links in ("contacts", "bonds"):
+        get = _getter(frame.tables[links])
         columns = [(Column("id1", INT, 10), get("id1", int)), (Column("id2", INT, 11), get("id2", int))]
-        columns += _link_columns(get)
-        if name == "bonds":
+        if links == "bonds":
+            columns += _link_columns(get, ("x", "y"), "Un")
+            columns[-2:-2] = [
+                (Column("rubber", INT, 8), get("rubber", int)),
+                (Column("type", INT, 6), get("kind", int)),
+            ]
             columns += [(Column("kind", INT, 6), get("kind", int))]
             columns += [(sci(w), get(c)) for w, c in _BOND_WORDS.items()]
-        sections += [f"{name[:-1]} data ...\n".encode(), *table(columns, LINK_HEAD)]
+        else:
+            columns += _link_columns(get, ("x", "y"), "Un")
+        sections += [f"{links[:-1]} data ...\n".encode(), *table(columns, LINK_HEAD)]
     return sections
 
 
 _BOND_WORDS = {"ebmod": "ebmod", "gbmod": "gbmod", "tstr": "tstrength", "sstr": "sstrength"}
 
 
-def _link_columns(get: Callable[..., np.ndarray]) -> list[tuple[Column, np.ndarray]]:
+_PUSH_WORDS = {"applyFx": "push_x", "applyFy": "push_y"}
+_LAW_WORDS = {"kn": "law_kn", "ks": "law_ks", "n_bond": "law_tension", "s_bond": "law_shear", "frci": "law_fric"}
+_REAL_WORDS = {"realkn": "law_realkn", "realks": "law_realks"}
+
+
+def _link_columns(
+    get: Callable[..., np.ndarray], own: tuple[str, ...], overlap: str = ""
+) -> list[tuple[Column, np.ndarray]]:
+    """ZDEM's columns of contacts, with that of the overlap where there is one, then `own` at the end."""
     values = {"Fn": get("fn"), "Fs": get("fs"), "globalFx": 0.0 - get("fx"), "globalFy": 0.0 - get("fy")}
-    values |= {"x": get("x"), "y": get("y"), "Un": get("overlap")}
-    return [(sci(word), v) for word, v in values.items()]
+    columns = [(sci(word), v) for word, v in values.items()]
+    columns += [(sci(word, 6), get(name)) for word, name in _LAW_WORDS.items()]
+    columns.append((Column("slip", INT, 6), get("law_slip", int)))
+    columns += [(sci(overlap), get("overlap"))] if overlap else []
+    columns += [(sci(word, 6), get(name)) for word, name in _REAL_WORDS.items()]
+    return columns + [(sci(word), get("overlap" if word == "Un" else word)) for word in own]
 
 
 def _getter(table: Table) -> Callable[..., np.ndarray]:
     def get(name: str, kind: type = float) -> np.ndarray:
         if name in table.columns:
             return table.columns[name].astype(np.int64 if kind is int else np.float64, copy=False)
+        if name.startswith("law_") and kind is float:
+            return np.zeros(len(table))
         return np.full(len(table), np.nan) if kind is float else np.zeros(len(table), dtype=np.int64)
 
     return get
@@ -171,15 +205,26 @@ def _header(columns: list[Column], head: str) -> bytes:
     return line.encode() + b"\n"
 
 
-def _parameters(frame: Frame) -> bytes:
-    values: dict[str, Any] = {"program": "hpcdem", "current_step": int(frame.step), "current_time": float(frame.time)}
-    values |= {"dt": float(frame.dt), "ball_num": frame.tables["particles"].total}
-    values |= {name: frame.settings.get(name, np.nan) for name in _SETTINGS}
-    lines = ["parameter data ..."]
-    for name, value in values.items():
-        text = str(value) if isinstance(value, (str, int)) else format_floats(np.array([value]), 13)[0]
-        lines.append(f"{name}: {text}")
+def _parameters(frame: Frame, file: str) -> bytes:
+    def words(*values: Any) -> str:
+        return " ".join(
+            str(v).rjust(20) if isinstance(v, (str, int)) else format_floats(np.array([v]), 13)[0].rjust(20)
+            for v in values
+        )
+
+    setting = {name: frame.settings.get(name, np.nan) for name in _SETTINGS}
+    values = {name: words(setting[name]) for name in ("right", "left", "height", "bottom")}
+    values |= {"dt": words(float(frame.dt)), "gravity": words(setting["gx"], setting["gy"])}
+    values |= {"frac": words(setting["frac"]), "disk": words(_SHAPES.get(str(setting["disk"]), str(setting["disk"])))}
+    values |= {"damp LSM": words(setting["lsm"]), "current_step": words(int(frame.step))}
+    head = ["version    : 2.2(hpcdem)", f"filename   : {file}", "", "parameter data ..."]
+    lines = [*head, *(f"{key:>18} : {value}" for key, value in values.items())]
+    # Not in ZDEM's; a public reader takes the number of particles from the second.
+    lines += [f"current_time: {words(float(frame.time)).strip()}", f"ball_num: {frame.tables['particles'].total}"]
     return ("\n".join(lines) + "\n\n").encode()
+
+
+_SHAPES = {"off": "off=ball", "on": "on=disk", "hex": "hex=hexagon"}
 
 
 # --- reading ---------------------------------------------------------------------------------------------------
@@ -208,9 +253,9 @@ _BALL_WORDS = {
     "M": "torque",
     "angle": "angle",
     "density": "density",
-}
+} | _PUSH_WORDS
 _LINK_WORDS = {"Fn": "fn", "Fs": "fs", "globalFx": "fx", "globalFy": "fy", "x": "x", "y": "y", "Un": "overlap"}
-_LINK_WORDS |= {"kind": "kind"} | _BOND_WORDS
+_LINK_WORDS |= {"kind": "kind", "rubber": "rubber"} | _BOND_WORDS
 _TYPES = {
     "gid": np.int64,
     "id1": np.int64,
@@ -220,10 +265,20 @@ _TYPES = {
     "group": np.int32,
     "hertz": np.int8,
     "kind": np.int8,
+    "rubber": np.int8,
     "fix": np.uint8,
 }
 
 _RawTable = dict[str, np.ndarray]
+
+
+def is_frame(path: str | os.PathLike) -> bool:
+    """Whether a text file is a frame of ZDEM or hpcdem, by its first lines; False if it cannot be read. Serial."""
+    try:
+        with open(path, "rb") as file:
+            return b"parameter data ..." in file.read(4096)
+    except (OSError, ValueError):
+        return False
 
 
 def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:
@@ -250,7 +305,7 @@ def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> 
         columns = {
             "particles": particles,
             "contacts": _links(raw.get("contact data", [])),
-            "bonds": _links(raw.get("bond data", [])),
+            "bonds": _links(raw.get("bond data", []), forces=True),
             "wall_contacts": _wall_contacts(raw.get("wall contact data", []), walls["id"]),
         }
         frame = _frame(parameters, walls, groups, columns)
@@ -403,6 +458,9 @@ def _particles(raw: list[_RawTable]) -> tuple[_RawTable, list[str]]:
             columns["fix"] = fix[rows].astype(np.uint8)
         if "group" in table:
             names = table["group"][rows]
+    push = [columns.pop(name) for name in _PUSH_WORDS.values() if name in columns]
+    if any(values.any() for values in push):  # nearly always zero, and then as if they were not there
+        columns |= dict(zip(_PUSH_WORDS.values(), push))
     unique, first, inverse = np.unique(names, return_index=True, return_inverse=True)
     rank = np.empty(len(unique), dtype=np.int32)
     by_appearance = np.argsort(first)
@@ -411,12 +469,15 @@ def _particles(raw: list[_RawTable]) -> tuple[_RawTable, list[str]]:
     return columns, [bytes(unique[k]).decode("utf-8", "replace") for k in by_appearance]
 
 
-def _links(raw: list[_RawTable]) -> _RawTable:
+def _links(raw: list[_RawTable], forces: bool = False) -> _RawTable:
+    """Pairs in order; forces: with the strengths of bonds as ZDEM writes them."""
     if not raw:
         return {}
     table = raw[0]
     order = np.lexsort((table["id2"], table["id1"]))
     columns = {name: table[name][order].astype(np.int64) for name in ("id1", "id2")}
+    if forces and "kind" not in table:  # in frames of hpcdem they follow from its own columns
+        columns |= {word: table[word][order] for word in ("n_bond", "s_bond") if word in table}
     return columns | _link_values(table, order)
 
 
@@ -425,6 +486,9 @@ def _wall_contacts(raw: list[_RawTable], wall_ids: np.ndarray) -> _RawTable:
         return {}
     table = raw[0]
     rows = {int(i): k for k, i in enumerate(wall_ids)}
+    unknown = [int(i) for i in table["wall_id"] if int(i) not in rows]
+    if unknown:
+        raise ValueError(f"a wall contact names wall {unknown[0]}, which is not among the walls")
     wall = np.array([rows[int(i)] for i in table["wall_id"]], dtype=np.int32)
     order = np.lexsort((wall, table["ball_id"]))
     columns: _RawTable = {"id1": table["ball_id"][order].astype(np.int64), "wall": wall[order]}

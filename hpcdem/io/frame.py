@@ -29,7 +29,8 @@ class Frame:
     """All that is written at one output time.
 
     tables: "particles", "contacts", "bonds", "wall_contacts"; walls: columns of the wall table (BOX walls first,
-    ids -1..-4); settings: left, right, bottom, height, gx, gy, disk, frac, lsm. SI units throughout.
+    ids fields.BOX_IDS, in this order); settings: left, right, bottom, height, gx, gy, disk, frac, lsm. SI units
+    throughout.
     """
 
     step: int

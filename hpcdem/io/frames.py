@@ -10,6 +10,7 @@ from pathlib import Path
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io.frame import Frame
+from hpcdem.io.run_record import Record, is_earlier_frame, read
 
 FORMATS = ("vtkhdf", "dat")
 """Formats that can be read, the preferred one first."""
@@ -34,17 +35,14 @@ def frame_name(step: int, suffix: str, ini: bool = False, stem: str = "all") -> 
 
 def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
     """The frames in a folder in the order of time: by step, the `_ini` one after the other of the same step, since it
-    shows what was done between two commands.
+    shows what was done between two commands. Those that an earlier run has left there, as run.json tells, do not count;
+    `left_out` says which.
 
     Where a frame is there in several formats, the first of FORMATS is taken. Raises HpcdemError if the folder
     cannot be read.
     """
-    try:
-        names = os.listdir(folder)
-    except OSError as failure:
-        raise HpcdemError(f"cannot read the folder {os.fspath(folder)}: {failure.strerror}") from None
     best: dict[tuple[int, bool], tuple[int, str]] = {}
-    for name in sorted(names):
+    for name in _names(folder)[0]:
         found = _NAME.fullmatch(name)
         if found and found[3] in FORMATS:
             key = int(found[1]), found[2] is not None
@@ -54,15 +52,12 @@ def list_frames(folder: str | os.PathLike) -> list[FrameFile]:
 
 def list_mesh_frames(folder: str | os.PathLike, stem: str | None = None) -> list[FrameFile]:
     """The frames of blocks in a folder, `<stem>_<step>.vtkhdf`, in the order of steps; without a stem those of the name
-    that most of them have. Raises HpcdemError if the folder cannot be read, or has none of this name."""
+    that most of them have. Those of an earlier run do not count, as in `list_frames`. Raises HpcdemError if the folder
+    cannot be read, or has none of this name."""
     from hpcdem.io.vtkhdf_mesh import is_mesh_frame
 
-    try:
-        names = os.listdir(folder)
-    except OSError as failure:
-        raise HpcdemError(f"cannot read the folder {os.fspath(folder)}: {failure.strerror}") from None
     found: dict[str, list[FrameFile]] = {}
-    for name in sorted(names):
+    for name in _names(folder)[0]:
         parts = _MESH_NAME.fullmatch(name)
         if parts and (stem is None or parts[1] == stem) and is_mesh_frame(Path(folder) / name):
             found.setdefault(parts[1], []).append(FrameFile(Path(folder) / name, int(parts[2]), False))
@@ -70,6 +65,46 @@ def list_mesh_frames(folder: str | os.PathLike, stem: str | None = None) -> list
         raise HpcdemError(f"no frame {stem}_*.vtkhdf of blocks in {os.fspath(folder)}")
     most = max(found, key=lambda name: len(found[name]), default=None)
     return sorted(found[most], key=lambda file: file.step) if most is not None else []
+
+
+def left_out(folder: str | os.PathLike) -> str:
+    """What is to be said about frames that an earlier run has left in a folder; "" if there are none. Raises
+    HpcdemError if the folder cannot be read."""
+    earlier = _names(folder)[1]
+    if not earlier:
+        return ""
+    steps = sorted(int(name.partition(".")[0].removesuffix("_ini").rpartition("_")[2]) for name in earlier)
+    which = f"of step {steps[0]}" if steps[0] == steps[-1] else f"of steps {steps[0]} to {steps[-1]}"
+    count = len({name.rpartition(".")[0] for name in earlier})
+    return (
+        f"{count} frame{'s' if count > 1 else ''} {which} in {os.fspath(folder)} were left by an earlier run, "
+        "and do not count; copy the frames that are wanted together into a folder of their own"
+    )
+
+
+def earlier_stems(folder: str | os.PathLike) -> frozenset[str]:
+    """Names, without suffix, of frames that an earlier run has left in a folder, and this one not written again. Raises
+    HpcdemError if the folder cannot be read."""
+    names, earlier = _names(folder)
+    return frozenset(Path(name).stem for name in earlier) - {
+        Path(name).stem for name in names if name.endswith(FORMATS)
+    }
+
+
+def _names(folder: str | os.PathLike) -> tuple[list[str], list[str]]:
+    """Sorted names of the files in a folder without the frames of an earlier run, and these."""
+    try:
+        names = sorted(os.listdir(folder))
+    except OSError as failure:
+        raise HpcdemError(f"cannot read the folder {os.fspath(folder)}: {failure.strerror}") from None
+    record: Record | None = None
+    try:
+        record = read(Path(folder))
+    except HpcdemError:
+        pass  # `hpcdem info` tells that run.json is damaged; all frames count then
+    earlier = [name for name in names if is_earlier_frame(Path(folder) / name, record)]
+    gone = set(earlier)
+    return [name for name in names if name not in gone], earlier
 
 
 def read_frame(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:

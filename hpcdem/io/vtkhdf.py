@@ -79,7 +79,7 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any, later: Delive
         out.whole("VTKHDF/FieldData/step", np.array([frame.step], dtype=np.int64))
 
         numbers = {"format": 1, "step": frame.step, "time": float(frame.time), "dt": float(frame.dt)}
-        columns = {f"{name}_columns": " ".join(frame.tables[name].columns) for name in ("contacts", "bonds")}
+        columns = {f"{name}_columns": " ".join(_kept(frame.tables[name])) for name in ("contacts", "bonds")}
         out.group("hpcdem", numbers | {"contacts": n_contacts, "bonds": n_bonds} | _ascii(columns))
         out.group("hpcdem/settings", _ascii(frame.settings))
         names = [name.encode() for name in frame.group_names]
@@ -89,8 +89,13 @@ def write_vtkhdf(path: str | os.PathLike, frame: Frame, comm: Any, later: Delive
             out.whole(f"hpcdem/walls/{name}", values)
         out.group("hpcdem/wall_contacts")
         table = frame.tables["wall_contacts"]
-        for name, values in table.columns.items():
+        for name, values in _kept(table).items():
             out.slabs(f"hpcdem/wall_contacts/{name}", values, table.offset, table.total)
+
+
+def _kept(table: Table) -> dict[str, np.ndarray]:
+    """The columns without those that follow from others and are for the text of ZDEM's frames."""
+    return {name: values for name, values in table.columns.items() if not name.startswith("law_")}
 
 
 def _ascii(attributes: Mapping[str, Any]) -> dict[str, Any]:
@@ -136,7 +141,7 @@ def _cell_data(particles: Table, contacts: Table, bonds: Table, bonded: np.ndarr
         "link": [np.full(size, kind, dtype=np.int8) for size, kind in zip(sizes, (PARTICLE, CONTACT, BOND))],
         "bonded": [np.zeros(sizes[0], np.int8), bonded.astype(np.int8), np.ones(sizes[2], np.int8)],
     }
-    for name in dict.fromkeys((*contacts.columns, *bonds.columns)):
+    for name in dict.fromkeys((*_kept(contacts), *_kept(bonds))):
         dtype = next(t.columns[name].dtype for t in (contacts, bonds) if name in t.columns)
         fill = np.nan if dtype.kind == "f" else _FILL_INT.get(name, 0)
         data[_LINK_NAMES.get(name, name)] = [np.full(sizes[0], fill, dtype=dtype)] + [

@@ -21,8 +21,8 @@ _PYTHON_LINE = re.compile(
 
 
 def kind(source: bytes | str, file: str = "script") -> str:
-    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python) or "python" (Python that imports something; in a
-    file *.sc it is a PCDC script that leaves its commands to others).
+    """ "zdem" (ZDEM commands), "pcdc" (``pcdc`` commands among Python, and whatever stands in a file *.sc) or "python"
+    (Python that imports something).
 
     ScriptError, with the line that gave it away, for what is none of these. That a script is of a kind does not mean
     that it is correct.
@@ -32,12 +32,14 @@ def kind(source: bytes | str, file: str = "script") -> str:
     if source.startswith(_UTF_16):
         raise ScriptError(file, 1, "the file is UTF-16 text; save it as UTF-8")
     source = source.removeprefix(b"\xef\xbb\xbf")
+    firsts = _first_words(source)
+    if firsts and file.lower().endswith(".sc"):
+        return "pcdc"
     tree, trouble = _python(source)
     if tree is not None and any(isinstance(node, (ast.Import, ast.ImportFrom)) for node in ast.walk(tree)):
-        return "pcdc" if file.lower().endswith(".sc") else "python"  # PCDC may leave all commands to functions
+        return "python"
     if _PCDC_LINE.search(source):
         return "pcdc"
-    firsts = _first_words(source)
     if not firsts:
         raise ScriptError(file, 1, "there is no command in the script")
     commands = sum(ZDEM.command(word) is not None for _, word in firsts)

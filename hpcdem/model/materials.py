@@ -20,13 +20,19 @@ MATERIAL = np.dtype(
         ("kn", "f8"),
         ("ks", "f8"),
         ("hertz", "f8"),
+        ("xp", "f8"),
+        ("yp", "f8"),
     ]
 )
 """Density [kg/m^3, or kg/m^2 for disks], friction, shear modulus [Pa], Poisson's ratio, local damping, linear normal
-and shear stiffness [N/m], 1 for the Hertz-Mindlin law."""
+and shear stiffness [N/m], 1 for the Hertz-Mindlin law, pressure along x and y [Pa]. New columns are added at the end:
+older checkpoints have the first ones."""
 
-BOND_TYPE = np.dtype([("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8")])
-"""Kind (laws.ELASTIC_BOND, laws.CONTACT_BOND), moduli [Pa], strengths [Pa; N for contact bonds]. Row 0: no bond."""
+BOND_TYPE = np.dtype(
+    [("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8"), ("rubber", "f8")]
+)
+"""Kind (laws.ELASTIC_BOND, laws.CONTACT_BOND), moduli [Pa], strengths [Pa; N for contact bonds], 1 for bonds of a
+membrane (a mark, without mechanics). Row 0: no bond."""
 
 MOST_ROWS = 4096
 
@@ -48,6 +54,13 @@ class PropertyTable:
     def as_floats(self) -> np.ndarray:
         """The table as (n, columns) f8 for the kernels."""
         return self.rows.view(np.float64).reshape(len(self.rows), -1).copy()
+
+    def take_floats(self, rows: np.ndarray) -> None:
+        """Inverse of `as_floats`; columns that a table of an earlier version does not have are 0."""
+        taken = np.zeros(len(rows), self.rows.dtype)
+        for name, column in zip(self.rows.dtype.names or (), rows.T):
+            taken[name] = column
+        self.rows = taken
 
     def row(self, **values: float) -> int:
         """Number of the row with these values (others zero), made if need be."""

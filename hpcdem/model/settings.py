@@ -8,7 +8,7 @@ from dataclasses import dataclass
 @dataclass
 class Settings:
     """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
-    attempts of GEN per particle asked for, 0 while not set."""
+    attempts of GEN per particle asked for, 0 while not set. thickness: of the model, for pressures and stresses."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -25,3 +25,4 @@ class Settings:
     seed: int = 5
     wallside: str = "both"
     gentry: float = 0.0
+    thickness: float = 1.0

@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.errors import CommandError
+from hpcdem.fields import BOX_IDS
 
-BOX_IDS = {"left": -1, "right": -2, "bottom": -3, "top": -4}
+OLD_SIDES = ("left", "right", "bottom", "top")
+"""The walls with ids -1 to -4 in checkpoints that know no column `side`."""
+
+_SIDES = f"{min(BOX_IDS.values())} to {max(BOX_IDS.values())}"
 
 
 class Walls:
-    """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool.
+    """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool;
+    side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS.
 
     A wall keeps its place in the table for good (contact histories refer to it).
     """
@@ -21,10 +26,11 @@ class Walls:
         self.kn, self.ks, self.fric = np.empty(0), np.empty(0), np.empty(0)
         self.color = np.empty(0, np.int64)
         self.one_sided = np.empty(0, bool)
+        self.side = np.empty(0, np.int64)
         self.travel = np.empty((0, 2))
         """Way of each wall since the contact lists were built [m]."""
 
-    COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "travel")
+    COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel")
 
     def __len__(self) -> int:
         return len(self.id)
@@ -38,7 +44,7 @@ class Walls:
         """Row of the wall with this id; CommandError if there is none."""
         at = self.find(wall_id)
         if at is None:
-            known = ", ".join(str(i) for i in self.id if i >= 0) or "none"
+            known = ", ".join(map(str, self.id[self.side == 0])) or "none"
             raise CommandError(f"there is no wall with id {wall_id} (walls so far: {known})")
         return at
 
@@ -56,6 +62,49 @@ class Walls:
             getattr(self, name)[at] = 0
         self.id[at], self.p1[at], self.p2[at], self.one_sided[at] = wall_id, p1, p2, one_sided
         return at
+
+    def put_side(self, side: str, p1: tuple[float, float], p2: tuple[float, float]) -> int:
+        """Make a wall of BOX, or give it new end points and default properties; returns its row. CommandError where its
+        id is taken."""
+        at, wanted = self.of_side(side), BOX_IDS[side]
+        if at is None and self.find(wanted) is not None:
+            raise CommandError(
+                f"BOX makes the walls {_SIDES}, and there is a wall {wanted} already; give it another id"
+            )
+        at = self.put(wanted if at is None else int(self.id[at]), p1, p2, one_sided=True)
+        self.side[at] = 1 + list(BOX_IDS).index(side)
+        return at
+
+    def side_of(self, row: int) -> str:
+        """The side of BOX that a wall is, "" for others."""
+        return ["", *BOX_IDS][int(self.side[row])]
+
+    def of_side(self, side: str) -> int | None:
+        """Row of a wall of BOX, or None."""
+        at = np.flatnonzero(self.side == 1 + list(BOX_IDS).index(side))
+        return int(at[0]) if len(at) else None
+
+    def ids_of_earlier_versions(self) -> np.ndarray:
+        """The ids (n,), those of BOX as they were: fingerprints of states stay comparable."""
+        ids = self.id.copy()
+        for number, side in enumerate(OLD_SIDES, 1):
+            ids[self.side == 1 + list(BOX_IDS).index(side)] = -number
+        return ids
+
+    def take_columns(self, columns: dict[str, list]) -> None:
+        """All walls from lists by name. In those of earlier versions BOX has the ids -1 to -4: it gets its present ones
+        unless another wall has them."""
+        n = len(columns["id"])
+        for name in self.COLUMNS:
+            like = getattr(self, name)
+            values = columns.get(name, np.zeros((n, *like.shape[1:])))
+            setattr(self, name, np.array(values, dtype=like.dtype).reshape(n, *like.shape[1:]))
+        if "side" not in columns:
+            free = not np.isin(self.id, list(BOX_IDS.values())).any()
+            for number, side in enumerate(OLD_SIDES, 1):
+                at = self.id == -number
+                self.side[at] = 1 + list(BOX_IDS).index(side)
+                self.id[at] = BOX_IDS[side] if free else -number
 
     def table(self) -> np.ndarray:
         """(n, 8) f8 for the kernels, see physics.dem.walls."""
@@ -76,13 +125,12 @@ class Walls:
 
     def box(self) -> tuple[float, float, float, float] | None:
         """(left, right, bottom, top) of the BOX, or None."""
-        if self.find(BOX_IDS["left"]) is None:
+        left, right, bottom, top = (self.of_side(side) for side in OLD_SIDES)
+        if left is None or right is None or bottom is None or top is None:
             return None
-        bottom, top = self.row(BOX_IDS["bottom"]), self.row(BOX_IDS["top"])
-        left, right = self.row(BOX_IDS["left"]), self.row(BOX_IDS["right"])
         return self.p1[left, 0], self.p1[right, 0], self.p1[bottom, 1], self.p1[top, 1]
 
     def in_output_order(self) -> np.ndarray:
-        """Rows with the BOX first (left, right, bottom, top), then by making."""
-        sides = np.flatnonzero(self.id < 0)
-        return np.concatenate([sides[np.argsort(-self.id[sides])], np.flatnonzero(self.id >= 0)])
+        """Rows with the BOX first (in the order of BOX_IDS), then by making."""
+        sides = np.flatnonzero(self.side)
+        return np.concatenate([sides[np.argsort(self.side[sides])], np.flatnonzero(self.side == 0)])

@@ -27,3 +27,17 @@ def uniform(seed, stream, counter):
     z = _mix(np.uint64(seed) * _GOLDEN + np.uint64(stream))
     z = _mix(z + (np.uint64(counter) + np.uint64(1)) * _GOLDEN)
     return float(z >> _S11) * (1.0 / 9007199254740992.0)
+
+
+def uniforms(seed: int, stream: int, counters: np.ndarray) -> np.ndarray:
+    """The same as an array, for an array of counters."""
+
+    def mix(z: np.ndarray) -> np.ndarray:
+        z = (z ^ (z >> _S30)) * _M1
+        z = (z ^ (z >> _S27)) * _M2
+        return z ^ (z >> _S31)
+
+    with np.errstate(over="ignore"):
+        z = mix(np.array([seed], np.uint64) * _GOLDEN + np.uint64(stream))
+        z = mix(z + (np.asarray(counters).astype(np.uint64) + np.uint64(1)) * _GOLDEN)
+    return (z >> _S11).astype(np.float64) * (1.0 / 9007199254740992.0)

@@ -132,7 +132,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         x = left + (width + gap) * (number if beside else 0)
         y = bottom + (0 if beside else (down - 1 - number) * (height + top + 0.3 * gap))
         axes = figure.add_axes((x / page[0], y / page[1], width / page[0], height / page[1]))
-        _frame(axes, seen, looks, first=number == 0 or not beside, last=beside or number == down - 1)
+        frame(axes, seen, looks, first=number == 0 or not beside, last=beside or number == down - 1)
         if panel == CRACKS:
             cracks(axes, state, looks.font, width / seen.width)
         else:
@@ -154,11 +154,11 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
 
 def panel(axes: Any, state: MeshState, seen: View, width: float, looks: Looks = USUAL) -> list[Any]:
     """The cracks of a model in axes that are so wide [cm]; returns what a legend is made of."""
-    _frame(axes, seen, looks, first=True, last=True)
+    frame(axes, seen, looks, first=True, last=True)
     return _cracks(axes, state, width / seen.width)
 
 
-def _frame(axes: Any, seen: View, looks: Looks, first: bool, last: bool) -> None:
+def frame(axes: Any, seen: View, looks: Looks, first: bool, last: bool) -> None:
     size, unit = seen.unit
     axes.set(xlim=(seen.left, seen.right), ylim=(seen.bottom, seen.top), aspect="equal")
     for axis, ticks, name, shown in zip((axes.xaxis, axes.yaxis), seen.ticks(), "xy", (last, first), strict=True):
@@ -199,12 +199,12 @@ def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
                 PolyCollection(corners, facecolors=colour[rows], edgecolors=edges, linewidths=0.25, zorder=1),
                 autolim=False,
             )
-    width = _line_width(state, scale)
+    width = line_width(state, scale)
     at = state.points[state.joints]
     joint_state, mode = state.of_joints.get("state", np.empty(0)), state.of_joints.get("mode", np.empty(0))
     handles: list[Any] = []
     for rows, shade, part, word in _kinds(joint_state, mode):
-        _lines(axes, at[rows], shade, part * width)
+        lines(axes, at[rows], shade, part * width)
         handles.insert(0, Line2D([], [], color=shade, linewidth=max(part * width, 0.9), label=word))
     return handles
 
@@ -231,7 +231,7 @@ def _group_colours(state: MeshState) -> np.ndarray:
     return colour
 
 
-def _line_width(state: MeshState, scale: float) -> float:
+def line_width(state: MeshState, scale: float) -> float:
     """Points: a seventh of an edge on paper, within what can be seen."""
     return float(np.clip(_edge(state) * scale * CM * 72.0 / 7.0, 0.5, 1.6))
 
@@ -244,7 +244,7 @@ def _edge(state: MeshState) -> float:
     return float(np.median(np.hypot(*(b - a).T)))
 
 
-def _lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
+def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
     from matplotlib.collections import LineCollection
 
     axes.add_collection(
@@ -269,7 +269,7 @@ def stress(axes: Any, state: MeshState, span: tuple[float, float]) -> Any:
     filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap="YlOrBr", extend="both", zorder=1)
     joints = state.of_joints.get("state", np.empty(0))
     broken = (joints == BROKEN) | (joints == FREE)
-    _lines(axes, state.points[state.joints[broken]], INK, 0.5)
+    lines(axes, state.points[state.joints[broken]], INK, 0.5)
     return filled
 
 

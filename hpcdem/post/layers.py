@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.fields import sides_of_box
 from hpcdem.io import colours
 from hpcdem.io.frame import Frame
 
@@ -60,7 +61,7 @@ def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:
         for limit in limits:
             near = 1e-6 * (limits[1] - limits[0])
             on_edge = (np.abs(p1[:, axis] - limit) < near) & (np.abs(p2[:, axis] - limit) < near)
-            shown &= ~(on_edge & (np.asarray(frame.walls["id"]) < 0))
+            shown &= ~(on_edge & np.isin(frame.walls["id"], [*sides_of_box(frame.walls["id"])]))
     if shown.any():
         shades = look.palette[colours.numbers(frame.walls["color"])]
         _lines(ax, p1[shown], p2[shown], shades[shown], look.line)

@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +23,18 @@ _EXACT = 160
 _RIMS = 0.0, 0.35, 0.65
 
 
-def pages(folder: str | os.PathLike) -> list[Path]:
+def pages(folder: str | os.PathLike, without: Collection[str] = ()) -> list[Path]:
     """The numbered pictures *.jpg of a folder in the order of time, as `frames.list_frames`; the most frequent
-    kind where there are several. Raises HpcdemError where there is none."""
+    kind where there are several. without: names of frames whose pictures do not count. Raises HpcdemError where there
+    is none."""
     try:
         names = sorted(os.listdir(folder))
     except OSError as failure:
         raise HpcdemError(f"cannot read the folder {os.fspath(folder)}: {failure.strerror}") from None
     kinds: dict[tuple[str, str], list[tuple[int, bool, str]]] = {}
     for name in names:
-        if found := _PAGE.fullmatch(name):
+        found = _PAGE.fullmatch(name)
+        if found and f"{found[1]}{found[2]}{found[3] or ''}" not in without:
             kinds.setdefault((found[1], found[4]), []).append((int(found[2]), found[3] is not None, name))
     if not kinds:
         raise HpcdemError(f"no pictures <name><step>.jpg in {os.fspath(folder)}: make them with zdemss first")

@@ -26,7 +26,7 @@ TALLEST = 22.0 / 17.0
 FONT = 9.0
 _MARGINS = 0.9 * CM, 0.45 * CM, 1.15 * CM, 0.35 * CM  # left (without numbers), right, bottom, top of the axes
 _DIGIT = 0.2 * CM
-FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
+FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
 SIDES = ("left", "right", "bottom", "top")
 MODEL = ("bfill", "wall")
 """The usual picture: filled particles and walls."""
@@ -60,9 +60,9 @@ class Style:
         """The ticks along both axes. Raises UsageError for more than anyone can read."""
         major, minor = self.major, self.minor
         if self.usual_ticks and major is None and MAJOR <= max(seen.width, seen.height) <= _LARGE:
-            both = seen.ticks(MAJOR, MINOR if minor is None else minor)
-            alone = seen.ticks(None, minor)
-            x, y = (a if len(a.major) > 1 else b for a, b in zip(both, alone))
+            x, y = seen.ticks(MAJOR, MINOR if minor is None else minor)
+            if min(len(x.major), len(y.major)) < 2:
+                x, y = seen.ticks(None, minor)
         else:
             x, y = seen.ticks(major, minor)
         if max(len(ticks.major) + len(ticks.minor) for ticks in (x, y)) > _MOST_TICKS:
@@ -71,6 +71,18 @@ class Style:
 
 
 USUAL_STYLE = Style()
+SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
+"""Settings of matplotlib while a file is written: texts stay texts, and an SVG's ids are the same every time."""
+
+
+def saving(kind: str) -> dict[str, Any]:
+    """Options of `savefig` for jpg, png, tiff, pdf, svg or eps: the same figure gives the same file."""
+    if kind == "jpg":
+        return {"pil_kwargs": {"quality": 92, "subsampling": 0}}  # thin coloured layers need their full colour
+    if kind == "tiff":
+        return {"pil_kwargs": {"compression": "tiff_lzw"}}
+    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
+    return {"metadata": metadata[kind]} if kind in metadata else {}
 
 
 def seen_of(frame: Frame, style: Style) -> View:
@@ -166,10 +178,10 @@ def plot_frame(
     frame: Frame, path: str | os.PathLike, dpi: float = 300.0, what: Sequence[str] = MODEL,
     style: Style = USUAL_STYLE, seen: View | None = None,
 ) -> Path:  # fmt: skip
-    """Write the picture of a whole frame: JPG, PNG, PDF or SVG by the suffix of `path`.
+    """Write the picture of a whole frame: JPG, PNG, TIFF, PDF or SVG by the suffix of `path`.
 
-    what: words of `layers.LAYERS`; dpi: dots per inch of JPG and PNG; the figure is 17 cm wide unless `style` says
-    otherwise. Serial. Raises HpcdemError.
+    what: words of `layers.LAYERS`; dpi: dots per inch of JPG, PNG and TIFF; the figure is 17 cm wide unless
+    `style` says otherwise. Serial. Raises HpcdemError.
     """
     path = Path(path)
     if path.suffix.lower() not in FORMATS:
@@ -180,17 +192,12 @@ def plot_frame(
         raise HpcdemError(f"cannot draw {path}: matplotlib is not installed") from None
     figure = frame_figure(frame, what, style, seen)
     kind = path.suffix.lower().removeprefix(".")
-    if kind in ("jpg", "jpeg", "png") and max(figure.get_size_inches()) * dpi >= 2**16:  # the most a JPEG can have
+    kind = {"jpeg": "jpg", "tif": "tiff"}.get(kind, kind)
+    if kind in ("jpg", "png", "tiff") and max(figure.get_size_inches()) * dpi >= 2**16:  # the most a JPEG can have
         raise HpcdemError(f"cannot draw {path}: more than 65535 pixels along a side; take a smaller page or dpi")
-    options: dict[str, Any] = {}
-    if kind in ("jpg", "jpeg"):
-        options["pil_kwargs"] = {"quality": 92, "subsampling": 0}  # thin coloured layers need their full colour
-    elif kind in ("pdf", "svg"):
-        options["metadata"] = {"CreationDate": None} if kind == "pdf" else {"Date": None}  # same frame, same file
-    # A text in a PDF or SVG stays text; the salt makes an SVG's ids the same every time.
-    with matplotlib.rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}):
+    with matplotlib.rc_context(SAVED):
         with atomic_path(path) as temporary:
-            figure.savefig(temporary, format=kind, dpi=dpi, **options)
+            figure.savefig(temporary, format=kind, dpi=dpi, **saving(kind))
     return path
 
 

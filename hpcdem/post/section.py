@@ -16,6 +16,7 @@ import numpy as np
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
+from hpcdem.post import grid as grids
 
 UNITS = {
     "volumetric": "%",
@@ -41,7 +42,8 @@ VERSION = 1
 class Section:
     """One frame. name: of its file, without suffix; size: grid spacing [m]; x (nx,), y (ny,): nodes [m]; fields: by
     UNITS, each (ny, nx); particles: by PARTICLE_FIELDS, each (n,), in the order of ids; surface (m, 2): line over the
-    top [m]; walls: id, p1, p2, color."""
+    top [m]; walls: id, p1, p2, color; smooth: whether strains are means around each node, or those of the nearest
+    particle; average: length over which means are taken [m], 0: `size`."""
 
     name: str
     step: int
@@ -53,6 +55,26 @@ class Section:
     particles: dict[str, np.ndarray]
     surface: np.ndarray
     walls: dict[str, np.ndarray] = field(default_factory=dict)
+    smooth: bool = True
+    average: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.average = self.average or self.size
+
+    def mean_strain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x (nx,), y (ny,) [m] and the distortional strain (ny, nx), the mean of the particles nearer than `average` to
+        nodes as far apart: without the scatter from particle to particle."""
+        if self.smooth:
+            return self.x, self.y, self.fields["distortional"]
+        p = self.particles
+        known = np.isfinite(p["distortional"])
+        x, y, strain = (p[name][known] for name in ("x", "y", "distortional"))
+        if not len(x):
+            return self.x, self.y, self.fields["distortional"]
+        grid = grids.cover(self.average, x, y, p["radius"][known])
+        total = grids.sums(grid, x, y, {"strain": strain}, 1.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return grid.x, grid.y, total["strain"] / total["number"]
 
     @property
     def initial(self) -> bool:
@@ -69,7 +91,7 @@ def write_section(section: Section, path: str | os.PathLike) -> Path:
         "step": np.int64(section.step),
     }
     arrays |= {"time": np.float64(section.time), "size": np.float64(section.size), "x": section.x, "y": section.y}
-    arrays |= {"surface": section.surface}
+    arrays |= {"surface": section.surface, "smooth": np.bool_(section.smooth), "average": np.float64(section.average)}
     arrays |= {f"field_{name}": values for name, values in section.fields.items()}
     arrays |= {f"particle_{name}": values for name, values in section.particles.items()}
     arrays |= {f"wall_{name}": values for name, values in section.walls.items()}
@@ -92,6 +114,7 @@ def read_section(path: str | os.PathLike) -> Section:
         return Section(
             str(arrays["name"]), int(arrays["step"]), float(arrays["time"]), float(arrays["size"]), arrays["x"],
             arrays["y"], part("field_"), part("particle_"), arrays["surface"], part("wall_"),
+            bool(arrays.get("smooth", True)), float(arrays.get("average", 0.0)),
         )  # fmt: skip
     except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise HpcdemError(f"{path}: not a section written by hpcdem -s: {error}") from None

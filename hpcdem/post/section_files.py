@@ -29,8 +29,8 @@ def write_out(path: str | os.PathLike, section: Section, since: str) -> None:
         columns.append((kind, p[name].astype(np.int64) if name == "color" else p[name]))
     words = "".join(c.name.rjust(c.width) for c, _ in columns)
     head = (
-        f"# frame {section.name} step {section.step} time {section.time:.12g} s grid {section.size:.12g} m, "
-        f"strain since {since}\n#{words[1:]}\n"
+        f"# frame {section.name} step {section.step} time {section.time:.12g} s, stress over {section.average:.12g} m, "
+        f"strain {'on the grid' if section.smooth else 'of nearest neighbours'} since {since}\n#{words[1:]}\n"
     )
     write_sections(path, Alone(), lambda: [head.encode(), TextTable(columns)])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -10,10 +11,11 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from hpcdem.errors import HpcdemError
 from hpcdem.io.axes import View
+from hpcdem.io.disk import explain
 from hpcdem.post import blocks
 from hpcdem.post.plots import Style, plot_file
 
@@ -30,38 +32,66 @@ class Job:
     style: Style | blocks.Looks
     seen: View | None = None
 
+    @property
+    def name(self) -> str:
+        """What progress calls it."""
+        return self.source.stem
 
-def draw_all(jobs: Sequence[Job], comm: Any, workers: int = 1, report: Report | None = None) -> None:
-    """Collective: draw all jobs, equal on all ranks. The same bytes on any number of ranks and workers.
+    def __call__(self) -> None:
+        """Draw. Raises HpcdemError that names one of the files."""
+        try:
+            if isinstance(self.style, blocks.Looks):
+                blocks.plot_file(self.source, self.picture, self.style, self.seen)
+            else:
+                plot_file(self.source, self.picture, self.style, self.seen)
+        except HpcdemError as failure:
+            text = str(failure)
+            named = self.source.name in text or self.picture.name in text
+            raise HpcdemError(text if named else f"{self.source}: {text}") from None
 
-    Several ranks take turns, each draws alone; one rank starts `workers` processes. A job that fails does not keep the
-    others from being drawn; HpcdemError on all ranks afterwards. report: called on this rank with lines of progress.
+
+class Task(Protocol):
+    """Something that takes a while and can be done in another process: it can be pickled."""
+
+    @property
+    def name(self) -> str:
+        """What progress calls it."""
+
+    def __call__(self) -> None:
+        """Do it. Raises HpcdemError."""
+
+
+def draw_all(tasks: Sequence[Task], comm: Any, workers: int = 1, report: Report | None = None) -> None:
+    """Collective: do all tasks, equal on all ranks. The same bytes on any number of ranks and workers.
+
+    Several ranks take turns, each works alone; one rank starts `workers` processes. A task that fails does not keep the
+    others from being done; HpcdemError on all ranks afterwards. report: called on this rank with lines of progress.
     """
-    mine = range(comm.rank, len(jobs), comm.size)
-    workers = min(workers, len(jobs))
-    progress = Progress(len(jobs), len(mine), report)
+    mine = range(comm.rank, len(tasks), comm.size)
+    workers = min(workers, len(tasks))
     failures: dict[int, str] = {}
-    for k, failure in _in_processes(jobs, workers) if comm.size == 1 and workers > 1 else _here(jobs, mine):
-        if failure is not None:
-            failures[k] = failure
-        progress.done(jobs[k].source.stem)
+    with Progress(len(tasks), len(mine), report if comm.rank == 0 else None) as progress:
+        for k, failure in _in_processes(tasks, workers) if comm.size == 1 and workers > 1 else _here(tasks, mine):
+            if failure is not None:
+                failures[k] = failure
+            progress.done(tasks[k].name)
     failures = {k: text for part in comm.allgather(failures) for k, text in part.items()}
     if failures:
         first = failures[min(failures)]
-        count = f"{len(failures)} of {len(jobs)} pictures could not be made; the first: " if len(failures) > 1 else ""
+        count = f"{len(failures)} of {len(tasks)} pictures could not be made; the first: " if len(failures) > 1 else ""
         raise HpcdemError(count + first)
 
 
-def _here(jobs: Sequence[Job], mine: Sequence[int]) -> Iterator[tuple[int, str | None]]:
+def _here(tasks: Sequence[Task], mine: Sequence[int]) -> Iterator[tuple[int, str | None]]:
     for k in mine:
-        yield k, _draw(jobs[k])
+        yield k, _done(tasks[k])
 
 
-def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[tuple[int, str | None]]:
+def _in_processes(tasks: Sequence[Task], workers: int) -> Iterator[tuple[int, str | None]]:
     # Fresh processes, not forks: a fork of a process with threads (OpenMP, HDF5, MPI) may hang.
     pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_alone)
     try:
-        number = {pool.submit(_draw, job): k for k, job in enumerate(jobs)}
+        number = {pool.submit(_done, task): k for k, task in enumerate(tasks)}
         for drawn in as_completed(number):
             yield number.pop(drawn), drawn.result()
     except BrokenProcessPool:
@@ -79,34 +109,50 @@ def _alone() -> None:
         del os.environ[name]
 
 
-def _draw(job: Job) -> str | None:
-    """Draw; what went wrong, or None."""
+def _done(task: Task) -> str | None:
+    """Do it; what went wrong, or None."""
     try:
-        if isinstance(job.style, blocks.Looks):
-            blocks.plot_file(job.source, job.picture, job.style, job.seen)
-        else:
-            plot_file(job.source, job.picture, job.style, job.seen)
+        task()
     except HpcdemError as failure:
-        text = str(failure)
-        return text if job.source.name in text or job.picture.name in text else f"{job.source}: {text}"
+        return str(failure)
     except MemoryError:
-        return f"{job.picture}: not enough memory for this picture"
+        return f"{task.name}: not enough memory for this picture"
+    except OSError as failure:
+        return explain(failure.filename or f"the picture of {task.name}", failure)
     except Exception as failure:  # one bad file must not keep a thousand good ones from being drawn
-        return f"cannot draw {job.source}: {type(failure).__name__}: {failure}"
+        return f"cannot draw {task.name}: {type(failure).__name__}: {failure}"
     return None
 
 
 class Progress:
-    """A line every second at most: what is done and how long it will take."""
+    """What is done and how long it will take: a bar on a terminal, else a line every second at most."""
 
     def __init__(self, total: int, mine: int, report: Report | None) -> None:
         self._total, self._mine, self._report = total, mine, report
         self._done, self._began, self._last = 0, time.monotonic(), -1e9
+        self._bar: Any = None
+
+    def __enter__(self) -> Progress:
+        # Open MPI gives its processes a terminal of their own, wherever their output goes in the end.
+        if self._report is not None and sys.stdout.isatty() and "OMPI_COMM_WORLD_SIZE" not in os.environ:
+            from rich import progress
+
+            self._bar = progress.Progress(*progress.Progress.get_default_columns(), transient=True)
+            self._bar.add_task("", total=self._mine)
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
 
     def done(self, name: str) -> None:
-        """One more picture of this rank is there."""
+        """One more task of this rank is done."""
         self._done += 1
         now = time.monotonic()
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=self._done, description=name)
+            return
         if self._report is None or (now - self._last < 1.0 and self._done < self._mine):
             return
         self._last = now

@@ -1,10 +1,10 @@
-"""Strain from the displacements of particles: gradient of the displacement on a grid, deformation gradient on the
-particles.
+"""Strain from the displacements of particles: gradient of the displacement, deformation gradient on the particles.
 
-Between two frames the displacement near a node is fitted by least squares with u = u0 + H (x - x0) (the grid method of
-SSPX: Cardozo & Allmendinger 2009, Computers & Geosciences 35, 1343-1357); dF = 1 + H goes to the particles by bilinear
-interpolation, and F <- dF F. Both steps are exact for affine displacements, so a rigid rotation by any angle gives no
-strain.
+Between two frames displacements are fitted by least squares with u = u0 + H (x - x0), dF = 1 + H, and F <- dF F
+(SSPX: Cardozo & Allmendinger 2009, Computers & Geosciences 35, 1343-1357). `nearest` fits a particle and its nearest
+neighbours, as sharp as particles can tell; `increment` fits what lies around the nodes of a grid, and brings dF to the
+particles by bilinear interpolation. Both are exact for affine displacements, so a rigid rotation by any angle gives no
+strain. A fit with det dF <= 0 turns the material inside out, which says only that neighbours have parted: it is no dF.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hpcdem.post import grid as grids
 
 REACH = 1.5
-"""Particles nearer to a node than this many spacings count in its fit."""
+"""Particles nearer to a node, or to a particle, than this many spacings count in its fit."""
+NEIGHBOURS = (6, 12, 18)
+"""A fit has the first ring of a dense packing; two or three times as many particles where that gives no dF."""
 FLAT = 1e-4
 """The particles of a fit count as lying on a line when the variance across it is less than this part of that along."""
 
@@ -45,6 +48,55 @@ def gradient(
     return result
 
 
+def nearest(size: float, x: np.ndarray, y: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """(n, 4): dF = xx, xy, yx, yy of particles at x, y [m] that moved by u, v [m]: each fitted with its nearest
+    neighbours (NEIGHBOURS) within REACH x size, all with the weight 1. NaN where these are fewer than two, or all on a
+    line, or no number of them gives a det dF > 0."""
+    n = len(x)
+    result = np.full((n, 4), np.nan)
+    if n < 3:
+        return result
+    places = np.stack([x, y], axis=1)
+    moved = np.stack([u - np.mean(u), v - np.mean(v)], axis=1)
+    tree = cKDTree(places)
+    open_rows = np.arange(n)
+    for count in NEIGHBOURS:
+        distance, row = tree.query(places[open_rows], min(count + 1, n), distance_upper_bound=REACH * size)
+        near = np.isfinite(distance)
+        row = np.where(near, row, open_rows[:, None])
+        d = (places[row] - places[open_rows, None]) * near[..., None]
+        w = (moved[row] - moved[open_rows, None]) * near[..., None]
+        number = near.sum(axis=1)
+        df = _fit(number, d, w)
+        known = _det(df) > 0.0
+        result[open_rows[known]] = df[known]
+        open_rows = open_rows[~known]
+        if not len(open_rows):
+            break
+    return result
+
+
+def _fit(number: np.ndarray, d: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """(m, 4): 1 + H by least squares from the `number` (m,) of points at d (m, k, 2) that moved by w (m, k, 2); those
+    that do not count are zeros. NaN for fewer than three points, or all on a line."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        middle = d.sum(axis=1) / number[:, None]
+        moment = np.einsum("mki,mkj->mij", d, d) - number[:, None, None] * middle[:, :, None] * middle[:, None, :]
+        cross = np.einsum("mki,mkj->mij", w, d) - w.sum(axis=1)[:, :, None] * middle[:, None, :]
+        xx, xy, yy = moment[:, 0, 0], moment[:, 0, 1], moment[:, 1, 1]
+        det = xx * yy - xy * xy
+        (ux, uy), (vx, vy) = cross[:, 0].T, cross[:, 1].T
+        columns = [yy * ux - xy * uy, xx * uy - xy * ux, yy * vx - xy * vy, xx * vy - xy * vx]
+        result = np.stack([c / det for c in columns], axis=1) + IDENTITY
+        result[~((number >= 3) & (det > FLAT * (xx + yy) ** 2))] = np.nan
+    return result
+
+
+def _det(f: np.ndarray) -> np.ndarray:
+    """(n,): determinants of matrices stored as xx, xy, yx, yy."""
+    return f[:, 0] * f[:, 3] - f[:, 1] * f[:, 2]
+
+
 def increment(
     size: float,
     x: np.ndarray,
@@ -54,11 +106,14 @@ def increment(
     v: np.ndarray,
     sums: Sums = grids.sums,
 ) -> np.ndarray:
-    """(n, 4): dF = xx, xy, yx, yy on particles that moved by u, v; NaN where no node around has a gradient."""
+    """(n, 4): dF = xx, xy, yx, yy on particles that moved by u, v; NaN where no node around has a gradient, or
+    det dF <= 0."""
     if len(x) == 0:
         return np.zeros((0, 4))
     grid = grids.cover(size, x, y, radius)
-    return grids.between(grid, gradient(grid, x, y, u, v, sums), x, y) + IDENTITY
+    df = grids.between(grid, gradient(grid, x, y, u, v, sums), x, y) + IDENTITY
+    df[~(_det(df) > 0.0)] = np.nan
+    return df
 
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 1.0])
@@ -76,7 +131,7 @@ def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def volumetric(f: np.ndarray) -> np.ndarray:
     """(n,): 100 (det F - 1) [%], positive for growth."""
-    return 100.0 * (f[:, 0] * f[:, 3] - f[:, 1] * f[:, 2] - 1.0)
+    return 100.0 * (_det(f) - 1.0)
 
 
 def distortional(f: np.ndarray) -> np.ndarray:

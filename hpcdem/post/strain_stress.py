@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import Alone, on_first
 from hpcdem.io.disk import explain
-from hpcdem.io.frames import FrameFile, list_frames, read_frame
+from hpcdem.io.frames import FrameFile, left_out, list_frames, read_frame
 from hpcdem.post import grid as grids
 from hpcdem.post import section_files, strain, stress
 from hpcdem.post.section import Section, write_section
@@ -32,6 +33,8 @@ QUIET_SECONDS = 2.0
 """At most one line on the progress in this time."""
 INSIDE, AROUND = 2, 3
 """Of `solid_fraction`, in spacings."""
+STRESS_REACH = 1.5
+"""Particles nearer to a node than this many SIZE count in its stress: as smooth as the manual's figures."""
 SUFFIXES = (".out", ".npz", ".vtkhdf")
 _T = TypeVar("_T")
 
@@ -40,7 +43,8 @@ _T = TypeVar("_T")
 class Options:
     """folder: with the frames; size: spacing of the grid [m]; left_wall, right_wall: ids of walls beyond which
     particles are left out; xmove, ymove [m]: added to all coordinates; addball, delball: whether particles may be
-    added or deleted between frames; increment: strain since the frame before instead of since the first one."""
+    added or deleted between frames; increment: strain since the frame before instead of since the first one; smooth:
+    strain fitted around the nodes of the grid and averaged, instead of by the nearest neighbours of each particle."""
 
     folder: Path
     size: float = 200.0
@@ -51,6 +55,7 @@ class Options:
     addball: bool = False
     delball: bool = False
     increment: bool = False
+    smooth: bool = False
 
 
 def run(comm: Any, log: Any, options: Options) -> Path:
@@ -59,20 +64,24 @@ def run(comm: Any, log: Any, options: Options) -> Path:
     if not (np.isfinite(options.size) and options.size > 0.0):
         raise UsageError(f"-g {options.size:g}: the spacing of the grid must be larger than 0")
     began = time.monotonic()
-    frames = on_first(comm, lambda: _frames(options.folder))
+    frames = on_first(comm, lambda: _frames(options.folder, log))
     results = options.folder / "ss" / "data"
     fresh = results.with_name("data.tmp")
     on_first(comm, lambda: _make_fresh(fresh))
     many = "1 frame" if len(frames) == 1 else f"{len(frames)} frames"
     ranks = f", {comm.size} ranks share {'the frames' if len(frames) >= comm.size else 'each frame'}"
-    log.info(f"stress and strain of {many} in {options.folder}, grid {options.size:g} m{ranks * (comm.size > 1)}")
+    spacing = on_first(comm, lambda: _spacing(frames[0], options))
+    log.info(
+        f"stress and strain of {many} in {options.folder}, stress over {options.size:g} m, "
+        f"nodes every {spacing:g} m{ranks * (comm.size > 1)}"
+    )
     if len(frames) == 1:
         log.warn(f"{frames[0].path.name} is the only frame: its strain is zero, there is nothing to compare it with")
     try:
         if len(frames) >= comm.size:
-            _rounds(comm, log, frames, options, fresh, grids.sums)
+            _rounds(comm, log, frames, options, _Output(fresh, spacing), grids.sums)
         else:
-            _together(comm, log, frames, options, fresh)
+            _together(comm, log, frames, options, _Output(fresh, spacing))
         on_first(comm, lambda: _replace(fresh, results, [f.path.stem for f in frames]))
     except HpcdemError:
         if comm.rank == 0:
@@ -86,11 +95,31 @@ def run(comm: Any, log: Any, options: Options) -> Path:
 # --- files and folders -----------------------------------------------------------------------------------------
 
 
-def _frames(folder: Path) -> list[FrameFile]:
+def _frames(folder: Path, log: Any) -> list[FrameFile]:
     frames = list_frames(folder)
+    if others := left_out(folder):
+        log.warn(others)
     if not frames:
         raise HpcdemError(f"{folder} holds no frames (all_<step>.vtkhdf or all_<step>.dat)")
     return frames
+
+
+class _Output(NamedTuple):
+    """Where the results go, and the spacing of their nodes [m]."""
+
+    folder: Path
+    spacing: float
+
+
+def _spacing(first: FrameFile, options: Options) -> float:
+    """SIZE, or the largest whole part of it that is no longer than the mean diameter in the first frame, so that each
+    particle has a node of its own."""
+    if options.smooth:
+        return options.size
+    radius = read_frame(first.path, ["particles"]).tables["particles"].columns["radius"]
+    if not len(radius) or not np.mean(radius) > 0.0:
+        return options.size
+    return options.size / max(1.0, float(np.ceil(options.size / (2.0 * np.mean(radius)) - 1e-9)))
 
 
 def _make_fresh(folder: Path) -> None:
@@ -239,7 +268,11 @@ def link(earlier: Earlier, now: Snapshot, options: Options, sums: strain.Sums = 
     row = at[both]
     df = np.full((len(earlier.gid), 4), np.nan)
     x, y = earlier.x[row], earlier.y[row]
-    df[row] = strain.increment(options.size, x, y, earlier.radius[row], now.x[both] - x, now.y[both] - y, sums)
+    u, v = now.x[both] - x, now.y[both] - y
+    if options.smooth:
+        df[row] = strain.increment(options.size, x, y, earlier.radius[row], u, v, sums)
+    else:
+        df[row] = strain.nearest(options.size, x, y, u, v)
     place = np.cumsum(earlier.inside) - 1
     return Link(np.where(both, place[at], -1)[now.inside], df[earlier.inside])
 
@@ -256,33 +289,53 @@ def carried(link: Link, f_earlier: np.ndarray | None) -> np.ndarray:
 # --- the section -----------------------------------------------------------------------------------------------
 
 
-def make_section(s: Snapshot, f: np.ndarray, size: float, sums: strain.Sums = grids.sums) -> Section:
-    """Grid fields and particle columns of a frame; f (n, 4) of the particles inside."""
+def make_section(
+    s: Snapshot, f: np.ndarray, size: float, spacing: float = 0.0, smooth: bool = True, sums: strain.Sums = grids.sums
+) -> Section:
+    """Grid fields and particle columns of a frame; f (n, 4) of the particles inside.
+
+    Means are taken around nodes `size` apart [m]. With `smooth` these are the nodes of the section; otherwise its nodes
+    are `spacing` apart (a whole part of `size`), the stress is linear between the others, and the strains are those of
+    the nearest particle.
+    """
     k = np.flatnonzero(s.inside)
     x, y, radius, m = s.x[k], s.y[k], s.radius[k], s.moments[k]
     pseudo = m / s.volume[k, None]
     ev, ed = strain.volumetric(f), strain.distortional(f)
     grid = grids.cover(size, x, y, radius)
     known = np.isfinite(ev)
-    total = sums(
-        grid, x, y,
-        {
-            "area": np.pi * radius * radius, "sxx": m[:, 0], "sxy": 0.5 * (m[:, 1] + m[:, 2]), "syy": m[:, 3],
-            "known": known.astype(float), "volumetric": np.where(known, ev, 0.0),
-            "distortional": np.where(known, ed, 0.0),
-        },
-        1.0,
-    )  # fmt: skip
-    material = (total["number"] > 0) & grids.touched(grid, x, y, radius)
-    solid = solid_fraction(grid, total, x, y, radius)
-    fields = {}
+    columns = {
+        "area": np.pi * radius * radius, "sxx": m[:, 0], "sxy": 0.5 * (m[:, 1] + m[:, 2]), "syy": m[:, 3],
+    }  # fmt: skip
+    total = sums(grid, x, y, columns, STRESS_REACH)
+    solid = solid_fraction(grid, sums(grid, x, y, {"area": columns["area"]}, 1.0), x, y, radius)
     with np.errstate(invalid="ignore", divide="ignore"):
-        for name in ("volumetric", "distortional"):
-            fields[name] = np.where(material, total[name] / total["known"], np.nan)
         extent = total["area"] / solid * s.thickness
-        tensor = [np.where(material, total[name] / extent, np.nan) for name in ("sxx", "sxy", "syy")]
-    mean, shear, angle = stress.principal(*tensor)
-    fields |= {"mean": mean, "shear": shear, **dict(zip(("sxx", "sxy", "syy"), tensor)), "direction": angle}
+        tensor = np.stack([total[name] / extent for name in ("sxx", "sxy", "syy")], axis=2)
+    fields = {}
+    if smooth:
+        values = {"known": known.astype(float), "volumetric": ev, "distortional": ed}
+        near = sums(grid, x, y, {name: np.where(known, v, 0.0) for name, v in values.items()}, 1.0)
+        material = (near["number"] > 0) & grids.touched(grid, x, y, radius)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for name in ("volumetric", "distortional"):
+                fields[name] = near[name] / near["known"]
+    else:
+        grid, coarse = grids.cover(spacing, x, y, radius), grid
+        nodes = [axis.ravel() for axis in np.meshgrid(grid.x, grid.y)]
+        tensor = grids.between(coarse, tensor, *nodes).reshape(grid.ny, grid.nx, 3)
+        material = grids.touched(grid, x, y, radius)
+        some = np.flatnonzero(known)
+        at = cKDTree(np.stack([x[some], y[some]], axis=1)).query(np.stack(nodes, axis=1)) if len(some) else None
+        for name, v in (("volumetric", ev), ("distortional", ed)):
+            fields[name] = np.full((grid.ny, grid.nx), np.nan)
+            if at is not None:
+                close = at[0] < size
+                fields[name].flat[close] = v[some[at[1][close]]]
+    fields = {name: np.where(material, values, np.nan) for name, values in fields.items()}
+    sxx, sxy, syy = (np.where(material, tensor[..., c], np.nan) for c in (0, 1, 2))
+    mean, shear, angle = stress.principal(sxx, sxy, syy)
+    fields |= {"mean": mean, "shear": shear, "sxx": sxx, "sxy": sxy, "syy": syy, "direction": angle}
     particles = {
         "gid": s.gid[k], "x": x, "y": y, "radius": radius, "color": s.color[k],
         "pxx": pseudo[:, 0], "pxy": 0.5 * (pseudo[:, 1] + pseudo[:, 2]), "pyy": pseudo[:, 3],
@@ -290,7 +343,9 @@ def make_section(s: Snapshot, f: np.ndarray, size: float, sums: strain.Sums = gr
     }  # fmt: skip
     top = s.held[k] if s.held[k].any() else slice(None)
     line = surface(x[top], y[top], radius[top], size, 0.1 * size)
-    return Section(s.name, s.step, s.time, size, grid.x, grid.y, fields, particles, line, s.walls)
+    return Section(
+        s.name, s.step, s.time, grid.size, grid.x, grid.y, fields, particles, line, s.walls, smooth, size
+    )  # fmt: skip
 
 
 def solid_fraction(
@@ -336,12 +391,12 @@ class _Single(Alone):
         return parts
 
 
-def _rounds(comm: Any, log: Any, frames: list[FrameFile], options: Options, folder: Path, sums: strain.Sums) -> None:
+def _rounds(comm: Any, log: Any, frames: list[FrameFile], options: Options, output: _Output, sums: strain.Sums) -> None:
     """Collective over `comm`: one frame per rank and round."""
     last = _Last()
     began = told = time.monotonic()
     for first in range(0, len(frames), comm.size):
-        last = _round(comm, frames, first, last, options, folder, sums)
+        last = _round(comm, frames, first, last, options, output, sums)
         done, now = min(first + comm.size, len(frames)), time.monotonic()
         if now - told >= QUIET_SECONDS or done == len(frames):
             name, speed = frames[done - 1].path.name, done / max(now - began, 1e-9)
@@ -357,7 +412,7 @@ class _Last(NamedTuple):
 
 
 def _round(
-    comm: Any, frames: list[FrameFile], first: int, last: _Last, options: Options, folder: Path, sums: strain.Sums
+    comm: Any, frames: list[FrameFile], first: int, last: _Last, options: Options, output: _Output, sums: strain.Sums
 ) -> _Last:
     mine = first + comm.rank
     file = frames[mine] if mine < len(frames) else None
@@ -373,7 +428,13 @@ def _round(
             f = carried(found, None if options.increment else f_before) if found else _none(now)
         passed = _to_next(comm, f if comm.rank == turn else f[:0])
         f_before = passed if len(passed) else f_before
-    _each(comm, lambda: _write(make_section(now, f, options.size, sums), options, frames[0], folder) if now else None)
+
+    def result() -> None:
+        if now:
+            section = make_section(now, f, options.size, output.spacing, options.smooth, sums)
+            _write(section, options, frames[0], output.folder)
+
+    _each(comm, result)
     return _Last(arrived, f_before)
 
 
@@ -396,7 +457,7 @@ def _write(section: Section, options: Options, first: FrameFile, folder: Path) -
     write_section(section, folder / f"{section.name}.npz")
 
 
-def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, folder: Path) -> None:
+def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, output: _Output) -> None:
     """Collective: rank 0 goes through the frames, all ranks sum their columns of the grids."""
     error = None
     if comm.rank == 0:
@@ -407,7 +468,7 @@ def _together(comm: Any, log: Any, frames: list[FrameFile], options: Options, fo
             return {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
 
         try:
-            _, error = _tried(lambda: _rounds(_Single(), log, frames, options, folder, shared))
+            _, error = _tried(lambda: _rounds(_Single(), log, frames, options, output, shared))
         finally:
             with suppress(HpcdemError):
                 comm.bcast(None)

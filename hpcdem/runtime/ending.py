@@ -55,8 +55,21 @@ def describe(error: BaseException) -> Failure:
     if isinstance(error, KeyboardInterrupt):
         if error.args == ("SIGTERM",):
             return Failure(EXIT_TERMINATED, "hpcdem: ended by a second SIGTERM; nothing was saved")
+        if error.args == ("own loop",):
+            said = f"hpcdem: interrupted{_line_of_script(error)}, which came to no command; nothing was saved"
+            return Failure(EXIT_INTERRUPTED, said)
         return Failure(EXIT_INTERRUPTED, "hpcdem: interrupted; nothing was saved")
     return Failure(EXIT_ERROR, "".join(traceback.format_exception(error)).rstrip())
+
+
+def _line_of_script(error: BaseException) -> str:
+    """`in line 4 of script.sc`: where it came to the script or program, "" if it did not."""
+    place, trace = "", error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_globals.get("__name__") == "__main__" and trace.tb_frame.f_back is not None:
+            place = f" in line {trace.tb_lineno} of {trace.tb_frame.f_code.co_filename}"
+        trace = trace.tb_next
+    return place
 
 
 def run_together(comm: Any, work: Callable[[], None]) -> Ending:

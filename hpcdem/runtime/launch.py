@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hpcdem.errors import HpcdemError, UsageError
@@ -79,10 +80,39 @@ def prepare_environment(threads: int) -> tuple[int, list[str]]:
     ]
 
 
-def threads_by_default() -> int:
-    """Threads per rank without -j: what `srun -c` or `sbatch -c` gives each task and this process may use, else 1."""
+def threads_by_default(as_zdem: bool = False) -> int:
+    """Threads per rank without -j: what `srun -c` or `sbatch -c` gives each task and this process may use, else 1.
+
+    as_zdem: of a ZDEM script that one process runs alone, as the ZDEM manual has it: OMP_NUM_THREADS, else all physical
+    cores this process may use.
+    """
     given = os.environ.get("SLURM_CPUS_PER_TASK", "")
+    who = launcher()
+    if as_zdem and (who is None or who.size == 1):
+        wanted = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+        if wanted.isdigit() and int(wanted) > 0:
+            return int(wanted)
+        if not given.isdigit() and "SLURM_JOB_ID" in os.environ:  # a share of a node that has no masks
+            given = os.environ.get("SLURM_CPUS_ON_NODE", "")
+        return max(1, min(int(given), physical_cores())) if given.isdigit() else physical_cores()
     return max(1, min(int(given), cores())) if given.isdigit() else 1
+
+
+def physical_cores(root: str = "/") -> int:
+    """The physical cores that this process may use: of its mask, two threads of a core being one, and no more than a
+    control group allows it time for. root: where proc and sys are."""
+    from hpcdem.runtime.doctor import cgroups
+    from hpcdem.runtime.doctor.scene import Scene
+
+    found = set()
+    for cpu in os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1):
+        topology = Path(root, f"sys/devices/system/cpu/cpu{cpu}/topology/thread_siblings_list")
+        try:
+            found.add(topology.read_text(encoding="ascii").strip())
+        except (OSError, ValueError):
+            found.add(str(cpu))
+    quota = cgroups.cpu_quota(Scene([], root=Path(root)))
+    return max(1, len(found) if quota is None else min(len(found), round(quota)))
 
 
 def let_waiting_threads_sleep(threads: int) -> None:

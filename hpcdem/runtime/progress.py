@@ -65,12 +65,15 @@ def rate(number: float) -> str:
 
 @dataclass
 class Command:
-    """A running CYC or IMPLE: name, script line, steps to do, and the step and time at which it began."""
+    """A running CYC or IMPLE: name, script line, steps to do (0: not known), the step at which it began here, and how
+    many steps of it an earlier run did. beside: others tell of its beginning and end."""
 
     name: str
     line: int
     steps: int
     first_step: int | None = None
+    before: int = 0
+    beside: bool = False
 
 
 class Log:
@@ -140,19 +143,23 @@ class Log:
         """After SET stepbar: the user wants a line per interval, however short."""
         self.every_interval = explicit
 
-    def command_started(self, name: str, line: int, steps: int, step: int | None = None) -> None:
-        """A CYC or IMPLE of `steps` steps begins at this line of the script (0: no script).
+    def command_started(
+        self, name: str, line: int, steps: int, step: int | None = None, before: int = 0, beside: bool = False
+    ) -> None:
+        """A CYC or IMPLE with `steps` steps to do (0: not known) begins at this line of the script (0: no script).
 
-        step: the step number now; left out, the first call of `step` tells it.
+        step: the step number now; left out, the first call of `step` tells it. before: steps of the command that an
+        earlier run did. beside: of particles that are stepped with blocks, which tell of beginning and end.
         """
-        self._command = Command(name, line, steps, step)
+        self._command = Command(name, line, steps, step, before, beside)
         self._window = None if step is None else (step, self._now())
-        if not self._speaks:
+        if not self._speaks or beside:
             return
         where = f"line {line}: " if line else ""
-        self._print(f"{where}{name}, {steps} step{'s' * (steps != 1)}")
+        whole, left = steps + before, f", {steps} left" if before else ""
+        self._print(f"{where}{name}, {whole} step{'s' * (whole != 1)}{left}")
         if self._terminal:
-            self._bar = Bar(self._stream, name, steps, self._script_steps, self._script_done)
+            self._bar = Bar(self._stream, name, whole, self._script_steps, self._script_done)
 
     def wants(self, step: int) -> bool:
         """Move the bar to this step; True if a line is due, so that a StepStatus must be made (ask rank 0)."""
@@ -163,8 +170,9 @@ class Log:
             return True
         done = step - command.first_step
         if self._bar is not None:
-            self._bar.update(done, self._script_done + done)
-        due = self.every_interval or self._now() - self._last_line >= QUIET_SECONDS or done >= command.steps
+            self._bar.update(command.before + done, self._script_done + done)
+        due = self.every_interval or self._now() - self._last_line >= QUIET_SECONDS
+        due = due or (done >= command.steps and not command.beside)
         return due and step > self._window[0]
 
     def step(self, status: StepStatus) -> None:
@@ -188,7 +196,10 @@ class Log:
         assert command is not None
         total, script_done = self._script_steps, self._script_done + done
         left = (command.steps - done) / speed if speed > 0 else -1.0
-        parts = [f"step {status.step}", f"{command.name} {percent(done, command.steps)}"]
+        parts = [
+            f"step {status.step}",
+            f"{command.name} {percent(command.before + done, command.before + command.steps)}",
+        ]
         if total:
             parts.append(f"script {percent(script_done, total)}")
         parts.append(f"{rate(speed)} steps/s, {rate(speed * status.particles)} particle-steps/s")

@@ -1,15 +1,7 @@
 """The folder that a run writes into: who is writing there, and what `hpcdem resume` and `hpcdem info` must know of it.
 
-`run.json` is written when the first file is, and again at the end:
-
-| key | |
-|---|---|
-| `script`, `language`, `arguments` | what was started: absolute path, "zdem", "pcdc" or "python", further words |
-| `version`, `ranks`, `threads`, `began` | by what, on how many, when (UTC) |
-| `state`, `step` | "running", "stopped" (with a checkpoint), "failed", "done"; step at that moment |
-| `older` | checkpoints that another run had left: name -> [bytes, time of change in ns] |
-
-A run that was killed still says "running", but holds no lock.
+What `run.json` holds is in `io/run_record.py`; it is written when the first file is, and again at the end. A
+run that was killed still says "running", but holds no lock.
 
 Functions that take a communicator are collective; rank 0 alone touches the disk.
 """
@@ -20,7 +12,7 @@ import json
 import os
 import re
 import socket
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -29,13 +21,15 @@ from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of
-
-RECORD = "run.json"
+from hpcdem.io.run_record import RECORD, Record, is_older, left_behind, read
 
 _NUMBERED = re.compile(r"(auto_)?(\d{10,})\.sav")
 
 _held: dict[Path, FolderLock] = {}
 """Locks of this process. One program may make several simulations that write into one folder."""
+
+_entered: set[Path] = set()
+"""Folders for which this process has written run.json: what is there now is its own."""
 
 
 @dataclass(frozen=True)
@@ -52,32 +46,19 @@ class Job:
         return {"host": socket.gethostname(), "pid": os.getpid(), "script": self.script, "began": _now()}
 
 
-@dataclass
-class Record:
-    """What run.json says."""
-
-    script: str = ""
-    language: str = ""
-    arguments: list[str] = field(default_factory=list)
-    version: str = ""
-    ranks: int = 1
-    threads: int = 1
-    began: str = ""
-    state: str = "running"
-    step: int = 0
-    older: dict[str, list[int]] = field(default_factory=dict)
-
-
 def claim(folder: Path, comm: Any, job: Job) -> bool:
     """Lock a folder that is there; nothing happens to one that is not. Returns False if its file system has no locks.
     UsageError on all ranks if another run writes into it."""
     return on_first(comm, lambda: _claim(folder, job) if folder.is_dir() else True)
 
 
-def enter(folder: Path, comm: Any, job: Job, version: str, resumed: bool) -> bool:
-    """Make the folder, lock it, and write run.json; a resumed run keeps what it says of older checkpoints. Returns
-    False if its file system has no locks. UsageError if another run writes into it, HpcdemError if it cannot be
-    made."""
+def enter(
+    folder: Path, comm: Any, job: Job, version: str, resumed: bool, restored: tuple[Path, int] | None = None
+) -> bool:
+    """Make the folder, lock it, and write run.json; a resumed run keeps what it says of older files. restored: the
+    checkpoint that the script began with, and its step; if it is one of this folder, the frames up to there belong to
+    the run. Returns False if the file system has no locks. UsageError if another run writes into the folder,
+    HpcdemError if it cannot be made."""
 
     def work() -> bool:
         try:
@@ -85,11 +66,24 @@ def enter(folder: Path, comm: Any, job: Job, version: str, resumed: bool) -> boo
         except OSError as failure:
             raise HpcdemError(explain(folder, failure, "make the folder")) from None
         works = _claim(folder, job)
-        before = read(folder) if resumed else None
-        older = before.older if before is not None else {} if resumed else _checkpoints(folder)
+        again = folder.resolve() in _entered  # several models of one program, or particles and blocks of one run
+        before = read(folder) if resumed or again else None
+        _entered.add(folder.resolve())
+        older = before.older if before is not None else {} if resumed else left_behind(folder)
+        since = before.since if before is not None else _history(folder, restored)
         script = str(Path(job.script).resolve()) if job.script else ""
         record = Record(
-            script, job.language, list(job.arguments), version, comm.size, job.threads, _now(), "running", 0, older
+            script,
+            job.language,
+            list(job.arguments),
+            version,
+            comm.size,
+            job.threads,
+            _now(),
+            "running",
+            0,
+            older,
+            since,
         )
         _write(folder, record)
         return works
@@ -143,25 +137,9 @@ def retire(folder: Path, comm: Any, step: int, keep: int) -> None:
 
 def release_all() -> None:
     """Give back all locks of this process. Not collective."""
+    _entered.clear()
     while _held:
         _held.popitem()[1].release()
-
-
-def read(folder: Path) -> Record | None:
-    """What run.json of a folder says; None if there is none. HpcdemError if it cannot be read."""
-    path = folder / RECORD
-    try:
-        given = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(given, dict):
-            raise ValueError("no table of names and values")
-        known = Record()
-        return Record(**{name: type(value)(given[name]) for name, value in vars(known).items() if name in given})
-    except FileNotFoundError:
-        return None
-    except OSError as failure:
-        raise HpcdemError(explain(path, failure, "read")) from None
-    except (TypeError, ValueError, AttributeError) as problem:
-        raise HpcdemError(f"{path} is damaged: {problem}") from None
 
 
 def running(folder: Path) -> dict[str, Any] | None:
@@ -169,11 +147,17 @@ def running(folder: Path) -> dict[str, Any] | None:
     return holder_of(folder)
 
 
-def is_older(path: Path, record: Record | None) -> bool:
-    """Whether a checkpoint was there before the run began, and was not written anew since."""
-    if record is None or path.name not in record.older:
-        return False
-    return _signature(path) == record.older[path.name]
+def _history(folder: Path, restored: tuple[Path, int] | None) -> int:
+    """The step up to which the frames in a folder lead to a checkpoint that was restored: -1, unless the checkpoint
+    lies there, or a copy of it."""
+    if restored is None:
+        return -1
+    path, step = restored
+    try:
+        known = folder / path.name
+        return step if known.samefile(path) or known.stat().st_size == path.stat().st_size else -1
+    except OSError:
+        return -1
 
 
 def _claim(folder: Path, job: Job) -> bool:
@@ -192,18 +176,6 @@ def _refusal(folder: Path, holder: dict[str, Any]) -> str:
         f"another run is writing into {folder}: {script or 'a Python program'}, process {pid} on {host}, since "
         f"{holder.get('began', '?')}. Wait for its end, or choose another folder with --outdir"
     )
-
-
-def _checkpoints(folder: Path) -> dict[str, list[int]]:
-    return {path.name: _signature(path) for path in sorted(folder.glob("*.sav"))}
-
-
-def _signature(path: Path) -> list[int]:
-    try:
-        status = path.stat()
-    except OSError:
-        return []
-    return [status.st_size, status.st_mtime_ns]
 
 
 def _write(folder: Path, record: Record) -> None:

@@ -6,6 +6,8 @@
 | SIGUSR2 | save a checkpoint and go on |
 | so much time since the last checkpoint (autosave) | the same |
 | second SIGINT, or second SIGTERM | stop at once, nothing is saved, exit code 130 or 143 |
+| first SIGINT in a loop of the script's own, without commands | the same, after a second |
+| first SIGINT, SIGTERM in a loop of commands that do not step | save and stop, after a second |
 | time limit or end of the Slurm job | save and stop, early enough for the save to finish |
 
 srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1 with either MPI, SIGTERM and
@@ -40,6 +42,9 @@ NONE, AUTO, SAVE, STOP = 0, 1, 2, 3
 Decision = Literal["none", "auto", "save", "stop"]
 
 HANDLED = ("SIGUSR2", "SIGUSR1", "SIGTERM", "SIGINT")
+GRACE = 1.0
+"""Seconds after the first SIGINT in which the script may come to a command; its own Python is interrupted then."""
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep
 SAME_REQUEST = 2.0
 """A SIGUSR2 this soon [s] after a save was sent to all ranks at once and is answered already."""
 
@@ -96,6 +101,8 @@ class StopRequests:
         self._last_save_took: float | None = None
         self._last_saved = -math.inf
         self._before: dict[int, Any] = {}
+        self._answered = False
+        self._asked = 0.0
 
     # -- signals ---------------------------------------------------------------------------------------------
 
@@ -111,6 +118,7 @@ class StopRequests:
 
     def uninstall(self) -> None:
         """Give the signals back."""
+        self._quiet()
         for number, handler in self._before.items():
             signal.signal(number, handler)
         self._before.clear()
@@ -126,11 +134,32 @@ class StopRequests:
             self._interrupts += 1
             if self._interrupts > 1:
                 raise KeyboardInterrupt
+            self._wait_for_a_command()
         if name == "SIGTERM":
             self._terminated = self._terminated or time.monotonic()
             if time.monotonic() - self._terminated > SAME_SIGNAL:
                 raise KeyboardInterrupt("SIGTERM")
         self._stop = self._stop or ("Ctrl-C" if name == "SIGINT" else name)
+
+    def _wait_for_a_command(self) -> None:
+        """A script in a loop of its own never looks at flags: look at it from time to time. Where it uses the alarm
+        itself it must be interrupted a second time."""
+        number = getattr(signal, "SIGALRM", None)
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, None):
+            self._before[number] = signal.signal(number, self._on_alarm)
+            signal.setitimer(signal.ITIMER_REAL, GRACE, GRACE)
+
+    def _on_alarm(self, number: int, frame: FrameType | None) -> None:
+        if not self._answered and in_the_script(frame):
+            raise KeyboardInterrupt("own loop")
+
+    def _quiet(self) -> None:
+        """The request is being answered: no alarm any more."""
+        self._answered = True
+        number = getattr(signal, "SIGALRM", None)
+        if number in self._before:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(number, self._before.pop(number))
 
     # -- the questions of the step loop ----------------------------------------------------------------------
 
@@ -145,6 +174,13 @@ class StopRequests:
             return STOP if self._stop else SAVE
         return AUTO if self._autosave is not None and time.monotonic() - self._last_file > self._pause() else NONE
 
+    def overdue_request(self) -> int:
+        """STOP if the end was asked for, and no step has answered for some time; else NONE."""
+        if self.local_request() != STOP:
+            return NONE
+        self._asked = self._asked or time.monotonic()
+        return STOP if time.monotonic() - self._asked > GRACE else NONE
+
     def _pause(self) -> float:
         """Seconds between checkpoints that nobody asked for."""
         return max(self._autosave or 0.0, LEAST_SHARE * (self._last_save_took or 0.0))
@@ -153,6 +189,7 @@ class StopRequests:
         """The decision that belongs to the largest code of all ranks; a save request is answered by it."""
         if code >= STOP:
             self.reason = self._stop or "a request to another rank"
+            self._quiet()
             self._last_resort.answered()
             return "stop"
         if code == SAVE:
@@ -186,6 +223,17 @@ class StopRequests:
         if self._last_save_took is not None:
             return 2.0 * self._last_save_took + 1.0
         return max((margin for _, margin, _ in self._limits), default=0.0)
+
+
+def in_the_script(frame: FrameType | None) -> bool:
+    """Is this frame, or the first around it that belongs to either, one of the script or program, not of hpcdem?"""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(_PACKAGE):
+            return False
+        if frame.f_globals.get("__name__") == "__main__":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def slurm_end_time(environ: Mapping[str, str] = os.environ, ask: Callable[..., Any] = subprocess.run) -> float | None:

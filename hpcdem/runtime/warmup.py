@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 import os
 import re
 import shutil
@@ -17,7 +18,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,9 +32,16 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
+KERNELS = {"shared": 100, "": 120, "blocks": 160, "coupled": 25}
+"""About how many kernels of each kind are compiled."""
+QUIET_SECONDS = 5.0
+"""Between two lines on how far compiling has come."""
+
+
 def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callable[[], None]]) -> Path:
     """Collective: load or compile kernels, those of one kind after those of another; returns the last cache folder of
-    this rank. rehearsals: by kind, what calls all of its kernels once; each kind has a folder of its own.
+    this rank. rehearsals: by kind, what calls all of its kernels once; each kind has a folder of its own. Rank 0 says
+    how far it is.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
     a folder has still to be filled, one rank of each machine type goes first, then one of each host, then the rest,
@@ -41,9 +49,15 @@ def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callabl
     """
     folder, writable = cache_folder()
     folders = [folder.with_name(f"{folder.name}-{kind}") if kind else folder for kind in rehearsals]
-    if comm.rank == 0 and not all(folder.is_dir() for folder in folders):
-        log.info("compiling the kernels (first run of this version on this machine)")
-    damaged = [_prepare(comm, *one) for one in zip(folders, rehearsals.values())]
+    missing = sum(KERNELS.get(kind, 0) for kind, folder in zip(rehearsals, folders) if not folder.is_dir())
+    if comm.rank == 0 and missing:
+        threaded = os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
+        log.info(
+            f"compiling about {missing} kernels{' for several threads' if threaded else ''} (first run of this version "
+            f"on this machine{'; runs with one thread, -j 1, have their own' if threaded else ''})"
+        )
+    with _progress(log, missing):
+        damaged = [_prepare(comm, *one) for one in zip(folders, rehearsals.values())]
 
     if comm.any(not writable):
         log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
@@ -53,6 +67,31 @@ def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callabl
         for folder in folders:
             tidy(folder)
     return folders[-1]
+
+
+@contextlib.contextmanager
+def _progress(log: Log, missing: int) -> Iterator[None]:
+    """Says from time to time how many of so many kernels are compiled, and how long the others may take."""
+    from numba.core import event
+
+    began = told = time.monotonic()
+    done = 0
+
+    class Listener(event.Listener):
+        def on_start(self, _: event.Event) -> None:
+            """Nothing: kernels that are called by others are compiled within these."""
+
+        def on_end(self, _: event.Event) -> None:
+            nonlocal done, told
+            done += 1
+            now = time.monotonic()
+            if now - told >= QUIET_SECONDS and done < missing:
+                told = now
+                left = (now - began) / done * (missing - done)
+                log.info(f"{done} of about {missing} kernels are compiled, some {math.ceil(left)} s left")
+
+    with event.install_listener("numba:compile", Listener()) if missing else contextlib.nullcontext():
+        yield
 
 
 def _prepare(comm: SerialComm, folder: Path, warm: Callable[[], None]) -> bool:

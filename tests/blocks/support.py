@@ -53,6 +53,14 @@ def joined(*meshes: Mesh) -> Mesh:
     return Mesh.of(np.concatenate(points), np.concatenate(cells))
 
 
+def near(mesh: Mesh, axis: int, at: float, inner: bool = False) -> np.ndarray:
+    """Faces (both of an inner edge) that lie on the line x = at (axis 0) or y = at (1)."""
+    edges = mesh.edges()
+    on = (np.abs(mesh.points[edges.points][:, :, axis] - at) < 1e-9).all(axis=1) & (edges.inner == inner)
+    faces = edges.faces[on]
+    return faces[faces >= 0]
+
+
 def model(mesh: Mesh, **options) -> Blocks:
     """A model of rock on one rank."""
     sim = Blocks(**options)

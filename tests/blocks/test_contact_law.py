@@ -13,7 +13,9 @@ UPPER = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, math.sqrt(3.0) / 2.0]])
 LOWER = np.array([[0.0, 0.0], [0.5, -math.sqrt(3.0) / 2.0], [1.0, 0.0]])
 
 
-def forces(a, b, penalty=1.0, shear=0.0, friction=0.0, va=None, vb=None, dt=1.0, memory=None, half=0.0, damp=None):
+def forces(
+    a, b, penalty=1.0, shear=0.0, friction=0.0, va=None, vb=None, dt=1.0, memory=None, half=0.0, damp=None, dashpot=0.0
+):
     """Forces (n, 6, 2) on the corners of triangles a, then b, (n, 3, 2) each."""
     a, b = (np.asarray(t, float).reshape(-1, 3, 2) for t in (a, b))
     n = len(a)
@@ -22,15 +24,16 @@ def forces(a, b, penalty=1.0, shear=0.0, friction=0.0, va=None, vb=None, dt=1.0,
     for rows, speed in ((slice(0, n), va), (slice(n, 2 * n), vb)):
         if speed is not None:
             v[rows] = np.broadcast_to(speed, (n, 3, 2)).reshape(n, 6)
-    table = np.tile([penalty, shear, friction, half], (n + 4, 1))
+    table = np.tile([penalty, shear, friction, 0.0], (n + 4, 1))
+    table.view(np.int64)[:, contact.CODE] = int(half) + contact.ALL_EDGES
     memory = np.zeros((n + 4, 6)) if memory is None else memory
-    dampers, largest = np.zeros((0, 2)), np.zeros((0, 12))
+    dampers, largest = np.zeros((0, 3)), np.zeros((0, 12))
     if damp is not None:
-        dampers, largest = np.tile(damp[:2], (n + 4, 1)).astype(float), damp[2]
+        dampers, largest = np.tile([*damp[:2], dashpot], (n + 4, 1)), damp[2]
     touching, out = np.zeros(n, np.uint8), np.zeros((n, 12))
     contact.forces(
         1, np.arange(n), np.arange(n, 2 * n), 8 * np.arange(2 * n), 6 * np.arange(2 * n), x, v, table, memory, dampers,
-        largest, touching, out, dt,
+        largest, np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((0, contact.CHOICE)), touching, out, dt,
     )  # fmt: skip
     return (out * touching[:, None]).reshape(n, 6, 2)
 
@@ -166,3 +169,19 @@ def test_damped_contact_loses_energy_on_the_way_out():
     assert damped.max() < 1.1 * 2.0 * top  # both edges limited
     assert (damped[41:-1] < damped[38:0:-1][: len(damped[41:-1])] + 1e-15).all()
     assert (damped <= plain + 1e-15).all()
+
+
+def test_a_dashpot_pushes_against_approach_and_never_pulls():
+    """c v on the length inside, for either contactor; while they part it takes away, down to nothing."""
+    c, speed = 3.0, 1e-4
+    a = UPPER - [0.0, 0.01]
+    plain = forces(a, LOWER)[0]
+    damp = (math.inf, 1.0, np.zeros((5, 12)))
+    for v in (speed, -speed):
+        found = forces(a, LOWER, va=[[0.0, -v]] * 3, damp=damp, dashpot=c)[0]
+        more = (found - plain)[:3, 1].sum()
+        # Both flat edges lie 0.01 inside a triangle of base 1 and height 0.866: 1 - 2 * 0.01 / sqrt(3) of them.
+        assert more == pytest.approx(2.0 * c * v * (1.0 - 0.02 / math.sqrt(3.0)), rel=0.03)
+        assert found.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
+    away = forces(a, LOWER, va=[[0.0, 1e3]] * 3, damp=damp, dashpot=c)[0]
+    assert away[:3, 1].sum() == pytest.approx(0.0, abs=0.01 * plain[:3, 1].sum())  # what is at the corners

@@ -89,12 +89,14 @@ def test_the_search_finds_what_trying_all_pairs_finds():
     x = np.zeros((n, 8))
     x[:, :6] = (middle + size * rng.normal(size=(n, 3, 2))).reshape(n, 6)
     box = np.empty((n, 4))
-    detect.boxes(8 * np.arange(n), x, 0.05, box)
+    around = np.empty((n, 4))
+    detect.boxes(8 * np.arange(n), np.full(n, 7), x, 0.05, box, around)
+    assert (around == box).all()  # every edge is free
     cells = np.column_stack([np.arange(3 * n).reshape(n, 3), np.full(n, -1)])
     owned = rng.uniform(size=n) < 0.7
     element = rng.permutation(n)
     partner = np.full(4 * n, -1)
-    first, second = detect.find(box, element, 2 * element, owned, cells, partner, np.zeros(4 * n, bool))
+    first, second = detect.find(box, around, element, 2 * element, owned, cells, partner, np.zeros(4 * n, bool))
     found = set(zip(element[first].tolist(), element[second].tolist()))
     expected = set()
     for i in range(n):

@@ -71,7 +71,7 @@ def test_numbers_that_are_not_there_are_refused():
         (lambda: sim.crack([10**6]), "no joint"),
         (lambda: sim.values("stress_xx", [99]), "no element 99"),
         (lambda: sim.values("colour"), "no quantity colour"),
-        (lambda: sim.face_property(None, {"friction": 1.0}), "has no model"),
+        (lambda: sim.face_property(None, {"friction": 1.0}), "has a model whose properties could be changed"),
         (lambda: sim.element_model(None, "granite", {}), "no model granite for an element"),
     ):
         with pytest.raises(CommandError, match=said):

@@ -9,6 +9,7 @@ import pytest
 
 from hpcdem.blocks import Blocks
 from hpcdem.errors import CommandError
+from hpcdem.model.blocks.properties import CONTACT_MOHR_COULOMB, Rows
 from tests.blocks import worker
 from tests.blocks.support import jointed, model, rectangle
 
@@ -93,3 +94,17 @@ def test_what_cannot_be_restored_leaves_the_model_alone(tmp_path):
             sim.restore(Path(path))
         same(before, state(sim))
     sim.advance(5)
+
+
+def test_tables_of_earlier_versions_lack_what_is_new():
+    """Rows of contact models without damping_ratio, options without overlap: as if they had not been said."""
+    rows = Rows()
+    rows.row(CONTACT_MOHR_COULOMB, CONTACT_MOHR_COULOMB.complete({"penalty_normal": 1e10}))
+    (none, (name, numbers)) = rows.state()
+    again = Rows.restored([none, [name, numbers[:-1]]])
+    assert list(again.column("damping_ratio")) == [0.0, 0.0] and list(again.column("penalty_normal")) == [0.0, 1e10]
+    sim = model(rectangle(1, 1, 1.0, 1.0))
+    state = sim.scene_state()
+    del state["options"]["overlap"]
+    sim.take_scene_state(state)
+    assert sim.options.overlap == "refuse"

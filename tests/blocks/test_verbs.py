@@ -9,6 +9,7 @@ import pytest
 
 from hpcdem.blocks import QUANTITIES, Blocks
 from tests.blocks.support import ROCK, joined, jointed, model, rectangle, shaken
+from tests.pcdc.fake import Noted
 
 
 def pulled(steps: int = 0) -> Blocks:
@@ -21,18 +22,24 @@ def pulled(steps: int = 0) -> Blocks:
     return sim
 
 
-def test_broken_joints_hold_again_after_a_reset():
-    """State, events and forces: broken, then whole without history, then broken again by more of the same."""
-    sim = pulled(400)
-    broken = sim.joint_counts()[2]
-    assert broken >= 2 and len(sim.events()["joint"]) == broken
-    sim.velocity_condition(None, vx=0.0, vy=0.0)
+def test_a_reset_forgets_damage_and_leaves_broken_joints_broken():
+    """Yielded joints are whole again, without history, and yield again by more of the same; broken ones, and a crack
+    that was there from the beginning, stay open: faces, events, forces."""
+    sim = pulled(230)
+    while not (sim.joint_counts()[1] and sim.joint_counts()[2]):
+        sim.advance(1)
+    sim.crack(sim.numbers_of_joints(None)[:1])
+    _, yielded, broken = sim.joint_counts()
+    damage, events = sim.values("damage"), sim.events()["joint"]
+    assert ((damage > 0.0) & (damage < 1.0)).any() and len(events) == broken
     sim.reset_joint_state()
-    assert sim.joint_counts()[2] == 0
-    assert np.nanmax(sim.values("damage")) == 0.0
-    # The gap that is there is strain of the joint now: it pulls, and breaks again.
-    sim.step()
-    assert sim.joint_counts()[1] + sim.joint_counts()[2] >= broken
+    after = sim.values("damage")
+    assert sim.joint_counts()[1:] == (0, broken) and np.array_equal(sim.events()["joint"], events)
+    assert np.array_equal(after == 1.0, sim.values("state") == 3.0) and not ((after > 0.0) & (after < 1.0)).any()
+    free = ~sim.closed_faces()[events]
+    assert free.all() and not sim.closed_faces()[sim.numbers_of_joints(None)[0]]
+    sim.advance(40)
+    assert sim.joint_counts()[1] > 0 and sim.joint_counts()[2] >= broken
 
 
 def test_velocities_and_displacements_are_reset_where_they_are_asked_for():
@@ -145,9 +152,12 @@ def test_small_and_large_strain_differ_by_the_rotation():
         assert sim.values("stress_xy") == pytest.approx(0.0, abs=1.0)
 
 
-def test_resetting_elements_changes_nothing_in_an_elastic_model():
+def test_resetting_elements_changes_nothing_in_an_elastic_model_and_says_so():
+    log = Noted()
     sim = pulled(50)
+    sim.log = log
     before = sim.values("stress_yy")
     sim.reset_state()
     assert np.array_equal(sim.values("stress_yy"), before)
     assert sim.critical_time_step() == pytest.approx(sim.clock.dt)
+    assert "no element has a law with a state of its own (mech_iso_elastic)" in log.lines[-1]

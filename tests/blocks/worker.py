@@ -63,13 +63,18 @@ def mixed(sim: Blocks) -> None:
 
 
 def flight(sim: Blocks) -> None:
-    """Two blocks shatter each other while both fly to the right, through the strips of all ranks."""
+    """Two blocks shatter each other while both fly to the right, through the strips of all ranks; their outer faces are
+    of three kinds."""
     one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
     two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13, kind="mixed"), 0.2, seed=2)
     sim.take_mesh(joined(one, two))
     sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
     sim.face_model(None, "contact_mohr_coulomb",
                    {"friction": 25.0, "penalty_normal": 2e11, "damping_t": 2e8, "damping_b": 2.0})  # fmt: skip
+    outside = sim.mesh.edges()
+    outside = outside.faces[~outside.inner][:, 0]
+    sim.face_property(outside[::3], {"friction": 5.0, "penalty_normal": 1e11, "damping_ratio": 0.3})
+    sim.face_property(outside[1::3], {"penalty_shear": 5e10, "damping_b": 4.0})
     sim.joint_model(None, COHESIVE, WEAK)
     n = len(one.points)
     sim.set_velocity(np.arange(n), vx=203.0, vy=0.0)
@@ -108,15 +113,45 @@ def open_up(sim: Blocks) -> None:
         sim.null(np.flatnonzero(np.hypot(*middle.T) < 0.16), relax=250)
     if sim.clock.step == 750:
         sim.option(dynamic=True)
-        sim.time_step(auto=True, mass_scaling=3e-6)
+        sim.time_step(mass_scaling=3e-6)
         sim.account_energy()
-        sim.table("blast", [(0.0, 0.0), (1e-4, -2e7), (3e-4, -2e6)])
+        sim.table("blast", [(0.0, 0.0), (1e-4, -2.5e7), (3e-4, -2e6)])
         gone = np.repeat(~sim.alive, 4) & (sim.partner >= 0)
         rim = sim.partner[gone]
         sim.stress_condition(rim[sim.alive[rim // 4]], normal="blast")
         sim.reset_displacement()
     if sim.clock.step == 1200:
         sim.element_property(np.arange(40), {"young": 40e9})
+        sim.time_step(auto=True)
+
+
+def backfill(sim: Blocks) -> None:
+    """The same bed; its hole is filled at rest, taken out once more and filled again in motion."""
+    opening(sim)
+
+
+def fill_up(sim: Blocks) -> None:
+    """What happens to it."""
+    middle = sim.mesh.centroids() - [0.75, 0.45]
+    hole = np.flatnonzero(np.hypot(*middle.T) < 0.16)
+    fill = {"density": 2000.0, "young": 5e9, "poisson_ratio": 0.3}
+    if sim.clock.step == 200:
+        sim.null(hole, relax=100)
+    if sim.clock.step == 400:
+        sim.element_model(hole, "mech_iso_elastic", fill)
+        joints = np.flatnonzero(sim.joint_exists())
+        inside = np.isin(joints // 4, hole) & np.isin(sim.partner[joints] // 4, hole)
+        sim.joint_model(joints[inside], COHESIVE, WEAK)
+    if sim.clock.step == 600:
+        sim.option(dynamic=True)
+        sim.time_step(mass_scaling=3e-6)
+        sim.account_energy()
+        sim.reset_displacement()
+        sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 0] > 1.6 - 1e-9), vx=0.5)
+    if sim.clock.step == 800:
+        sim.null(hole)
+    if sim.clock.step == 900:
+        sim.element_model(hole[:-3], "mech_iso_elastic", {**fill, "young": 20e9})
 
 
 def report_borders(sim: Blocks) -> None:
@@ -145,7 +180,8 @@ def nothing(sim: Blocks) -> None:
 
 
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
-         "opening": (opening, open_up), "borders": (report_borders, nothing)}  # fmt: skip
+         "opening": (opening, open_up), "backfill": (backfill, fill_up),
+         "borders": (report_borders, nothing)}  # fmt: skip
 
 
 def main() -> None:

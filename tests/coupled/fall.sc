@@ -16,8 +16,24 @@ pcdc mesh structured (0.2,[top + 0.002]) (0.8,[top + 0.202]) cells 6 2 group 'bl
 pcdc element c-model mech-iso-e property density 2600 young 1e8 poisson-r 0.25 damp-factor 0.1
 pcdc face-joint c-model c-i-c-i property friction 35 cohesion 6e4 tensile-strength 2e4 gf1 0.05 gf2 0.2 penalty-normal 1e9
 pcdc node initial velocity (0.3,-3)
-sand.set(print=100)
+pcdc history create 'vy' node value velocity-y id 0 every 30
+pcdc output vtk 'block' every 90
+sand.set(print=100, vtk=170, ps=150, save=70, energy=60, stepbar=40)
+sand.hist(1, 25, 'kinetic')
+sand.hist(2, 25, 'contacts')
+sand.plot(1, 2)
 both = hpcdem.couple(sand)
+called = []
+
+
+def brake(particles):                                 # in the middle of a command
+    called.append(particles.kinetic_energy())
+    if len(called) in (2, 7):
+        particles.prop(where='y 0 0.1', fric=0.1 * len(called))
+    return len(called) == 9                           # ends the command, in the fifth turn
+
+
+brakes = sand.every(30, brake)
 for turn in range(8):
     load = both.force()[1]
     steps = 60 if load > 0.0 else 40
@@ -28,7 +44,8 @@ for turn in range(8):
     if turn == 2:                                     # particles change, too
         sand.prop(damp=0.0)
         print('turn: %d of %d discs are gone' % (sand.delete('x 0 0.1'), sand.count))
-    print('turn %d: %d steps, %r %r %r' % (turn, steps, load, deep, sand.wall_forces()[-3]))
+    print('turn %d: %d steps, %r %r %r' % (turn, steps, load, deep, sand.wall_forces()[100]))
     if os.path.exists('peep'):
         peep = sand['x']
+print('turn: %r' % called)
 pcdc model save 'end.sav'

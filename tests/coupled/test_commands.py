@@ -12,7 +12,7 @@ from hpcdem import output
 from hpcdem.blocks import Blocks
 from hpcdem.cli import info
 from hpcdem.commands import properties, running, settings, walls
-from hpcdem.commands.blocks import assigning, closing, coupling, meshing, saving
+from hpcdem.commands.blocks import assigning, closing, coupling, meshing, modelling, saving
 from hpcdem.commands.blocks import running as stepping
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
@@ -21,7 +21,6 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.post import inventory
 from hpcdem.runtime.progress import BETWEEN, Log
-from hpcdem.simulation import Watcher
 from hpcdem.timers import Timers
 from tests.coupled.support import ROCK, discs
 
@@ -77,10 +76,6 @@ def test_refusals(tmp_path):
         coupling.couple(project, discs([(0.5, 0.9, 0.1)], tmp_path / "data", dt=5e-6))
     with pytest.raises(CommandError, match="time step must be positive"):
         coupling.couple(project, sim, dt=-1.0)
-    sim.watchers.append(Watcher(5, lambda: None))
-    with pytest.raises(CommandError, match="wait for steps of the particles"):
-        coupling.couple(project, sim)
-    sim.watchers.clear()
     inside = discs([(0.5, 0.31, 0.1)], tmp_path / "sand", dt=5e-6)
     with pytest.raises(CommandError, match="inside element"):
         coupling.couple(project, inside)
@@ -91,6 +86,116 @@ def test_refusals(tmp_path):
         running.cycle(sim, 1)
     project.clear()
     running.cycle(sim, 1)
+
+
+def test_scaled_masses_are_refused(tmp_path):
+    """Before anything is stepped, whichever comes first."""
+    project, sim = scene(tmp_path)
+    modelling.time_step(project, mass_scaling=1e-4)
+    with pytest.raises(CommandError, match="time-step mass-scaling must be 0"):
+        coupling.couple(project, sim)
+    modelling.time_step(project, mass_scaling=0.0)
+    coupling.couple(project, sim)
+    stepping.step(project, 2)
+    modelling.time_step(project, mass_scaling=1e-4)
+    with pytest.raises(CommandError, match="time-step mass-scaling must be 0"):
+        stepping.step(project, 2)
+    assert project.step == sim.clock.step == 2
+
+
+def test_equilibrium_at_once_is_refused(tmp_path):
+    project, sim = scene(tmp_path)
+    coupling.couple(project, sim)
+    with pytest.raises(CommandError, match="model solve elastic would leave the particles behind"):
+        stepping.solve_elastic(project)
+
+
+def test_a_time_step_that_is_said_later_counts(tmp_path):
+    """Of either side, or by SET frac; different ones for both are refused."""
+    project, sim = scene(tmp_path)
+    coupling.couple(project, sim)
+    clocks = sim.clock, project.blocks.clock
+    for say, dt in (
+        (lambda: settings.set_option(sim, "dt", 4e-6), 4e-6),
+        (lambda: modelling.time_step(project, value=3e-6), 3e-6),
+        (lambda: None, 3e-6),
+    ):
+        before = sim.clock.time
+        say()
+        stepping.step(project, 3)
+        assert [clock.dt for clock in clocks] == [dt, dt] and sim.clock.time == pytest.approx(before + 3 * dt)
+    settings.set_option(sim, "dt", 2e-6)
+    modelling.time_step(project, value=1e-6)
+    with pytest.raises(CommandError, match="SET dt 2e-06 s of the particles, model time-step 1e-06 s"):
+        stepping.step(project, 3)
+    modelling.time_step(project, value=2e-6)
+    settings.set_option(sim, "frac", 0.003)
+    modelling.time_step(project, value=0.0)
+    stepping.step(project, 3)
+    assert [clock.dt for clock in clocks] == pytest.approx([0.003 * np.sqrt(2.0 * 2500.0 * np.pi * 0.1**2 / 1e7)] * 2)
+
+
+def test_frac_is_what_the_particles_ask_for(tmp_path):
+    """sqrt(m / k) of the disc times it; a model time-step beyond is refused."""
+    project, sim = scene(tmp_path)
+    settings.set_option(sim, "frac", 0.003)
+    modelling.time_step(project, value=5e-5)
+    with pytest.raises(CommandError, match=r"SET frac 0\.003 gives"):
+        coupling.couple(project, sim)
+    modelling.time_step(project, value=0.0)
+    coupling.couple(project, sim)
+    assert (
+        sim.clock.dt == project.blocks.clock.dt == pytest.approx(0.003 * np.sqrt(2.0 * 2500.0 * np.pi * 0.1**2 / 1e7))
+    )
+
+
+def test_what_is_said_of_one_only_is_named(tmp_path):
+    """Gravity of one side, collision off, and walls of which blocks know nothing: once each."""
+    project, sim = scene(tmp_path)
+    said = io.StringIO()
+    sim.log = project.blocks.log = Log(stream=said)
+    settings.set_option(sim, "gravity", (0.0, -9.81))
+    modelling.option(project, collision=False)
+    walls.box(sim, -1.0, 2.0, 0.3, 3.0)
+    walls.wall(sim, 7, nodes=((1.1, -1.0), (1.1, 2.0)))
+    walls.wall(sim, 8, nodes=((1.25, -1.0), (1.25, 2.0)))
+    assigning.initial_velocity(project, (50.0, 0.0))
+    both = coupling.couple(project, sim)
+    stepping.step(project, 3)
+    told = said.getvalue()
+    assert told.count("gravity differs: SET gravity 0 -9.81 moves the particles, model gravity (0,0) the blocks") == 1
+    assert told.count("blocks do not touch each other; they do touch particles") == 1
+    assert told.count("is in or beyond wall 7: walls and BOX hold particles only") == 1
+    assert told.count("is in or beyond the bottom side of the BOX") == 1 and "wall 8" not in told
+    stepping.step(project, 1500)
+    told = said.getvalue()
+    assert told.count("wall 7") == told.count("bottom side") == told.count("is in or beyond wall 8") == 1
+    assert len(both.contacts()["id"]) > 0 or project.blocks.values("velocity_x").mean() < 50.0
+
+    modelling.gravity(project, (0.0, -9.81))
+    modelling.option(project, collision=True)
+    stepping.step(project, 3)
+    assert said.getvalue().count("gravity differs") == 1
+
+
+def test_a_property_counts_from_the_next_step_on(tmp_path):
+    """Also between two searches for contacts, and for a material that is new: as if the search had come then."""
+    ends = []
+    for searches in (False, True):
+        project, sim = scene(tmp_path / str(searches))
+        both = coupling.couple(project, sim)
+        stepping.step(project, 60)
+        link = both.link
+        properties.prop(sim, kn=3e7, fric=0.01)
+        if searches:
+            both._connect()
+            both._replay()
+        stepping.step(project, 2)
+        assert (both.link is link) is not searches
+        stepping.step(project, 60)
+        ends.append(state(project))
+        assert both.contacts()["fn"].max() == pytest.approx(3e7 * both.contacts()["overlap"].max())
+    assert np.array_equal(*ends)
 
 
 def test_info_of_a_checkpoint_of_both(tmp_path, capsys):

@@ -77,6 +77,36 @@ def test_rebound_of_a_hertz_disc(tmp_path):
     assert of_disc(both, "vy") == pytest.approx(v, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    "upper, others, expected",
+    [(None, None, 0.5), (10.0, None, 10.0), (None, 10.0, 0.5), (40.0, 10.0, 0.5), ("joint", None, 10.0)],
+)
+def test_friction_of_the_face_that_is_touched(tmp_path, upper, others, expected):
+    """A disc (0.5) pushed along a held body: mu F_n, or the smaller friction of the face it lies on: of its contact
+    model, or of the joint it was. What other faces of the element have does not count."""
+    mesh = rectangle(6, 1, 1.2, 0.6, kind="quad")
+    rock = body(mesh, fixed=True)
+    edges = mesh.edges()
+    high = mesh.points[edges.points][:, :, 1].min(axis=1) > 0.59
+    top, rest = edges.faces[high][:, 0], edges.faces[~high].reshape(-1)
+    if upper == "joint":
+        mesh = rectangle(6, 2, 1.2, 1.2, kind="quad")
+        rock = body(mesh, fixed=True)
+        edges = mesh.edges()
+        joints = edges.faces[(np.abs(mesh.points[edges.points][:, :, 1] - 0.6) < 1e-9).all(axis=1)][:, 0]
+        rock.joint_model(joints, "classic_intrinsic_cohesive_interface", {**JOINT, "friction": 10.0})
+        rock.null(np.flatnonzero(mesh.centroids()[:, 1] > 0.6))
+    for faces, angle in ((top, upper), (rest[rest >= 0], others)):
+        if isinstance(angle, float):
+            rock.face_model(faces, "contact_mohr_coulomb", {"friction": angle, "penalty_normal": 1e10})
+    both = together(discs([(0.31, 0.6 + R - 1e-5, R)], tmp_path, dt=5e-6), rock)
+    properties.prop(both.particles, xv=1.0)
+    both.advance(40)
+    found = both.contacts()
+    mu = expected if expected < 1.0 else math.tan(math.radians(expected))
+    assert len(found["fn"]) == 1 and abs(found["fs"][0] / found["fn"][0]) == pytest.approx(mu, rel=1e-9)
+
+
 def test_disc_at_rest(tmp_path):
     """U = m g / k on an elastic body that stands on its base, which carries both weights."""
     blocks = body(rectangle(3, 2, 0.6, 0.4), {**ROCK, "damp_factor": 0.5}, gravity=G)

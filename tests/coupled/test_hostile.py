@@ -69,13 +69,15 @@ def test_the_smaller_time_step_is_chosen(tmp_path):
     assert steps[1e4] == pytest.approx(alone, rel=1e-3) and steps[1e12] < 0.2 * alone
 
 
-@pytest.mark.parametrize("change", [{"dynamic": False}, {"auto": True}])
+@pytest.mark.parametrize("change", [{"dynamic": False}, {"auto": True}, {"mass_scaling": 1e-4}])
 def test_options_that_do_not_go_together(tmp_path, change):
     both = both_of(tmp_path)
-    if "auto" in change:
-        both.blocks.time_step(**change)
-    else:
+    if "dynamic" in change:
         both.blocks.option(**change)
+    else:
+        both.blocks.time_step(**change)
+        with pytest.raises(CommandError, match="coupled to"):
+            both.settle_time_step()
     with pytest.raises(CommandError, match="coupled to"):
         both.advance(1)
 
@@ -134,7 +136,14 @@ def test_blocks_that_are_replaced(tmp_path):
     both.advance(2)
 
 
-def test_nobody_is_called_while_both_are_stepped(launch, tmp_path):
+@pytest.mark.parametrize(
+    "inside, said",
+    [("pcdc model step 1", "model step 1 cannot be used by a function that is called in the middle of model step 20"),
+     ("s.cycle(1)", "CYC cannot be used by a function"), ("both.end()", "end cannot be used by a function"),
+     ("pcdc model new", "model new cannot be used by a function"), ("1 / 0", "ZeroDivisionError: division by zero")],
+)  # fmt: skip
+def test_what_a_function_must_not_do(launch, tmp_path, inside, said):
+    """Called in the middle of a command: an error with the line, on whose way out nothing hangs."""
     (tmp_path / "script.sc").write_text(
         "import hpcdem\n"
         "pcdc mesh structured (0,0) (1,1) cells 2 2\n"
@@ -144,9 +153,12 @@ def test_nobody_is_called_while_both_are_stepped(launch, tmp_path):
         "sand.box(-1.0, 3.0, -1.0, 4.0)\n"
         "sand.ball(0.5, 1.5, 0.1)\n"
         "sand.prop(density=2000.0, kn=1e7)\n"
-        "hpcdem.couple(sand)\n"
-        "sand.every(5, print)\n"
+        "both = hpcdem.couple(sand)\n"
+        "def act(s):\n"
+        f"    {inside}\n"
+        "sand.every(5, act)\n"
+        "pcdc model step 20\n"
     )
-    done = launch(1, "script.sc", cwd=tmp_path)
-    assert done.returncode != 0
-    assert "script.sc:10: " in done.stderr and "the blocks step these particles" in done.stderr
+    done = launch(1, "script.sc", "--no-figure", cwd=tmp_path)
+    assert done.returncode in (1, 2) and "script.sc" in done.stderr and "11" in done.stderr, done.stderr
+    assert said in done.stderr

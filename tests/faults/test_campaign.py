@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT / "scripts" / "lib"))
 
 from faults import campaign, judge, report
 from faults.kinds import KINDS
-from faults.model import Reference
+from faults.model import MODELS, Reference
 
 QUICK = (
     "kill a rank", "kill in a write of a checkpoint", "kill in a write of a frame", "kill at flush or rename",
@@ -27,17 +27,18 @@ QUICK = (
 
 @pytest.mark.alone
 def test_a_dozen_faults(tmp_path: Path) -> None:
-    """All runs come to the same end. One rank; two runs at a time."""
+    """All runs, of particles, blocks and both by turns, come to the same end. One rank; two runs at a time."""
     paths = [str(ROOT / "scripts" / "lib"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     kinds = [word for name in QUICK for word in ("--kind", name)]
     lines = tmp_path / "lines.json"
     command = [sys.executable, "-m", "faults", "--number", str(len(QUICK)), "--seed", "7", "--ranks", "1", *kinds]
-    done = run([*command, "--json", str(lines)], tmp_path, env={"PYTHONPATH": os.pathsep.join(paths)})
+    done = run([*command, "--json", str(lines)], tmp_path, env={"PYTHONPATH": os.pathsep.join(paths)}, timeout=900)
     assert done.returncode == 0, done.stderr
     rows = [json.loads(line) for line in lines.read_text().splitlines()]
     assert {row["kind"] for row in rows} == set(QUICK)
     assert {row["result"] for row in rows} <= {"survived", "refused", "missed"}
-    assert sum(row["result"] == "survived" for row in rows) >= 9
+    assert sum(row["result"] == "survived" for row in rows) >= 8
+    assert {row["model"] for row in rows} == set(MODELS)
     page = tmp_path / "page.md"
     page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
     report.into(page, report.text(rows, {"seed": 7, "minutes": 1.0, "cores": 2, "mpi": "Open MPI"}))
@@ -78,6 +79,29 @@ def test_a_missing_file_is_found(pair, pattern) -> None:
     path = sorted(data.glob(pattern))[-1]
     path.unlink()
     assert judge.other_end(data, reference, set()) == [f"{path.name} is missing"]
+
+
+def test_folders_below_are_looked_at(tmp_path: Path) -> None:
+    """As that of the particles of a coupled run: a changed series, a missing and a strange frame."""
+    reference = Reference(tmp_path / "reference", model=MODELS["coupled"])
+    for data in (reference.data, tmp_path / "data"):
+        (data / "sand").mkdir(parents=True)
+        (data / "sand" / "walls.csv").write_text("step,time\n50,1.0\n650,2.0\n")
+        (data / "sand" / "all_0000000500.dat").write_text("a frame")
+        (data / "run.json").write_text(str(data))
+    data = tmp_path / "data"
+    assert judge.other_end(data, reference, set()) == [] and judge.reached(data, reference.model) == 650
+    (data / "sand" / "walls.csv").write_text("step,time\n50,1.0\n")
+    (data / "sand" / "all_0000000500.dat").rename(data / "sand" / "all_0000000501.dat")
+    found = judge.other_end(data, reference, set())
+    assert len(found) == 3 and all("sand/" in why for why in found)
+
+
+def test_checkpoints_by_their_steps(tmp_path: Path) -> None:
+    names = ["auto_0000000900.sav", "0000000800.sav", "0000001000.sav"]
+    for name in names:
+        (tmp_path / name).touch()
+    assert [path.name for path in judge.in_order(tmp_path)] == [names[1], names[0], names[2]]
 
 
 def test_a_frame_that_does_not_belong_is_found(pair) -> None:

@@ -283,14 +283,16 @@ def test_output_files_are_listed():
         "SAV end.sav",
     )
     for words in (
-        "out/all_<step>.dat 5 about 11.5 kB",
+        "out/all_<step>.dat 5 about 14.5 kB",
         "out/all_<step>.vtkhdf 5",
         "out/wall_<step>.vtk 2",
         "out/<step>.sav 2",
         "xyr.dat 1 line 7: particles",
         "end.sav 1 line 8",
-        "out/hist_4.dat 1",
+        "out/hist_id_4.dat 1",
+        "out/hist_4.csv 1",
         "out/hist_4_vs_4.txt",
+        "out/hist_4_vs_4.png",
         "out/walls.csv",
     ):
         assert words in text

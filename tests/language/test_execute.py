@@ -131,7 +131,8 @@ A = Group("a")
         ("SAV b.sav", [("saving.save", ("/models/b.sav",), {})]),
         ("HIST id 5 interval 10 step", [("history.hist", (5, 10, "step"), {})]),
         ("PLOT hist 2 1", [("history.plot_hist", (), {"x": 2, "y": 1})]),
-        ("DRAW interval 200 bfill wall", [("history.draw", (200, ["bfill", "wall"]), {})]),
+        ("DRAW interval 200 bfill wall", [("history.draw", (200, ["bfill", "wall"], []), {})]),
+        ("DRAW -bline bfill", [("history.draw", (None, ["bfill"], ["bline"]), {})]),
     ],
 )  # fmt: skip
 def test_every_verb(line, calls):

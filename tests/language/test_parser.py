@@ -226,7 +226,7 @@ def test_reading_a_file(tmp_path):
         ("PROB fric 0.3", "did you mean 'PROP'?"),
         ("WALL id 1 frci 0.3", "WALL: read 'frci' at column 11, expected a keyword: id, nodes"),
         ("WALL id 1 frci 0.3", "did you mean 'fric'?"),
-        ("IMPLE wall id 1 xmov3 5", "did you mean 'xmove'?"),
+        ("IMPLE wall id 1 xvmoe 5", "did you mean 'xmove'?"),
         ("SET prnit 100", "did you mean 'print'?"),
         ("PROP fric 0.3 RANEG y 0 1", "did you mean 'RANGE'?"),
         ("DEL RANGE elipse (0 0) 1 1", "did you mean 'ellipse'?"),

@@ -6,35 +6,17 @@ the manual is silent the rule is that of docs/zdem_reference.md.
 
 from __future__ import annotations
 
-import io
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hpcdem import output
 from hpcdem.commands.bonds import _slots
 from hpcdem.errors import ScriptError
-from hpcdem.halo.comm import SerialComm
-from hpcdem.lang.zdem.execute import Interpreter
-from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.runtime.progress import Log
 from hpcdem.simulation import Simulation
 from tests.support import at_wall, body, force, pair, position, value, velocity
-
-
-@pytest.fixture
-def play(tmp_path):
-    """`play("BALL ...", "CYC 1")`: the model after these lines (behind START and SET dt) and their log."""
-
-    def run(*lines: str, begin: str = "START\nSET dt 1e-3") -> tuple[Simulation, str]:
-        out = io.StringIO()
-        sim = Simulation(SerialComm(), 1, tmp_path / "data", Log(0, out))
-        text = "\n".join([begin, *lines]) + "\n"
-        Interpreter(parse_text(text, str(tmp_path / "script.py"))).run(sim)
-        return sim, out.getvalue()
-
-    return run
 
 
 def model(play, *lines: str, **how) -> Simulation:
@@ -272,10 +254,13 @@ def test_a_window_without_particles_is_refused(play, tmp_path):
         play(begin="LOAD xyr.dat x 10 20")
 
 
-def test_exp_may_replace_the_file_that_was_loaded(play, tmp_path):
+def test_exp_does_not_replace_the_file_that_was_loaded(play, tmp_path):
     (tmp_path / "xyr.dat").write_text("1 2 1\n5 2 1\n")
-    play("DEL RANGE x 4 9", "EXP xyr.dat", begin="LOAD xyr.dat")
-    assert rows(tmp_path / "xyr.dat") == [["1.000000000000e+00", "2.000000000000e+00", "1.000000000000e+00"]]
+    with pytest.raises(ScriptError, match=r"xyr\.dat would be written over the file that line 1 reads"):
+        play("DEL RANGE x 4 9", "EXP xyr.dat", begin="LOAD xyr.dat")
+    assert (tmp_path / "xyr.dat").read_text() == "1 2 1\n5 2 1\n"
+    play("DEL RANGE x 4 9", "EXP left.dat", begin="LOAD xyr.dat")
+    assert rows(tmp_path / "left.dat") == [["1.000000000000e+00", "2.000000000000e+00", "1.000000000000e+00"]]
 
 
 def test_sav_and_res(play, tmp_path):
@@ -297,7 +282,7 @@ def test_ini_is_prop(play):
         play, *ROW, "INI xv 2.0 yv -1 spin 3 RANGE id 1", "INIT den 7 fric 0.25 shear 2e9 poiss 0.2 damp 0.4 kn 5 ks 6"
     )
     assert (velocity(sim, 1).tolist(), value(sim, "spin", 1)) == ([2.0, -1.0], 3.0) and not velocity(sim, 2).any()
-    assert sim.materials.rows[sim.particles["material"][0]].tolist() == (7, 0.25, 2e9, 0.2, 0.4, 5, 6, 0)
+    assert sim.materials.rows[sim.particles["material"][0]].tolist() == (7, 0.25, 2e9, 0.2, 0.4, 5, 6, 0, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -575,10 +560,28 @@ def test_hist_and_plot(play, tmp_path):
         "STOP",
     )
     data = tmp_path / "data"
-    assert [row[0] for row in rows(data / "hist_1.dat")[1:]] == ["10", "20", "30", "40"]
-    assert float(rows(data / "hist_1.dat")[1][2]) == pytest.approx(0.5 * 2 * math.pi * 9)
+    table = (data / "hist_1.csv").read_text().splitlines()
+    assert table[0] == "step,time [s],kinetic [J]" and [row.split(",")[0] for row in table[1:]] == [
+        "10",
+        "20",
+        "30",
+        "40",
+    ]
+    assert float(table[1].split(",")[2]) == pytest.approx(0.5 * 2 * math.pi * 9)
     curve = rows(data / "hist_1_vs_2.txt")
     assert curve[0] == ["#", "step", "kinetic"] and [float(row[0]) for row in curve[1:]] == [20.0, 40.0]
+    drawn = pytest.importorskip("matplotlib.image").imread(data / "hist_1_vs_2.png")
+    inside = drawn[200:-200, 300:-100, :3]
+    assert drawn.shape[0] > 500 and (inside.max(axis=-1) - inside.min(axis=-1)).max() > 0.3  # a coloured line
+
+
+def test_plot_without_matplotlib_says_so(play, tmp_path, monkeypatch):
+    monkeypatch.setattr(output, "find_spec", lambda name: None)
+    _, log = play(
+        "BALL id 0 x 0 y 0 rad 1", "PROP density 2", "HIST ID 1 INTERVAL 1, step", "PLOT 1 1", "CYC 2", "STOP"
+    )
+    assert "hist_1_vs_1.png is not drawn: matplotlib is not installed" in log
+    assert (tmp_path / "data" / "hist_1_vs_1.txt").exists()
 
 
 def test_draw_is_noted(play):

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hpcdem.errors import CommandError
+from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon, chain, has_expressions
 
 EXTENTS = {"left": 0.0, "right": 100.0, "bottom": 10.0, "top": 4000.0}
@@ -152,3 +153,26 @@ def test_variables_without_a_value():
 def test_selections_travel_between_ranks():
     selection = (Interval("y", TOP_KILOMETRE, 1.0) | Group("a")) & Ids(1, 2)
     assert pickle.loads(pickle.dumps(selection)) == selection
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("group sed", 4),
+        ("group sed or x (6 8) y (0 2)", 8),
+        ("group sed or y (0 2) x (6 8)", 8),
+        ("x (6 8) y (0 2) or group sed", 8),
+        ("group sed and x (0 1) y (0 9) or x (6 8) y (0 2) or x (6 8) y (8 10)", 10),
+        ("group sed or x (6 8) and y (0 2)", 4 + 2),  # two terms and two words: from left to right
+        ("group sed or id 0 99 y (0 2)", 20),
+        ("x (0 2) y (8 9) x (1 9)", 1),
+    ],
+)
+def test_a_rectangle_is_one_shape(text, number):
+    """Particles at 0.5, 1.5 ... 9.5 in x and y; four of them in the group."""
+    y, x = (k.ravel() + 0.5 for k in np.mgrid[0:10, 0:10].astype(float))
+    group = np.zeros(100, int)
+    group[[0, 1, 80, 90]] = 1
+    statement = parse_text(f"START\nPROP color red RANGE {text}\n").statements[1]
+    p = {"x": x, "y": y, "gid": np.arange(100), "group": group, "group_names": ["***", "sed"]}
+    assert statement.selection.mask(p).sum() == number

@@ -11,6 +11,7 @@ from hpcdem.fields import GID, RADIUS, WIDTH, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Migration
 from hpcdem.physics.dem import neighbours, walls
+from hpcdem.physics.dem.fast import Fast
 from hpcdem.physics.dem.histories import Histories
 
 SKIN = 0.15
@@ -24,7 +25,12 @@ class Model:
     are ghosts; some pairs and walls are remembered, some pairs are bonded."""
 
     def __init__(
-        self, seed: int, n: int = 400, ranks_columns: tuple[int, int] = (-99, 99), bonds: bool = False
+        self,
+        seed: int,
+        n: int = 400,
+        ranks_columns: tuple[int, int] = (-99, 99),
+        bonds: bool = False,
+        fast_ones: bool = False,
     ) -> None:
         random = np.random.default_rng(seed)
         hot = np.zeros((n, WIDTH))
@@ -38,7 +44,12 @@ class Model:
         hot, cell = hot[order], cell[order]
         column = cells.columns(cell)
         first, last = ranks_columns
-        shown = (column >= first - 1) & (column <= last)
+        self.fast, self.columns = Fast.none(), 1
+        if fast_ones:
+            gid = np.sort(random.permutation(hot.view(np.int64)[:, GID])[:9])
+            self.fast = Fast(gid, random.uniform(0.1, 2.2, 9), np.zeros(9, bool))
+            self.columns = int(np.ceil(2.0 * (self.largest + self.fast.reach.max()) / self.side))
+        shown = (column >= first - self.columns) & (column < last + self.columns)
         self.hot, self.cell, column = hot[shown].copy(), cell[shown].copy(), column[shown]
         self.n_left, self.n_own = int((column < first).sum()), int(((column >= first) & (column < last)).sum())
         self.gid = self.hot.view(np.int64)[:, GID]
@@ -48,6 +59,7 @@ class Model:
         dx, dy = (self.hot[:, c, None] - self.hot[None, :, c] for c in (X, Y))
         self.d2 = dx * dx + dy * dy
         self.limit = (self.hot[:, RADIUS, None] + self.hot[None, :, RADIUS] + SKIN) ** 2
+        self.own_reach = np.full(len(self.gid), 0.5 * SKIN)
         for i, j in self.all_pairs(self.side if bonds else 0.0):
             if random.random() < 0.6:
                 bond = int(random.integers(0, 3)) if bonds else 0
@@ -57,6 +69,11 @@ class Model:
             for w in range(len(WALLS) - 1):
                 if random.random() < 0.05:
                     self.memory[self.gid[i], -1 - w] = (random.normal(), 1.0, 0)
+        if fast_ones:
+            rows, at = self.fast.among(self.gid)
+            self.own_reach[rows] = self.fast.reach[at]
+            both = self.hot[:, RADIUS] + self.own_reach
+            self.limit = np.maximum(self.limit, (both[:, None] + both) ** 2)
 
     def remember(self, i: int, j: int, values: tuple) -> None:
         self.memory[self.gid[i], self.gid[j]] = self.memory[self.gid[j], self.gid[i]] = values
@@ -83,7 +100,7 @@ class Model:
         where = np.random.default_rng(seed).permutation(self.n_own)
         return neighbours.build(
             self.hot, self.cell, self.n_left, self.n_own, self.histories(where), where, WALLS, self.side, self.largest,
-            SKIN, self.reach, n_blocks,
+            SKIN, self.reach, n_blocks, None, self.fast, self.columns,
         )  # fmt: skip
 
     def expected(self) -> list[tuple]:
@@ -114,11 +131,13 @@ MODELS = [
 ]
 
 
+@pytest.mark.parametrize("fast_ones", [False, True])
 @pytest.mark.parametrize("n_blocks", [1, 2, 5])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
-def test_the_list_holds_the_pairs_that_a_search_of_all_finds(seed, columns, bonds, n_blocks):
-    """Order, memory and bonds too; of several blocks each has the pairs that touch its own particles."""
-    model = Model(seed, ranks_columns=columns, bonds=bonds)
+def test_the_list_holds_the_pairs_that_a_search_of_all_finds(seed, columns, bonds, n_blocks, fast_ones):
+    """Order, memory and bonds too; of several blocks each has the pairs that touch its own particles. With some that
+    have a reach of their own, over several columns."""
+    model = Model(seed, ranks_columns=columns, bonds=bonds, fast_ones=fast_ones)
     lists = model.build(n_blocks)
     expected = model.expected()
     for t in range(n_blocks):
@@ -130,9 +149,10 @@ def test_the_list_holds_the_pairs_that_a_search_of_all_finds(seed, columns, bond
     assert lists.longest_bond2() == max((model.d2[pair] for pair in bonded), default=0.0)
 
 
+@pytest.mark.parametrize("fast_ones", [False, True])
 @pytest.mark.parametrize(("seed", "columns", "bonds"), MODELS)
-def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds):
-    model = Model(seed, ranks_columns=columns, bonds=bonds)
+def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds, fast_ones):
+    model = Model(seed, ranks_columns=columns, bonds=bonds, fast_ones=fast_ones)
     lists = model.build(3)
     expected = []
     for i in model.owned:
@@ -140,7 +160,8 @@ def test_wall_slots_are_those_near_or_remembered(seed, columns, bonds):
         for w, wall in enumerate(WALLS):
             _, _, qx, qy = walls.closest(wall, x, y)
             known = model.memory.get((model.gid[i], -1 - w))
-            if known or (x - qx) ** 2 + (y - qy) ** 2 <= (r + SKIN) ** 2:
+            far = r + max(SKIN, 0.5 * SKIN + model.own_reach[i])
+            if known or (x - qx) ** 2 + (y - qy) ** 2 <= far**2:
                 expected.append((i, w, *(known[:2] if known else (0.0, 0.0))))
     assert list(zip(lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side)) == expected
     assert lists.wptr.tolist() == np.searchsorted(lists.slot_row, lists.blocks.cut).tolist()
@@ -242,9 +263,9 @@ class Post(SerialComm):
     def __init__(self, size: int) -> None:
         self.size, self.sent = size, {}
 
-    def alltoallv(self, parts):
-        self.sent.setdefault(self.rank, parts)
-        return [self.sent.get(source, [np.empty(0, np.int64)] * self.size)[self.rank] for source in range(self.size)]
+    def exchange(self, parcels):
+        self.sent.setdefault(self.rank, parcels)
+        return {source: sent[self.rank] for source, sent in sorted(self.sent.items()) if self.rank in sent}
 
 
 def test_particles_and_histories_arrive_in_the_order_of_ranks():

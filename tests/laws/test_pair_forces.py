@@ -75,7 +75,7 @@ def reference(sim: Simulation) -> tuple[np.ndarray, np.ndarray, np.ndarray, list
         nx, ny, la, lb = dx / d, dy / d, ri - 0.5 * u, rj - 0.5 * u
         vs = ny * (hot[i, VX] - hot[j, VX]) + nx * (hot[j, VY] - hot[i, VY]) - hot[i, SPIN] * la - hot[j, SPIN] * lb
         model, a, b, mu = sim.pair_laws[ihot[i, MATERIAL] * len(sim.materials) + ihot[j, MATERIAL]]
-        which, e, g, tensile, shear = table[kind]
+        which, e, g, tensile, shear, _ = table[kind]
         area = laws.bond_area.py_func(two_rt, True)
         if u >= 0.0:
             fn, ks = laws.contact.py_func(model, a, b, two_rt, u)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 
 import numpy as np
 import pytest
@@ -181,9 +182,10 @@ def test_deep_penetration_keeps_its_side(tmp_path):
     began, through many rebuilds of the lists."""
     sim = held(tmp_path, 0.0, 0.95, ((-5.0, 0.0), (5.0, 0.0)))
     before = sim.rebuilds
-    for y in (0.5, 0.0, -0.5, -1.0, -2.0, -4.0, -1.5, 0.3, 0.99):
+    for y in (0.5, 0.0, -0.5, -1.0, -2.0, -4.0, -1.5, 0.3, 0.6, 0.99):
         put(sim, 0.0, y, n=40)
         assert force(sim)[:2] == pytest.approx([0.0, (1.0 - y) * K], rel=1e-9, abs=1e-5), f"y = {y}"
+        sim.rebuild()  # besides those that the way asks for: few, as the ball has a reach of its own
     assert sim.rebuilds > before + 10
     put(sim, 0.0, 1.01, n=5)
     assert at_wall(sim) is None and not force(sim).any()
@@ -328,7 +330,9 @@ def test_particles_that_leave_the_box_are_deleted(tmp_path):
     properties.prop(sim, only(8), yv=-30.0)
     steps(sim, 200)
     assert sim.particles["gid"].tolist() == [5] and value(sim, "x", 5) == 0.0
-    assert "left the BOX" in said.getvalue() and "3 at (10" in said.getvalue() and "8 at (0, -5" in said.getvalue()
+    places = {gid: (float(x), float(y)) for gid, x, y in re.findall(r"left the BOX .*: (\d+) at \((\S+), (\S+)\)",
+                                                                     said.getvalue())}  # fmt: skip
+    assert places.keys() == {"3", "8"} and 10.0 < places["3"][0] < 12.0 and -7.0 < places["8"][1] < -5.0
 
 
 def test_a_box_that_holds(tmp_path):

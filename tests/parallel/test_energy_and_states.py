@@ -81,7 +81,7 @@ def test_the_same_on_any_ranks_and_threads(
     folder, log = one
     other = run(launch, tmp_path / "other", ranks, "-j", threads, "--against", folder / "log.txt")
     assert states(other) == states(log) and "13 states are those of" in other
-    for name in ("energy.csv", "hist_1.dat"):
+    for name in ("energy.csv", "hist_1.csv", "hist_id_1.dat"):
         assert (tmp_path / "other/data" / name).read_bytes() == (folder / "data" / name).read_bytes()
 
 

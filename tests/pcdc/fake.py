@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from hpcdem.blocks import Balanced
+from hpcdem.blocks import Balanced, Watch
 from hpcdem.clock import Clock
 from hpcdem.commands.blocks import Project
 from hpcdem.errors import CommandError
@@ -49,6 +51,9 @@ class FakeBlocks:
         self.clear()
 
     def clear(self) -> None:
+        self.local = SimpleNamespace(passes=0)
+        self.event_rows: list[Any] = []
+        self.joint_row = np.zeros(0)
         self.mesh: Mesh | None = None
         self.clock = Clock()
         self.tables: dict[str, Table] = {}
@@ -89,10 +94,15 @@ class FakeBlocks:
     def remove_table(self, name: str) -> None:
         del self.tables[name]
 
+    def close_model(self) -> None:
+        """Ready to step: the time step is known."""
+        self.clock.dt = self.clock.dt or 0.01
+
     def advance(self, steps: int) -> int:
         assert steps > 0
         self.calls.append(("advance", (steps,), {}))
-        self.clock.dt = 0.01
+        self.close_model()
+        self.local.passes += steps
         self.clock.step += steps
         self.clock.time = self.clock.step * 0.01
         return 0
@@ -104,6 +114,11 @@ class FakeBlocks:
 
     def unbalanced_ratio(self) -> float:
         return 1.0 / max(self.clock.step, 1)
+
+    def watch(self, *how: Any) -> Watch:
+        """What is looked at on the way to a ratio."""
+        self.calls.append(("watch", how, {}))
+        return Watch(0, 0, self.clock.step)
 
     def joint_counts(self) -> tuple[int, int, int]:
         return 7, 2, 1
@@ -126,8 +141,23 @@ class FakeBlocks:
             raise CommandError(f"there is no quantity {name}")
         return found if numbers is None else found[numbers]
 
+    def corner_values(self, name: str, corners: Any = None) -> np.ndarray:
+        assert self.mesh is not None
+        at = np.column_stack([self.values(f"{name}_{axis}") for axis in "xy"])
+        return np.where((self.mesh.cells >= 0)[:, :, None], at[self.mesh.cells], np.nan).reshape(-1, 2)
+
     def total(self, name: str, numbers: Any = None) -> float:
         return float(self.values(name, numbers).sum())
+
+    def probe(self, name: str, numbers: Any = None) -> Any:
+        """Asks this simulation every time."""
+        return FakeProbe(self, name, np.array(numbers))
+
+    def crack_rows(self) -> list[Any]:
+        return self.event_rows
+
+    def one_moment(self) -> Any:
+        return nullcontext()
 
     def save(self, path: Path | str, extra: Any = None) -> None:
         mesh = self.mesh
@@ -151,12 +181,27 @@ class FakeBlocks:
         return state["extra"]
 
 
-class Bench:
-    """A script on a fake simulation: `bench("pcdc model new")` runs a text; blocks, project and the names of the script
-    can be looked at."""
+class FakeProbe:
+    """`hpcdem.blocks.probes.Probe` of a fake simulation."""
 
-    def __init__(self, folder: Path, comm: Any = None) -> None:
-        self.blocks = FakeBlocks(comm)
+    def __init__(self, sim: FakeBlocks, name: str, numbers: np.ndarray) -> None:
+        self.sim, self.name, self.numbers, self.local = sim, name, numbers, sim.local
+
+    def find(self) -> None:
+        """Nothing is to be found."""
+
+    def reduced(self, how: str, seen: Any = None) -> float:
+        values = self.sim.values(self.name, self.numbers)
+        made = {"sum": np.sum, "mean": np.mean, "minimum": np.min, "maximum": np.max, "": lambda found: found[0]}
+        return float(made[how](values))
+
+
+class Bench:
+    """A script on a fake simulation, or on `blocks`: `bench("pcdc model new")` runs a text; blocks, project and the
+    names of the script can be looked at."""
+
+    def __init__(self, folder: Path, comm: Any = None, blocks: Any = None) -> None:
+        self.blocks = blocks or FakeBlocks(comm)
         self.project = Project(self.blocks, folder, folder / "data")  # type: ignore[arg-type]
         self.interpreter = Interpreter(self.project)
         self.count = 0

@@ -133,12 +133,12 @@ def test_print_speaks_once(bench, capsys):
 def test_verbs_are_told_what_the_line_says(bench):
     bench(
         "pcdc model gravity (0,-9.81)\n"
-        "pcdc model option dynamic off collision on large-strain off\n"
+        "pcdc model option dynamic off collision on large-strain off overlap relax\n"
         "pcdc model time-step safety 0.5 mass-scaling 1e-6\n" + BOX + "pcdc table create 'v' values (0,0) (1,2)\n"
         "pcdc el c-m mech-iso-e den 2500 s 20e9 b 33e9 friction 30 pen 5e11\n"
         "pcdc element property damp-factor 0.3 range id 3 5\n"
         "pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2\n"
-        "pcdc element-f c-m contact-m-c property pen-shear 1e11 pen-normal 2e11 friction 30 damping-t 5e6 d-b 2\n"
+        "pcdc element-f c-m contact-m-c property pen-shear 1e11 pen-normal 2e11 friction 30 d-t 5e6 d-b 2 d-r 0.5\n"
         "pcdc face-j c-m c-i-c-i f 30 c 1e6 t-s 2e6 gf1 10 gf2 100 pen-o 5e12 np 3 range id 1\n"
         "pcdc element-face prop friction 20 range geometry 'top'\npcdc face-joint prop t-s 5 p-overlap 6 range id 1\n"
         "pcdc node bou mech-vel-b-c v-x 1 v-y table 'v' range y 2 2\n"
@@ -155,7 +155,7 @@ def test_verbs_are_told_what_the_line_says(bench):
     )
     told = bench.blocks.told
     assert told("gravity") == [((0.0, -9.81), {})]
-    assert told("option") == [((), {"dynamic": False, "collision": True, "large_strain": False})]
+    assert told("option") == [((), {"dynamic": False, "collision": True, "large_strain": False, "overlap": "relax"})]
     assert told("time_step") == [((), {"value": None, "auto": None, "safety": 0.5, "mass_scaling": 1e-6})]
     solid = {"density": 2500.0, "shear": 20e9, "bulk": 33e9, "friction": 30.0, "penalty": 5e11}
     assert told("element_model") == [((None, "mech_iso_elastic", solid), {})]
@@ -165,6 +165,7 @@ def test_verbs_are_told_what_the_line_says(bench):
     assert numbers.tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
     assert given == {"xx": -5e6, "yy": 0.0, "gradient": {"yy": (0.0, 25e3)}}
     contact = {"penalty_shear": 1e11, "penalty_normal": 2e11, "friction": 30.0, "damping_t": 5e6, "damping_b": 2.0}
+    contact["damping_ratio"] = 0.5
     assert told("face_model") == [((None, "contact_mohr_coulomb", contact), {})]
     (((numbers, name, joint), _),) = told("joint_model")
     assert numbers.tolist() == [1] and name == "classic_intrinsic_cohesive_interface"
@@ -207,13 +208,15 @@ def test_the_python_interface(bench):
         "m_p = pcdc.node(0).position\nm_v = pcdc.node(3).velocity.Y\nm_d = pcdc.node(3).displacement_x\n"
         "numbers = pcdc.numbers('node', group='top', set='bc')\n"
         "m_r = pcdc.total('node', 'reaction-y', group='top', set='bc')\n"
-        "stress = pcdc.values('element', 'stress-xx', x=(0, 1))\nm_e = pcdc.element(5).stress_yy\n"
+        "stress = pcdc.values('element', 'stress-xx', x=(0, 1), present=True)\n"
+        "in_mesh = pcdc.values('element', 'stress-xx', x=(0, 1))\nm_e = pcdc.element(5).stress_yy\n"
     )
     assert (bench["m_t"], bench["m_c"], bench["m_r"]) == (0.5, 50, 10.0)
     assert (bench["m_p"].X, bench["m_p"].Y, bench["m_v"], bench["m_d"]) == (0.5, 1.0, 2.0, 0.5)
     assert bench["numbers"].tolist() == [10, 11, 12, 13, 14]
     # The nodes have moved by 0.5: only centres that are now left of x = 1 count, those of the first column.
     assert isinstance(bench["stress"], np.ndarray) and len(bench["stress"]) == 2
+    assert len(bench["in_mesh"]) == 4
     for wrong in (
         "pcdc.node('a')",
         "pcdc.numbers('thing')",

@@ -85,9 +85,13 @@ def test_rounded_coordinates_are_found(bench):
     assert len(numbers(bench, g.NODE, g.Span(0, 0.1 + 0.2, 1.0))) == 2
 
 
-def test_the_present_positions_count(bench):
+def test_places_in_the_mesh_count_unless_the_range_says_present(bench):
     bench(BOX + "pcdc model step 100\n")  # nodes have moved by (1, 2)
-    assert numbers(bench, g.NODE, g.Span(0, 1, 1)) == [0, 5, 10] and numbers(bench, g.NODE, g.Span(1, 4, 4))[0] == 10
+    assert numbers(bench, g.NODE, g.Span(0, 1, 1)) == [1, 6, 11]
+    assert numbers(bench, g.NODE, g.Span(0, 1, 1), g.Present()) == [0, 5, 10]
+    assert numbers(bench, g.NODE, g.Present(), g.Span(1, 4, 4))[0] == 10
+    assert numbers(bench, g.ELEMENT, g.Span(0, 1, 2), g.Present()) == numbers(bench, g.ELEMENT, g.Span(0, 0, 1))
+    assert numbers(bench, g.JOINT, g.Span(0, 3, 3), g.Present()) == numbers(bench, g.JOINT, g.Span(0, 2, 2))
 
 
 def test_layers_of_the_mesh_and_of_the_drawing(bench):

@@ -33,8 +33,10 @@ def test_a_script_runs_on_every_rank_and_speaks_once(ranks, tmp_path, n):
     done = ranks(n, text)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("done 30") == 1
-    assert (tmp_path / "h.csv").read_text().splitlines()[1:] == ["10,0.1,10.0", "20,0.2,10.0", "30,0.3,10.0"]
-    assert (tmp_path / "data" / "history_load.csv").read_text().count("\n") == 4 and (tmp_path / "c.png").is_file()
+    assert (tmp_path / "data" / "h.csv").read_text().splitlines()[1:] == ["10,0.1,10.0", "20,0.2,10.0", "30,0.3,10.0"]
+    assert (tmp_path / "data" / "history_load.csv").read_text().count("\n") == 4 and (
+        tmp_path / "data" / "c.png"
+    ).is_file()
 
 
 @pytest.mark.parametrize(

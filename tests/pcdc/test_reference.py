@@ -6,10 +6,9 @@ from pathlib import Path
 
 from hpcdem.commands.blocks.histories import UNITS
 from hpcdem.lang.pcdc import table as t
-from hpcdem.lang.pcdc.bindings import _MODELS, python
 from hpcdem.lang.pcdc.reference import page
+from hpcdem.lang.pcdc.trial import MODELS, python
 from hpcdem.model.blocks import groups as g
-from hpcdem.model.blocks.properties import MODELS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pcdc_reference.md"
 
@@ -57,9 +56,9 @@ def test_everything_has_a_meaning():
 
 def test_models_have_the_properties_of_the_simulation():
     rows = {m.keyword.name: m for c in t.COMMANDS for m in c.models if not m.later}
-    for name, inner in _MODELS.items():
+    for name, inner in MODELS.items():
         mine = {python(option.name) for option in rows[name].options}
-        assert mine - {"np"} == {p.name for p in MODELS[inner].properties}, name
+        assert mine - {"np"} == {p.name for p in inner.properties}, name
 
 
 def test_histories_record_what_the_verbs_can():

@@ -100,10 +100,10 @@ def test_histories(bench):
     assert made["gauge"] == [(40, 0.4, 2 / 3)]  # element 0 of (0,0) (1,0) (1,1) holds the point: its centre
     assert made["mean"][0][2] == pytest.approx(1.0) and made["low"][0][2] == centres[:, 1].min() == pytest.approx(1 / 3)
     assert made["high"][0][2] == centres[:, 1].max() == pytest.approx(5 / 3)
-    table = rows(bench, "all.csv")
+    table = rows(bench, "data/all.csv")
     assert table[0][:4] == ["step", "time [s]", "one displacement_y [m]", "near position_x [m]"]
     assert [row[0] for row in table[1:]] == ["20", "40"] and table[1][4] == "" and table[2][4] == repr(2 / 3)
-    assert rows(bench, "two.csv")[0] == ["step", "time [s]", "load reaction_y [N/m]", "one displacement_y [m]"]
+    assert rows(bench, "data/two.csv")[0] == ["step", "time [s]", "load reaction_y [N/m]", "one displacement_y [m]"]
     assert rows(bench, "data/history_load.csv") == [
         ["step", "time [s]", "reaction_y [N/m]"], ["20", "0.2", "10.0"], ["40", "0.4", "10.0"]
     ]  # fmt: skip
@@ -149,7 +149,7 @@ def test_charts(bench):
         "pcdc chart add 'c' values (0,0) (1200,0.02) label 'exact' style points\n"
         "pcdc chart export 'c' 'c.png'\npcdc chart export 'c' 'c2.pdf'\npcdc chart export 'c' 'c3.svg'\n"
     )
-    table = rows(bench, "c.csv")
+    table = rows(bench, "data/c.csv")
     assert table[0] == ["curve", "x", "load, total [kN]"]
     assert [row[0] for row in table[1:]] == ["model"] * 3 + ["exact"] * 2
     assert [[float(v) for v in row[1:]] for row in table[1:4]] == [
@@ -159,7 +159,7 @@ def test_charts(bench):
     ]
     begins = {"c.png": b"\x89PNG", "c2.pdf": b"%PDF", "c3.svg": b"<?xml"}
     for name, first in begins.items():
-        assert (bench.project.directory / name).read_bytes().startswith(first)
+        assert (bench.project.outdir / name).read_bytes().startswith(first)
     for text in ("pcdc chart export 'c' 'c.gif'\n", "pcdc chart add 'c' y 'none'\n", "pcdc chart add 'd' y 'load'\n"):
         with pytest.raises(HpcdemError):
             bench(text)
@@ -187,6 +187,9 @@ class Asked:
 
     reason = "SIGTERM"
     took: float | None = None
+
+    def overdue_request(self) -> int:
+        return 0
 
     def decide(self, code: int) -> str:
         return "stop" if code == STOP else "none"

@@ -71,9 +71,9 @@ def test_the_bar_holds_up_to_its_strength_and_breaks(alone):
     assert STRENGTH > np.nanmax(cells["stress_xx"])
     largest = history(alone, "point")[:, 2]
     assert 0.99 * STRENGTH < largest.max() <= STRENGTH * (1 + 1e-12)  # at its points the law ends at the strength
-    table = (alone / "pull.csv").read_text().splitlines()
+    table = (alone / "data" / "pull.csv").read_text().splitlines()
     assert table[0] == "curve,displacement [um],stress [MPa]" and len(table) == 1 + len(load)
-    assert (alone / "pull.png").stat().st_size > 5000
+    assert (alone / "data" / "pull.png").stat().st_size > 5000
 
 
 @pytest.mark.slow

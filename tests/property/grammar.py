@@ -93,6 +93,7 @@ class Maker:
         self.balls = 0
         self.walls: dict[int, float] = {}
         self.saves = 0
+        self.accounts = self.pressed = False
 
     # ---- drawing
 
@@ -211,6 +212,7 @@ class Maker:
         more = [
             self.perhaps(20, f"seed {self.whole(0, 99)}"), self.perhaps(15, "wallside", self.pick("left", "both")),
             self.perhaps(15, f"gentry {self.pick('3', '0.5', '40')}"), self.perhaps(15, f"stepbar {self.whole(7, 90)}"),
+            self.perhaps(10, "thickness 3.0"),
         ]  # fmt: skip
         if any(more):
             self.add("SET", *more)
@@ -227,10 +229,11 @@ class Maker:
         return 0.005 * self.dt * self.stiffness / self.share**2
 
     def intervals(self) -> None:
-        """Outputs, not too many of them."""
+        """Outputs, not too many of them. The account of energy does not go with pressures."""
         for name, percent in (("print", 40), ("save", 20), ("vtk", 15), ("ps", 15), ("energy", 20)):
-            if self.chance(percent):
+            if self.chance(percent) and not (name == "energy" and self.pressed):
                 self.add("SET", name, str(self.pick(50, 70, 130, 0)))
+                self.accounts |= name == "energy"
 
     def enclosure(self) -> None:
         r, fric = self.r, self.pick("0.0", "0.4")
@@ -385,6 +388,7 @@ class Maker:
             keys += f" tstrength {number(force / area)} sstrength {number(2 * force / area)}"
         else:
             keys = f"n_bond {number(force)} s_bond {number(force * self.pick(1, 3))}"
+        keys += self.perhaps(15, " rubber")
         self.add("PROP", keys, reach, self.perhaps(30, "fric 0.5"), self.perhaps(70, self.range()))
 
     def do_break(self) -> None:
@@ -397,7 +401,30 @@ class Maker:
             self.perhaps(20, "damp 0.2"), self.perhaps(30, f"color {self.pick('blue', '3')}"),
             self.perhaps(30, self.group(self.pick("chosen", "bed"))),
         ]  # fmt: skip
+        if not self.accounts:
+            push = number(1e-3 * self.stiffness)
+            keys += [self.perhaps(15, f"xp {push}"), self.perhaps(15, f"yp -{push}")]
+            self.pressed |= any(key.startswith(("xp", "yp")) for key in keys)
         self.add("PROP", *(keys if any(keys) else ["color black"]), self.range())
+
+    def do_platens(self) -> None:
+        """Two short rows, and the stress and strain between them and between walls."""
+        names = [f"{place}{len(self.lines)}" for place in ("low", "high")]
+        for name, y in zip(names, (self.y(0.2, 0.4), self.y(1.4, 1.6)), strict=True):
+            x = self.x(0.3, 0.5)
+            self.add(f"GLINE p1 {point(x, y)} p2 {point(x + 6 * self.r, y)} rad {number(self.r)}", self.springs(),
+                     self.group(name))  # fmt: skip
+        self.add("PROP", self.material(), f"RANGE group {names[0]} or group {names[1]}")
+        wishes = [f"gstress group {names[0]}", f"gstrain group {'|'.join(names)}"]
+        for ident, axis in ((0, "y"), (1, "x"), (2, "x")):
+            wishes += [f"wall id {ident} {axis}stress"] * (ident in self.walls)
+        wishes += ["xstrain wall 1|2"] * (1 in self.walls and 2 in self.walls)
+        wishes += ["ystrain wall 0|1"] * (0 in self.walls and 1 in self.walls)
+        for ident in range(4, 4 + self.whole(1, 3)):
+            self.add(f"HIST id {ident} interval {self.whole(5, 40)}, {self.pick(*wishes)}")
+
+    def do_log(self) -> None:
+        self.add(self.pick("LOG on", "LOG off", "PAUSE"))
 
     def do_fix(self) -> None:
         self.add(self.pick("FIX", "FREE"), self.pick("x y spin", "y", "spin", "x y"), self.range())
@@ -442,7 +469,8 @@ class Maker:
         self.add(f"SAV kept{self.saves}.sav")
 
     def do_draw(self) -> None:
-        self.add("DRAW", self.perhaps(60, "interval 40"), self.pick("bfill wall", "bondc bid bang", "mesh cforce", ""))
+        self.add("DRAW", self.perhaps(60, "interval 40"), self.pick("bfill wall", "bondc bid bang", "mesh cforce", "",
+                                                                     "-bline bfill", "bline"))  # fmt: skip
 
     def run(self) -> None:
         """CYC, or IMPLE if a wall moves."""
@@ -462,7 +490,7 @@ class Maker:
 
 
 EVENTS = ("rain", "delete", "bond", "prop", "move_a_wall", "break", "fix", "set", "new_wall", "row", "ball", "export",
-          "save", "draw", "clumps", "join")  # fmt: skip
+          "save", "draw", "clumps", "join", "platens", "log")  # fmt: skip
 
 
 @st.composite

@@ -59,6 +59,7 @@ def test_a_frame_as_text(n: int, number: int, size: int) -> None:
         write_dat(again, found, SerialComm())
         # Words, not bytes: groups without a particle are not in the file, and the longest name makes the column wide.
         one, other = (file.read_bytes().splitlines() for file in (path, again))
+        assert (one.pop(1).split()[-1], other.pop(1).split()[-1]) == (b"all_1.dat", b"all_2.dat")
         assert [line.split() for line in one] == [line.split() for line in other]
 
 
@@ -77,7 +78,7 @@ def test_walls_csv_and_histories_hold_doubles(x: float, y: float, xv: float, dt:
         step, time, wall, *ends = rows[-1].split(",")
         assert (int(step), float(time), int(wall)) == (2, sim.clock.time, 3)
         assert [float(word) for word in ends[:4]] == [*sim.walls.p1[0], *sim.walls.p2[0]]
-        step, time, value = (Path(name) / "hist_1.dat").read_text().splitlines()[-1].split()
+        step, time, value = (Path(name) / "hist_1.csv").read_text().splitlines()[-1].split(",")
         assert int(step) == 2 and float(time) == float(value) == sim.clock.time
 
 

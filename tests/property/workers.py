@@ -253,7 +253,7 @@ def said(path: Path) -> dict[str, Any]:
     for name, values in contents(path).items():
         if name == "@state":
             state = json.loads(str(values))
-            for word in ("script", "position"):
+            for word in ("script", "position", "makers"):
                 state.pop(word)
             (state["progress"] or {}).pop("position", None)
             found |= {f"@state {word}": json.dumps(value) for word, value in state.items()}

@@ -69,7 +69,7 @@ def test_copies_that_do_not_know_each_other_are_refused(slurm: Cluster, tmp_path
 
 def test_an_error_ends_the_step_with_its_code(slurm: Cluster, tmp_path: Path) -> None:
     script = write_push(tmp_path / "wrong", steps=300)
-    script.write_text(script.read_text().replace("density", "densitty"))
+    script.write_text(script.read_text().replace("density", "weight"))
     done = slurm.srun(RANKS, BIN / "hpcdem", script, cwd=tmp_path)
     assert done.returncode == 2
     assert "push.py:9" in done.stderr

@@ -33,6 +33,7 @@ def make_frame(n: int = 500, comm: Any = None, seed: int = 1, scale: float = 1.0
     particles: dict[str, np.ndarray] = {"gid": gid, "x": x * scale, "y": y * scale, "radius": radius * scale}
     floats = "vx vy spin angle fx fy torque mass inertia density fric shear poiss kn ks damp"
     particles |= {name: wild(n) for name in floats.split()}
+    particles["push_x"], particles["push_y"] = wild(n), wild(n)
     particles |= {
         "hertz": rng.integers(0, 2, n).astype(np.int8),
         "fix": rng.integers(0, 8, n).astype(np.uint8),
@@ -53,6 +54,7 @@ def make_frame(n: int = 500, comm: Any = None, seed: int = 1, scale: float = 1.0
 
     contacts = links(pairs[touching])
     bonds = links(pairs[bonded], ("ebmod", "gbmod", "tstrength", "sstrength"))
+    bonds["rubber"] = rng.integers(0, 2, int(bonded.sum())).astype(np.int8)
     bonds["kind"] = rng.integers(1, 3, int(bonded.sum())).astype(np.int8)
     low = np.flatnonzero(y < y.min() + spacing)
     wall_contacts = {"id1": gid[low], "wall": np.full(len(low), 4, dtype=np.int32)}
@@ -62,7 +64,7 @@ def make_frame(n: int = 500, comm: Any = None, seed: int = 1, scale: float = 1.0
     p1 = np.concatenate([corners, [[0.0, 10.0], [10010.0, 10000.0], [40010.0, 10.0]]])
     p2 = np.concatenate([np.roll(corners, -1, axis=0), [[40000.0, 10.0], [10010.0, 10.0], [40010.0, 10000.0]]])
     walls = {
-        "id": np.array([-1, -2, -3, -4, 0, 1, 2], dtype=np.int64),
+        "id": np.array([100, 101, 102, 103, 0, 1, 2], dtype=np.int64),
         "p1": p1 * scale,
         "p2": p2 * scale,
         "kn": wild(7),

@@ -231,7 +231,7 @@ def written(tmp_path_factory) -> Path:
     (folder / "ucs.sc").write_text(eval(f"find('ucs')({COARSE})").script())
     done = Launcher()(1, "ucs.sc", cwd=folder, timeout=600)
     assert done.returncode == 0, done.stderr
-    assert (folder / "ucs.png").stat().st_size > 5000 and list((folder / "data").glob("all_*.jpg"))
+    assert (folder / "data" / "ucs.png").stat().st_size > 5000 and list((folder / "data").glob("all_*.jpg"))
     return folder
 
 
@@ -240,7 +240,7 @@ def test_step_by_step_in_a_script(launch, written, tmp_path):
     done = launch(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
     assert done.returncode == 0, done.stderr
     assert histories(tmp_path / "data") == histories(written / "data")
-    curve = np.loadtxt(written / "ucs.csv", delimiter=",", skiprows=1, usecols=(1, 2))
+    curve = np.loadtxt(written / "data" / "ucs.csv", delimiter=",", skiprows=1, usecols=(1, 2))
     (line,) = found(done.stdout)
     assert float(line.split()[1]) == pytest.approx(1e6 * curve[:, 1].max(), rel=1e-12)
 

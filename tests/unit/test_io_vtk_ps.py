@@ -85,7 +85,8 @@ def test_axes_take_the_unit_that_fits(longer: float, unit: str) -> None:
     seen = View(0.0, longer, 0.0, longer / 4)
     assert seen.unit[1] == unit
     x, y = seen.ticks()
-    assert 3 <= len(x.major) <= 8 and len(y.major) >= 2
+    assert 3 <= len(x.major) <= 11 and len(y.major) >= 2
+    assert np.diff(x.major).min() == pytest.approx(np.diff(y.major).max())
     assert set(np.round(x.major, 9)) <= set(np.round(x.minor, 9))
 
 
@@ -93,6 +94,23 @@ def test_ticks_are_those_of_the_manual_for_its_models() -> None:
     x, y = View(0.0, 41000.0, 0.0, 11000.0).ticks()
     assert x.labels == ["0", "10", "20", "30", "40"] and y.labels == ["0", "10"]
     np.testing.assert_allclose(x.minor, np.arange(42))
+
+
+@pytest.mark.parametrize(
+    ("high", "first", "along", "up"),
+    [
+        (7000.0, 0.0, 5.0, ["0", "5"]),  # two numbers are to be had
+        (3000.0, 0.0, 10.0, ["0"]),  # they would crowd the other axis: one will do
+        (1000.0, 5200.0, 10.0, ["5.5", "6"]),  # none will not
+    ],
+)
+def test_both_axes_go_in_the_same_steps(high: float, first: float, along: float, up: list[str]) -> None:
+    x, y = View(0.0, 40000.0, first, first + high).ticks()
+    assert np.diff(x.major) == pytest.approx(along)
+    assert y.labels == up
+    if first == 0.0:
+        assert np.diff(y.major) == pytest.approx(along)
+        assert np.diff(y.minor) == pytest.approx(x.minor[1] - x.minor[0])
 
 
 def test_what_is_seen() -> None:

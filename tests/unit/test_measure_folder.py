@@ -95,6 +95,35 @@ def test_wedge_of_the_last_frame(folder: Path) -> None:
     assert table(folder / "measure", "wedge")[0]["height[m]"] == ""  # flat ground
 
 
+@pytest.mark.parametrize("kind", ["vtkhdf", "dat"])
+@pytest.mark.parametrize(("fix", "counts"), [(3, False), (7, False), (1, True), (0, True)])
+def test_rows_that_stand_for_walls_are_no_surface(
+    folder: Path, tmp_path: Path, kind: str, fix: int, counts: bool
+) -> None:
+    """A column of particles 17 km high at the left end, fixed along x and y: the crest is that of the bed. Fixed along
+    x only, or not at all, it is a part of the bed."""
+    f = read_frame(folder / "all_0000004000.vtkhdf")
+    p = f.tables["particles"].columns
+    column_y = np.arange(R, 17_000.0, 2.0 * R)
+    n, wall = len(column_y), float(f.walls["p1"][1, 0])
+    new = {"gid": 10**6 + np.arange(n), "x": np.full(n, wall - 2.0 * R), "y": column_y, "radius": np.full(n, R)}
+    p["fix"] = np.zeros(len(p["gid"]), np.uint8)
+    new["fix"] = np.full(n, fix, np.uint8)
+    for name, values in p.items():
+        p[name] = np.concatenate([values, new.get(name, np.zeros(n))]).astype(values.dtype)
+    f.tables["particles"].total = len(p["gid"])
+    if kind == "dat":
+        write_dat(tmp_path / "all_0000004000.dat", f, SerialComm())
+    else:
+        write(tmp_path, f)
+    lines = run(tmp_path, "wedge", "surface", "--from", 0)
+    high = max(column(table(tmp_path / "measure", "surface"), "height[m]"))
+    crest = float(table(tmp_path / "measure", "wedge")[-1]["crest_y[m]"])
+    assert (high > 16_900.0, crest > 16_900.0) == (counts, counts)
+    assert any(f"{n} particles are fixed along x and y" in line for line in lines) == (not counts)
+    assert counts or crest == pytest.approx(float(table(folder / "measure", "wedge")[-1]["crest_y[m]"]), abs=1.0)
+
+
 def test_a_model_pushed_from_the_right_is_the_mirror_image(folder: Path, tmp_path: Path) -> None:
     for path in folder.glob("all_*.vtkhdf"):
         f = read_frame(path)

@@ -61,6 +61,9 @@ def test_version_is_quick_to_say():
 def test_help_also_as_the_manual_spells_it(word):
     done = program("main", word)
     assert done.returncode == 0 and "--time-limit" in done.stdout
+    for option in ("--strin-stres DIR", "-g, --grid SIZE", "--addball", "--delball", "--leftwallid ID", "--rightwallid",
+                   "--xmove X", "--ymove", "--increment", "--smooth"):  # fmt: skip
+        assert option in done.stdout
 
 
 @pytest.mark.parametrize(

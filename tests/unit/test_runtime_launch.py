@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from hpcdem.cli.run import speaks_zdem
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import doctor
@@ -127,6 +128,77 @@ def test_one_knob_sets_all_threads(clean, monkeypatch):
     assert os.environ["HDF5_USE_FILE_LOCKING"] == "FALSE"
 
 
+@pytest.mark.parametrize(
+    ("variables", "alone", "as_zdem"),
+    [
+        ({}, 1, 3),
+        ({"OMP_NUM_THREADS": "5"}, 1, 5),
+        ({"OMP_NUM_THREADS": "4,2"}, 1, 4),
+        ({"OMP_NUM_THREADS": "0"}, 1, 3),
+        ({"OMP_NUM_THREADS": "many"}, 1, 3),
+        ({"SLURM_CPUS_PER_TASK": "2", "SLURM_JOB_ID": "1", "SLURM_CPUS_ON_NODE": "3"}, 2, 2),
+        ({"SLURM_CPUS_PER_TASK": "64", "SLURM_JOB_ID": "1"}, 6, 3),
+        ({"SLURM_JOB_ID": "1", "SLURM_CPUS_ON_NODE": "2", "SLURM_STEP_NUM_TASKS": "1"}, 1, 2),
+        ({"SLURM_CPUS_ON_NODE": "2"}, 1, 3),  # no job: left over in the shell
+        # several ranks, or perhaps several
+        ({"OMPI_COMM_WORLD_SIZE": "4", "OMP_NUM_THREADS": "5"}, 1, 1),
+        ({"PMI_SIZE": "2", "SLURM_CPUS_PER_TASK": "2"}, 2, 2),
+        ({"PMIX_RANK": "0", "OMP_NUM_THREADS": "5"}, 1, 1),
+        ({"OMPI_COMM_WORLD_SIZE": "1", "OMP_NUM_THREADS": "2"}, 1, 2),
+    ],
+)
+def test_threads_by_default(monkeypatch, variables, alone, as_zdem):
+    """Six hyperthreads on three cores. OMP_NUM_THREADS, else all cores, only for a ZDEM script in one process."""
+    for name in ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE", "SLURM_JOB_ID"):
+        monkeypatch.delenv(name, raising=False)
+    for name, text in variables.items():
+        monkeypatch.setenv(name, text)
+    monkeypatch.setattr(launching, "cores", lambda: 6)
+    monkeypatch.setattr(launching, "physical_cores", lambda: 3)
+    assert (launching.threads_by_default(), launching.threads_by_default(as_zdem=True)) == (alone, as_zdem)
+
+
+@pytest.mark.parametrize(
+    ("mask", "quota", "expected"),
+    [
+        ({0, 1, 4, 5}, "max 100000", 2),
+        ({0, 2, 4}, "", 2),
+        ({0, 1, 2, 3}, "150000 100000", 2),
+        ({0, 1, 2, 3}, "50000 100000", 1),
+        ({7}, "", 1),
+    ],
+)
+def test_physical_cores(monkeypatch, tmp_path, mask, quota, expected):
+    """Cores 0-3 with hyperthreads 4-7; of cpu 7 nothing is known."""
+    for cpu in range(7):
+        place = tmp_path / f"sys/devices/system/cpu/cpu{cpu}/topology"
+        place.mkdir(parents=True)
+        (place / "thread_siblings_list").write_text(f"{cpu % 4},{cpu % 4 + 4}\n")
+    for name, text in {
+        "proc/self/cgroup": "0::/job\n",
+        "proc/self/mountinfo": "30 23 0:26 / /sys/fs/cgroup rw - cgroup2 cgroup2 rw\n",
+        "sys/fs/cgroup/job/cpu.max": quota,
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: mask, raising=False)
+    assert launching.physical_cores(str(tmp_path)) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("START\n", True), ("# a\n\n  res 0000046000.sav # b\r\n", True), ("load a.dat scale 2\n", True),
+        ("\ufeffstart", True), ("load = 3\n", False), ("restart=1\n", False), ("import hpcdem\n", False),
+        ("pcdc model new\nSTART\n", False), ("", False),
+    ],
+)  # fmt: skip
+def test_zdem_scripts_are_recognised_before_anything_is_loaded(tmp_path, text, expected):
+    (tmp_path / "a.py").write_text(text, encoding="utf-8")
+    assert speaks_zdem(tmp_path / "a.py") is expected
+    assert not speaks_zdem(tmp_path / "none.py") and not speaks_zdem(tmp_path)
+
+
 def test_what_the_user_has_set_stays(clean, monkeypatch):
     monkeypatch.setenv("HDF5_USE_FILE_LOCKING", "TRUE")
     monkeypatch.setenv("NUMBA_THREADING_LAYER", "tbb")
@@ -223,3 +295,12 @@ def test_all_ranks_see_each_other(launch):
     done = launch.python(3, "-c", program, timeout=60)
     assert done.returncode == 0, done.stderr
     assert "3 ranks x 1 thread" in done.stdout
+
+
+def test_a_zdem_script_alone_takes_the_threads_of_omp_num_threads(launch, tmp_path):
+    (tmp_path / "s.py").write_text("START\nSET dt 1e-3\nBALL id 0 x 0 y 0 rad 1\nPROP density 1\nCYC 3\n")
+    (tmp_path / "p.py").write_text("import hpcdem\n")
+    env = {**os.environ, "OMP_NUM_THREADS": "2"}
+    for words, expected in ((("s.py",), 2), (("-j", "1", "s.py"), 1), (("p.py",), 1)):
+        done = launch(1, *words, "--no-figure", cwd=tmp_path, env=env)
+        assert done.returncode == 0 and f"1 rank x {expected} thread" in done.stdout, done.stdout + done.stderr

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib.util
 import io
 import os
+import re
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -75,6 +77,31 @@ def test_the_folder_is_filled_once_and_then_read(base, kernels):
     again, said = prepare(kernels)
     assert again == folder and said == "" and kernels.hits() == 1
     assert [p.name for p in base.iterdir()] == [folder.name]
+
+
+def test_who_waits_is_told_how_long(base, kernels, monkeypatch):
+    monkeypatch.setattr(warmup, "QUIET_SECONDS", 0.0)
+    monkeypatch.setitem(warmup.KERNELS, "", 4)
+    _, said = prepare(kernels)
+    first, second = said.splitlines()
+    assert first == "compiling about 4 kernels (first run of this version on this machine)"
+    assert re.fullmatch(r"1 of about 4 kernels are compiled, some \d+ s left", second)
+    assert prepare(kernels)[1] == ""
+
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.slow) for kind in warmup.KERNELS])
+def test_the_number_of_kernels_is_about_right(tmp_path, kind):
+    program = (
+        "from numba.core import event\nfrom hpcdem.session import rehearse\n"
+        f"if {kind!r} != 'shared': rehearse('shared', 1)\n"
+        f"if {kind!r} == 'coupled': rehearse('', 1), rehearse('blocks', 1)\n"
+        "with event.install_recorder('numba:compile') as seen:\n"
+        f"    rehearse({kind!r}, 1)\n"
+        "print(sum(one.is_end for _, one in seen.buffer))"
+    )
+    env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_NUM_THREADS="1")
+    done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, check=True)
+    assert int(done.stdout) == pytest.approx(warmup.KERNELS[kind], rel=0.15, abs=5)
 
 
 def test_nobody_sees_a_folder_that_is_not_complete(base, kernels):

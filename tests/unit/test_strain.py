@@ -21,6 +21,14 @@ def cloud(n: int = 3000, x0: float = 38000.0) -> tuple[np.ndarray, np.ndarray, n
     return x0 + rng.uniform(0.0, 6000.0, n), rng.uniform(0.0, 3000.0, n), rng.choice([60.0, 80.0], n)
 
 
+@pytest.fixture(params=["nearest", "grid"], autouse=True)
+def method(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Both ways to fit; `increment` stands for the one that is tested."""
+    if request.param == "nearest":
+        monkeypatch.setattr(strain, "increment", lambda size, x, y, _, u, v: strain.nearest(size, x, y, u, v))
+    return request.param
+
+
 def follow(maps: list[np.ndarray]) -> np.ndarray:
     """F (n, 4) of the cloud after one map after another about a point of their own; each map (2, 2)."""
     x, y, radius = cloud()
@@ -100,6 +108,42 @@ def test_what_too_few_particles_do_is_not_known() -> None:
     f = strain.increment(SIZE, x, y, np.full(4, 10.0), 0.1 * x, 0.0 * y)
     np.testing.assert_allclose(f, np.tile([1.1, 0.0, 0.0, 1.0], (4, 1)), atol=1e-12)
     assert strain.increment(SIZE, *[np.zeros(0)] * 5).shape == (0, 4)
+
+
+def test_a_fault_is_as_wide_as_two_particles() -> None:
+    """Hexagonal discs 140 m across, the upper ones slide by 70 m: seen by the nearest neighbours, only the rows beside
+    the plane have sheared, by what six neighbours can tell; a grid of 200 m smears it over several times as much."""
+    d, slip = 140.0, 70.0
+    row, column = np.meshgrid(np.arange(40), np.arange(60), indexing="ij")
+    x, y = ((column + 0.5 * (row % 2)) * d).ravel(), (row * d * math.sqrt(0.75)).ravel()
+    upper = y > 19.5 * d * math.sqrt(0.75)
+    u = np.where(upper, slip, 0.0)
+    middle = np.abs(x - x.mean()) < 15.0 * d
+    seen = {}
+    for name, df in (
+        ("nearest", strain.nearest(SIZE, x, y, u, 0.0 * u)),
+        ("grid", grids.between(g := grids.cover(SIZE, x, y, np.full(len(x), 0.5 * d)),
+                               strain.gradient(g, x, y, u, 0.0 * u), x, y) + strain.IDENTITY),
+    ):  # fmt: skip
+        profile = np.array([np.mean(df[(row.ravel() == k) & middle, 1]) for k in range(40)])
+        seen[name] = profile
+        step = d * math.sqrt(0.75)
+        assert profile.sum() * step == pytest.approx(slip, rel=0.35)  # what is smeared is not lost
+    # four of six neighbours are a row above or below: H_xy = 2 slip rows / (4 rows^2) of the row's height
+    assert seen["nearest"].max() == pytest.approx(slip / (2.0 * d * math.sqrt(0.75)), rel=1e-9)
+    assert (np.abs(seen["nearest"]) > 1e-9).sum() == 2
+    assert (np.abs(seen["grid"]) > 0.1 * seen["grid"].max()).sum() > 4
+    assert seen["grid"].max() < 0.8 * seen["nearest"].max()
+
+
+def test_neighbours_that_mix_are_no_deformation() -> None:
+    """No dF has det <= 0: more neighbours are asked, and where they do not help it is not known."""
+    rng = np.random.default_rng(5)
+    x, y, radius = cloud(2000)
+    df = strain.increment(SIZE, x, y, radius, rng.normal(0.0, 150.0, len(x)), rng.normal(0.0, 150.0, len(x)))
+    known = np.isfinite(df).all(axis=1)
+    assert 0.2 < known.mean() < 1.0 and np.isnan(df[~known]).all()
+    assert strain.volumetric(df[known]).min() > -100.0
 
 
 def test_a_slope_of_displacements_is_followed() -> None:

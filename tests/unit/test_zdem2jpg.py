@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,7 @@ from hpcdem.io import colours
 from hpcdem.io.dat import write_dat
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.post.plots import Style, frame_figure, seen_of
-from hpcdem.post.series import Job, draw_all
+from hpcdem.post.series import Job, Progress, draw_all
 from tests.conftest import Launcher
 from tests.unit.io_synthetic import make_frame
 
@@ -105,6 +107,18 @@ def test_the_manuals_defaults() -> None:
     assert options("--dpi=300.0", "--max_workers=24.0")["max_workers"] == 24
 
 
+def test_pictures_of_several_kinds(folder: Path) -> None:
+    """--format: each frame in each kind, the same picture; a JPG where nothing is said."""
+    heads = {"png": b"\x89PNG", "tiff": b"II*\0", "pdf": b"%PDF", "svg": b"<?xml", "jpg": b"\xff\xd8"}
+    work(SerialComm(), Silent(), options("--dpi=80", "--format=PNG,tif,pdf, svg", folder=folder))  # type: ignore[arg-type]
+    found = {path.suffix[1:]: path for path in folder.iterdir() if path.suffix != ".vtkhdf"}
+    assert set(found) == {"png", "tiff", "pdf", "svg"}
+    assert all(path.stem == "all_0000001000" and path.read_bytes().startswith(heads[k]) for k, path in found.items())
+    np.testing.assert_array_equal(picture(found["png"]), picture(found["tiff"]))
+    work(SerialComm(), Silent(), options("--dpi=80", folder=folder))  # type: ignore[arg-type]
+    assert (folder / "all_0000001000.jpg").read_bytes().startswith(heads["jpg"])
+
+
 def test_a_blank_after_the_sign_does_not_eat_an_option() -> None:
     assert as_usual(["--colormap=", "--dpi=3"], {"--colormap", "--dpi"}) == ["--colormap=", "--dpi=3"]
 
@@ -115,6 +129,7 @@ def test_a_blank_after_the_sign_does_not_eat_an_option() -> None:
         (["--dri=x"], "--dir"),
         (["--dir", "x", "--fontsze=3"], "--fontsize"),
         (["--dir", "x", "-bondplt=true"], "such option"),
+        (["--dir", "x", "--format=gif"], "'gif' is not a format of pictures"),
         (["--dir", "x", "--dpi=many"], "'many' is not a valid float"),
         (["--dir", "x", "--dpi=-3"], "-3 is not a number above 0"),
         (["--dir", "x", "--pagesize=nan"], "nan is not a number above 0"),
@@ -425,6 +440,23 @@ def test_a_process_that_is_killed_is_reported(three: Path) -> None:
     jobs = [Job(three / "all_0000001000.dat", three / f"{k}.jpg", Deadly()) for k in range(2)]  # type: ignore[arg-type]
     with pytest.raises(HpcdemError, match=r"want of memory.*--max_workers"):
         draw_all(jobs, SerialComm(), 2)
+
+
+def test_a_terminal_gets_a_bar_and_a_file_gets_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines: list[str] = []
+    with Progress(2, 2, lines.append) as progress:
+        progress.done("first")
+        progress.done("second")
+    assert len(lines) == 2 and lines[-1].startswith("second: 2 of 2")
+    terminal = io.StringIO()
+    monkeypatch.setattr(terminal, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.delenv("OMPI_COMM_WORLD_SIZE", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    with Progress(2, 2, lines.append) as progress:
+        progress.done("first")
+        progress.done("second")
+    assert len(lines) == 2 and "second" in terminal.getvalue() and "100%" in terminal.getvalue()
 
 
 def test_processes_that_draw_do_not_take_themselves_for_ranks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -69,7 +69,7 @@ def test_the_options_of_the_manual_are_read() -> None:
         "--stressmean OFF --stressshear off"
     )
     assert not (o["strainvol"] or o["stressmean"] or o["stressshear"]) and o["strainshear"] and o["sigma1"]
-    assert (o["scale"], o["gridsize"], o["width"], o["labels"]) == (1.5, 1000.0, 14.0, False)
+    assert (o["scale"], o["gridsize"], o["width"], o["labels"]) == (1.5, 1000.0, 14.0, True)
     assert options("-d x --gridsize 700 --sigma1 on")["gridsize"] == 700.0  # in any order
 
 
@@ -81,7 +81,49 @@ def test_labels_have_two_names_and_three_values(name: str, word: str, value: obj
 
 def test_formats_are_a_list() -> None:
     assert options("-d x")["formats"] == ("jpg", "ps")
-    assert options("-d x --format PDF,eps,jpeg,pdf")["formats"] == ("pdf", "ps", "jpg")
+    assert options("-d x --format PDF,eps,jpeg,pdf,tif")["formats"] == ("pdf", "ps", "jpg", "tiff")
+
+
+def test_the_spellings_of_zdem2jpg_are_read() -> None:
+    """`--dir= DIR`, one dash, a lone `--` where a line breaks, true and false."""
+    o = options("--dir= ./datass -sigma1=true --scale= 1.5 -- --strainvol false --showlable=false -xmax=40.0")
+    assert (o["folder"], o["scale"], o["xmax"]) == (Path("datass"), 1.5, 40.0)
+    assert o["sigma1"] is True and o["strainvol"] is False and o["labels"] is False
+
+
+def test_ours_comes_by_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_wedges(tmp_path, [wedge(10, 4000.0, radius=300.0)])
+    seen: list[Any] = []
+    monkeypatch.setattr(draw, "section_page", lambda section, view, kinds, *_: seen.append(kinds))
+    monkeypatch.setattr(draw, "save", lambda *_: None)
+    for line in ("", "--stressshear half", "--strainshear root", "--stressshear HALF --strainshear Root"):
+        run(f"-d {tmp_path} {line}")
+    plain, half, root, both = seen
+    assert plain == panels.KINDS and half == (*panels.KINDS[:4], panels.HALF_SHEAR)
+    assert root == (*panels.KINDS[:2], panels.ROOT, *panels.KINDS[3:]) and both == OURS
+    assert len({kind.title for kind in (*panels.KINDS, panels.HALF_SHEAR, panels.ROOT)}) == 7
+
+
+def test_pages_are_drawn_by_several_processes_with_a_word_on_the_way(tmp_path: Path) -> None:
+    """The same bytes as by one."""
+    sections = [wedge(step, 1000.0 * step, radius=300.0) for step in range(3)]
+    line = "--width 8 --format png,ps --strainvol OFF --stressmean OFF"
+    for name, workers in (("one", 1), ("two", 2)):
+        write_wedges(tmp_path / name, sections)
+        log = run(f"-d {tmp_path / name} {line} --max_workers {workers}")
+        assert "3 sections" in log and "6 of 6" in log
+    files = {p.relative_to(tmp_path / "one"): p.read_bytes() for p in (tmp_path / "one").rglob("*") if p.is_file()}
+    for path, data in files.items():
+        assert (tmp_path / "two" / path).read_bytes() == data, path
+
+
+def test_nobody_measures_the_boxes_of_numbers_for_a_title(monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib.axis import Axis
+
+    asked: list[Any] = []
+    monkeypatch.setattr(Axis, "get_tightbbox", lambda self, *_, **__: asked.append(self))
+    pixels(section_page(wedge(3, radius=300.0), SEEN, panels.KINDS, replace(STYLE, bars=False)))
+    assert not asked
 
 
 @pytest.mark.parametrize(
@@ -149,7 +191,7 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Section]
 def test_the_tree_of_the_manual(drawn: tuple[Path, list[Section], str]) -> None:
     ss = drawn[0] / "ss"
     names = ["all_0000006000_ini", "all_0000026000"]
-    panels_with_grids = ["distortional", "mean", "shear", "volumetric"]  # whatever is drawn
+    panels_with_grids = ["difference", "distortional", "invariant", "mean", "shear", "volumetric"]  # whatever is drawn
     kinds = ["deformation", "distortional", "mean"]
     pages = [f"{n}_strain_stress" for n in names] + [f"series_{k}" for k in kinds]
     files = sorted(str(p.relative_to(ss)) for p in ss.rglob("*") if p.is_file())
@@ -168,8 +210,8 @@ def test_the_tables_hold_true_values(drawn: tuple[Path, list[Section], str]) -> 
     folder, sections, _ = drawn
     section = sections[1]
     for kind, head, names in (
-        ("strain", "# x[m] y[m] volumetric[%] distortional[1]", ("volumetric", "distortional")),
-        ("stress", "# x[m] y[m] mean[Pa] shear[Pa] s1[Pa] s2[Pa] direction[rad]", ("mean", "shear")),
+        ("strain", "# x[m] y[m] volumetric[%] distortional[1] invariant[1]", ("volumetric", "distortional")),
+        ("stress", "# x[m] y[m] mean[Pa] shear[Pa] s1[Pa] s2[Pa] direction[rad] difference[Pa]", ("mean", "shear")),
     ):
         path = folder / "ss" / "data2ps" / f"{kind}_{section.name}.out"
         assert path.read_text().splitlines()[0] == head
@@ -186,6 +228,7 @@ def test_the_tables_hold_true_values(drawn: tuple[Path, list[Section], str]) -> 
     values, vectors = np.linalg.eigh(tensor[solid])
     np.testing.assert_allclose(rows[solid, 4], values[:, 1], rtol=1e-8)
     np.testing.assert_allclose(rows[solid, 5], values[:, 0], rtol=1e-8)
+    np.testing.assert_allclose(rows[solid, 7], values[:, 1] - values[:, 0], rtol=1e-7)
     along = np.stack([np.cos(rows[solid, 6]), np.sin(rows[solid, 6])], axis=1)
     assert np.all(np.abs(np.sum(along * vectors[:, :, 1], axis=1)) > 1.0 - 1e-9)
 
@@ -235,7 +278,7 @@ def test_two_ranks_write_the_same_files(
     ended: subprocess.CompletedProcess[str] = launch.python(2, program, *words)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     found = [p for p in (tmp_path / "two").rglob("*") if p.is_file()]
-    assert len(found) == 2 + 4 + 8 + 2 * 5
+    assert len(found) == 2 + 4 + 12 + 2 * 5
     for path in found:
         assert path.read_bytes() == (folder / path.relative_to(tmp_path / "two")).read_bytes(), path.name
     assert "not a section" not in ended.stdout
@@ -304,20 +347,25 @@ def test_high_panels_go_side_by_side() -> None:
     assert len(places) > 1
 
 
-def test_known_values_have_their_colours() -> None:
+OURS = (*panels.KINDS[:2], panels.ROOT, panels.MEAN, panels.HALF_SHEAR)
+
+
+@pytest.mark.parametrize(("kinds", "invariant", "shear"), [(panels.KINDS, 0.04, 80.0), (OURS, 0.2, 40.0)])
+def test_known_values_have_their_colours(kinds: tuple[panels.Kind, ...], invariant: float, shear: float) -> None:
+    """The manual's pages show the second invariant and sigma1 - sigma3; the root and half of it by option."""
     section = wedge(3, radius=100.0)
     values = {"volumetric": -2.0, "distortional": 0.2, "mean": 180e6, "shear": 40e6}
     for name, value in values.items():
         section.fields[name] = np.where(np.isfinite(section.fields[name]), value, np.nan)
-    figure = section_page(section, SEEN, panels.KINDS, STYLE)
+    figure = section_page(section, SEEN, kinds, STYLE)
     picture = pixels(figure)
     expected = {
         "volumetric": (VOLUME, -2.0),
-        "distortional": (INVAR2, 0.2),
+        "distortional": (INVAR2, invariant),
         "mean": (STRESS, 180.0),
-        "shear": (STRESS, 40.0),
+        "shear": (STRESS, shear),
     }
-    for ax, kind in zip(figure.axes[1:5], panels.KINDS[1:]):
+    for ax, kind in zip(figure.axes[1:5], kinds[1:]):
         table, value = expected[kind.key]
         for x, y in ((1500.0, 500.0), (20000.0, 2100.0), (38500.0, 3500.0)):
             np.testing.assert_allclose(shade(picture, ax, x, y), table.colours(np.array(value)), atol=0.006)
@@ -531,9 +579,13 @@ def test_a_table_says_itself_what_is_labelled() -> None:
 
 def test_kinds_of_the_same_colours_share_a_bar() -> None:
     headings = [bar.heading for bar in bars_of(panels.KINDS, STYLE)]
-    assert headings == ["Volumetric strain (%)", "Distortional strain", "Mean stress,\nMaximum shear stress (MPa)"]
+    assert headings == [
+        "Volumetric strain (%)",
+        "Distortional strain J₂",
+        f"Mean stress,\nShear stress σ₁ {MINUS} σ₃ (MPa)",
+    ]
     both = replace(STYLE, tables={**STYLE.tables, "volumetric": INVAR2})
-    assert next(bar.heading for bar in bars_of(panels.KINDS, both)) == "Volumetric strain (%),\nDistortional strain"
+    assert next(bar.heading for bar in bars_of(panels.KINDS, both)) == "Volumetric strain (%),\nDistortional strain J₂"
     assert bars_of(panels.KINDS, replace(STYLE, bars=False)) == []
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -10,22 +11,27 @@ from hpcdem.commands.blocks.choosing import chosen, everything
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 from hpcdem.model.blocks.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
+from hpcdem.model.blocks.tables import Value
+from hpcdem.physics.random_field import RandomField
 
 Number = float | str
 """A number, or the name of a table of time."""
 
 
 def group(project: Project, kind: str, name: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
-    """Put objects of a kind (model.blocks.groups) into a group; they leave the one of the set that they were in."""
-    project.groups[kind].assign(everything(project, kind, where), name, set_name)
+    """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
+    back. They leave the one of the set that they were in."""
+    project.groups[kind].assign(everything(project, kind, where, null_too=True), name, set_name)
 
 
-def element_model(project: Project, name: str, properties: Mapping[str, float], where: Range | None = None) -> None:
-    """A constitutive model of elements, with its properties (model.blocks.properties)."""
+def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """A constitutive model of elements, with its properties (model.blocks.properties). Elements in the range that were
+    taken out come back, free of stress where their place is now; without a range these stay away."""
     blocks = project.ready()
-    elements = chosen(project, ELEMENT, where)
+    elements = chosen(project, ELEMENT, where, null_too=True)
     blocks.element_model(elements, name, properties)
-    project.alive[slice(None) if elements is None else elements] = True
+    if elements is not None:
+        project.alive[elements] = True
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:
@@ -40,58 +46,55 @@ def null(project: Project, relax: float = 0.0, where: Range | None = None) -> No
     project.alive = left
 
 
-def element_property(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Change some properties of elements."""
     project.ready().element_property(chosen(project, ELEMENT, where), properties)
 
 
-def face_model(project: Project, name: str, properties: Mapping[str, float], where: Range | None = None) -> None:
+def face_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """A contact model of faces. Without penalty_normal it is 10 E of the element."""
     blocks = project.ready()
-    if "penalty_normal" in properties:
-        blocks.face_model(chosen(project, FACE, where), name, properties)
-        return
-    faces = everything(project, FACE, where)
-    for penalty, part in _by_penalty(project, faces, faces[:, None]):
-        blocks.face_model(part, name, {**properties, "penalty_normal": penalty})
+    faces = chosen(project, FACE, where)
+    if "penalty_normal" not in properties:
+        faces = everything(project, FACE, where)
+        properties = {**properties, "penalty_normal": _usual_penalty(project, faces, faces[:, None])}
+    blocks.face_model(faces, name, properties)
 
 
-def face_property(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+def face_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Change some properties of contact models."""
     project.ready().face_property(chosen(project, FACE, where), properties)
 
 
-def joint_property(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Change some properties of cohesive models."""
     project.ready().joint_property(chosen(project, JOINT, where), properties)
 
 
-def joint_model(project: Project, name: str, properties: Mapping[str, float], where: Range | None = None) -> None:
+def joint_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """A cohesive model of joints. Without penalty_normal it is 10 E of the softer of both elements."""
     blocks = project.ready()
-    if "penalty_normal" in properties:
-        blocks.joint_model(chosen(project, JOINT, where), name, properties)
-        return
-    joints = everything(project, JOINT, where)
-    edges = project.edges()
-    sides = edges.faces[np.isin(edges.faces[:, 0], joints)]
-    for penalty, part in _by_penalty(project, joints, sides):
-        blocks.joint_model(part, name, {**properties, "penalty_normal": penalty})
+    joints = chosen(project, JOINT, where)
+    if "penalty_normal" not in properties:
+        joints = everything(project, JOINT, where)
+        edges = project.edges()
+        sides = edges.faces[np.isin(edges.faces[:, 0], joints)]
+        properties = {**properties, "penalty_normal": _usual_penalty(project, joints, sides)}
+    blocks.joint_model(joints, name, properties)
 
 
-def _by_penalty(project: Project, numbers: np.ndarray, faces: np.ndarray) -> Iterator[tuple[float, np.ndarray]]:
-    """10 E of the softest element beside each object, and the objects with that penalty; faces (n, k): theirs. For
-    elements that have no model yet CommandError."""
+def _usual_penalty(project: Project, numbers: np.ndarray, faces: np.ndarray) -> Value:
+    """10 E of the softest element beside each object (n,), or one number if it is the same for all; faces (n, k):
+    theirs. For elements that have no model yet CommandError."""
     blocks = project.blocks
-    young = np.array(blocks.element_rows.column("young"))[blocks.element_row[faces // 4]].min(axis=1)
+    young = blocks.element_rows.column("young")[blocks.element_row[faces // 4]].min(axis=1)
     if (young <= 0.0).any():
         lost = int(numbers[young <= 0.0][0])
         raise CommandError(
             f"penalty-normal is left out and so 10 E, but an element beside {lost} has no model yet: element c-model "
             "comes first"
         )
-    for value in np.unique(young):
-        yield 10.0 * float(value), numbers[young == value]
+    return 10.0 * float(young[0]) if (young == young[0]).all() else 10.0 * young
 
 
 def initial_stress(
@@ -176,6 +179,16 @@ def _known(project: Project, *values: Number | None) -> None:
 def table(project: Project, name: str, pairs: list[tuple[float, float]]) -> None:
     """A function of time, linear from point to point."""
     project.blocks.table(name, pairs)
+
+
+def random_field(project: Project, name: str, **about: Any) -> None:
+    """A random field, see physics.random_field.RandomField."""
+    project.blocks.random_field(name, RandomField.of(**about))
+
+
+def remove_field(project: Project, name: str) -> None:
+    """Forget a random field; properties that were drawn from it stay."""
+    project.blocks.remove_field(name)
 
 
 def remove_table(project: Project, name: str) -> None:

@@ -62,20 +62,28 @@ def add(
     chart.curves.append(Curve(label or y or "points", x, y, scale_x, scale_y, list(values), style))
 
 
+def figure_name(path: str) -> None:
+    """CommandError if figures are not written to files of this kind."""
+    if Path(path).suffix.lower() not in FIGURES:
+        raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
+
+
 def export(project: Project, name: str, path: str, cracks: bool = False) -> None:
-    """Write the diagram as a figure, and its curves as CSV beside it: curve, x, y, one row per point. cracks: the
-    figure also shows the model at this moment. Collective."""
+    """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
+    row per point. cracks: the figure also shows the model at this moment. Collective."""
     from hpcdem.post.charts import draw
 
-    chart, figure = _chart(project, name), project.path(path)
-    if figure.suffix.lower() not in FIGURES:
-        raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
+    chart, figure = _chart(project, name), project.result(path)
+    figure_name(path)
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]
     if not any(points for _, _, points in curves):
         raise CommandError(f"chart '{name}' has no points yet")
     rows = [f"{histories._quoted(label)},{x!r},{y!r}" for label, _, points in curves for x, y in points]
     titles = [histories._quoted(text) for text in (chart.x_label or "x", chart.y_label or "y")]
     text = "\n".join([",".join(["curve", *titles]), *rows]) + "\n"
+    for file in (figure, figure.with_suffix(".csv")):
+        project.to_write(file)
+    project.folder()
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])
     if cracks:
         project.ready(use=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hpcdem.errors import CommandError
 from hpcdem.model.blocks import groups as g
-from hpcdem.model.blocks.connectivity import centroids, face_points, find_edges
+from hpcdem.model.blocks.connectivity import centroids, corner_counts, face_points, find_edges
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.cracks import TOLERANCE, edges_on
 
@@ -19,28 +19,31 @@ NEAR = 1e-9
 """Bounds of x and y reach so much of the size of the model further: coordinates of meshes are rounded."""
 
 
-def chosen(project: Project, kind: str, where: g.Range | None) -> np.ndarray | None:
-    """Ascending numbers of the objects of this kind that a range chooses; None stands for all. CommandError if it
-    chooses nothing."""
+def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray | None:
+    """Ascending numbers of the objects of this kind that a range chooses among those that are there; None stands for
+    all. null_too: also among elements that were taken out, and what belonged to them. CommandError if it chooses
+    nothing."""
     if where is None:
         return None
-    objects = _Objects(project, kind)
-    mask = np.ones(len(objects.numbers), bool)
-    for term in where:
-        mask &= objects.mask(term)
+    objects = _Objects(project, kind, null_too)
+    mask = objects.all_of(where)
     if not mask.any():
         raise CommandError(f"the range chooses no {kind}" + _why(objects, where))
     return objects.numbers[mask]
 
 
-def everything(project: Project, kind: str, where: g.Range | None) -> np.ndarray:
+def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
     """The same as numbers in any case."""
-    found = chosen(project, kind, where)
-    return _Objects(project, kind).numbers if found is None else found
+    found = chosen(project, kind, where, null_too)
+    return _Objects(project, kind, null_too).numbers if found is None else found
 
 
 def _why(objects: _Objects, where: g.Range) -> str:
-    """Which of several terms is fulfilled by nothing at all."""
+    """What it chose was taken out, or which of several terms is fulfilled by nothing at all."""
+    if not objects.null_too and not objects.project.alive.all():
+        gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
+        if gone:
+            return f": all that it names ({gone}) was taken out (element c-model null)"
     if len(where) == 1:
         return ""
     empty = [type(term).__name__ for term in where if not objects.mask(term).any()]
@@ -52,24 +55,59 @@ _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
 
 
 class _Objects:
-    """All objects of a kind: numbers (n,), the corners of an element or ends of a face as point numbers (n, k)."""
+    """All objects of a kind that are there: numbers (n,), ends (n, 2) point numbers of faces and joints, sides (n, 2)
+    of joints. An element is there unless it was taken out, a node or face if one of its elements is, a joint if both
+    are. null_too: those that are not there as well."""
 
-    def __init__(self, project: Project, kind: str) -> None:
-        self.project, self.kind = project, kind
+    def __init__(self, project: Project, kind: str, null_too: bool = False) -> None:
+        self.project, self.kind, self.null_too = project, kind, null_too
         self.mesh = mesh = project.whole_mesh()
         self.groups = project.groups
+        self.now = False
+        there = np.ones(len(mesh.cells), bool) if null_too else project.alive
         if kind == g.ELEMENT:
-            self.numbers = np.arange(len(mesh.cells))
+            self.numbers = np.flatnonzero(there)
         elif kind == g.NODE:
-            self.numbers = np.arange(len(mesh.points))
+            corners = mesh.cells[there]
+            self.numbers = np.unique(corners[corners >= 0])
         else:
             self.edges = edges = project.edges()
             if kind == g.JOINT:
-                self.sides = edges.faces[edges.inner]
+                sides = edges.faces[edges.inner]
+                self.sides = sides[there[sides // 4].all(axis=1)]
                 self.numbers = self.sides[:, 0]
             else:
-                self.numbers = np.sort(edges.faces[edges.faces >= 0])
+                faces = np.sort(edges.faces[edges.faces >= 0])
+                self.numbers = faces[there[faces // 4]]
             self.ends = face_points(mesh.cells, self.numbers)
+
+    def all_of(self, where: g.Range) -> np.ndarray:
+        """(n,) bool: which of them all terms hold for."""
+        self.now = any(isinstance(term, g.Present) for term in where)
+        if self.now and not any(isinstance(term, (g.Span, g.OnLayer)) for term in where):
+            raise CommandError("present goes with x, y and geometry: it says which positions they look at")
+        mask = np.ones(len(self.numbers), bool)
+        for term in where:
+            mask &= self.mask(term)
+        return mask
+
+    def places(self) -> np.ndarray:
+        """(n, k, 2) [m] where x, y and geometry look for each: the centre of an element, a node, both ends of a face or
+        joint (of the element that it is numbered by)."""
+        mesh = self.mesh
+        if not self.now:
+            if self.kind == g.ELEMENT:
+                return centroids(mesh.points, mesh.cells[self.numbers])[:, None]
+            return mesh.points[self.numbers][:, None] if self.kind == g.NODE else mesh.points[self.ends]
+        if self.kind == g.NODE:
+            return self.project.positions()[self.numbers][:, None]
+        corners = self.project.corner_positions()
+        if self.kind == g.ELEMENT:
+            own = np.arange(4 * len(self.numbers)).reshape(-1, 4)
+            cells = np.where(mesh.cells[self.numbers] >= 0, own, -1)
+            return centroids(corners.reshape(-1, 4, 2)[self.numbers].reshape(-1, 2), cells)[:, None]
+        e, k = np.divmod(self.numbers, 4)
+        return corners[np.column_stack([self.numbers, 4 * e + (k + 1) % corner_counts(mesh.cells[e])])]
 
     def mask(self, term: g.Term) -> np.ndarray:
         """(n,) bool: which of them a term holds for."""
@@ -97,6 +135,8 @@ class _Objects:
                 groups = self.groups[g.ELEMENT]
                 a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
                 return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
+            case g.Present():
+                return np.ones(len(self.numbers), bool)
             case g.OnCrack():
                 rows = find_edges(self.edges, self.mesh.cracks, len(self.mesh.points))
                 return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
@@ -107,24 +147,27 @@ class _Objects:
             raise CommandError(f"id {first} {last}: the first number is above the last")
         mask = (self.numbers >= first) & (self.numbers <= last)
         if first == last and not mask.any():
-            raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(self.numbers[-1])}")
+            known = _Objects(self.project, self.kind, True).numbers
+            if first in known:
+                raise CommandError(f"{self.kind} {first} was taken out (element c-model null)")
+            raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
         return mask
 
     def _span(self, axis: int, low: float, high: float) -> np.ndarray:
         if low > high:
             raise CommandError(f"{'xy'[axis]} {low:g} {high:g}: the first bound is above the second")
-        xy = self.project.positions()
         slack = NEAR * float(np.ptp(self.mesh.points, axis=0).max())
-        if self.kind == g.ELEMENT:
-            at = centroids(xy, self.mesh.cells)[:, axis]
-        else:
-            at = xy[:, axis]
-        inside = (at >= low - slack) & (at <= high + slack)
-        return inside if self.kind in (g.ELEMENT, g.NODE) else inside[self.ends].all(axis=1)
+        at = self.places()[:, :, axis]
+        return ((at >= low - slack) & (at <= high + slack)).all(axis=1)
 
     def _layer(self, layer: str) -> np.ndarray:
         if self.kind == g.ELEMENT:
-            return _inside(self._curves(layer), self.mesh.centroids(), layer)
+            return _inside(self._curves(layer), self.places()[:, 0], layer)
+        if self.now:
+            raise CommandError(
+                f"geometry '{layer}' present chooses elements, by where their centres are now; which {self.kind}s lie "
+                "on its lines is known in the mesh: leave out present"
+            )
         pairs = self.mesh.layers[layer] if layer in self.mesh.layers else edges_on(self.mesh, self._curves(layer))
         if self.kind == g.NODE:
             return np.isin(self.numbers, pairs) | self._on_points(layer)
@@ -134,10 +177,11 @@ class _Objects:
     def _on_points(self, layer: str) -> np.ndarray:
         """Nodes on the single points of a layer, or on a line of which no edge of the mesh is a part."""
         found = np.zeros(len(self.numbers), bool)
+        points = self.mesh.points[self.numbers]
         slack = TOLERANCE * float(np.ptp(self.mesh.points, axis=0).max())
         for curve in self.project.layers[layer] if layer in self.project.layers else ():
             if not curve.segments or layer not in self.mesh.layers:
-                found |= geometry.distance(curve, self.mesh.points) <= slack
+                found |= geometry.distance(curve, points) <= slack
         return found
 
     def _curves(self, layer: str) -> list[geometry.Curve]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from hpcdem.blocks import QUANTITIES, Blocks
+from hpcdem.blocks.looking import PROPERTIES
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 from hpcdem.io import vtkhdf_mesh
@@ -20,18 +21,23 @@ from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.model.blocks.connectivity import face_points
-from hpcdem.model.blocks.groups import ELEMENT
+from hpcdem.model.blocks.groups import ELEMENT, JOINT
 
 
 def vtk(project: Project, name: str, every: int | None = None) -> None:
     """Write `<name>_<step>.vtkhdf` into the folder of the results: now, or every so many steps. Collective."""
-    if "/" in name:
-        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
+    file_name(name)
     if every is None:
         project.ready(use=False)
         _write(project, name)
     else:
         project.frames[name] = every
+
+
+def file_name(name: str) -> None:
+    """CommandError if it cannot be the first part of names of files."""
+    if "/" in name:
+        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
 
 
 def stop(project: Project, name: str) -> None:
@@ -104,16 +110,21 @@ def whole(project: Project) -> MeshState | None:
     return vtkhdf_mesh.whole(frame(project), project.comm)
 
 
-def _names(kind: str) -> list[str]:
+def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
-    joints."""
-    return [name for name, quantity in QUANTITIES.items() if quantity.on == kind and quantity.framed]
+    joints; of properties those that a table or a field has made different from object to object."""
+    varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
+    return [
+        name for name, quantity in QUANTITIES.items()
+        if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
+    ]  # fmt: skip
 
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
-    """Every corner of this rank's elements by itself: those of broken joints part."""
+    """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
     vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
     columns = blocks.owned_values("corner", vectors)
+    columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
     return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
 
 
@@ -135,8 +146,8 @@ def frame(project: Project) -> MeshFrame:
     """What is written at this moment. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     corners = _corners(blocks)
-    elements = blocks.owned_values("element", _names("element"))
-    joints = _with_cracks(blocks, elements["number"], blocks.owned_values("joint", _names("joint")))
+    elements = blocks.owned_values("element", _names(blocks, "element"))
+    joints = _with_cracks(blocks, elements["number"], blocks.owned_values("joint", _names(blocks, "joint")))
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():

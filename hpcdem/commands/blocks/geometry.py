@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import Any
 
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
@@ -13,39 +14,27 @@ from hpcdem.pre.mesh.once import made_once
 Vector = tuple[float, float]
 
 
-def polyline(project: Project, layer: str, points: Sequence[Vector]) -> None:
-    """Straight lines from point to point [m]; closed if the last point is the first."""
-    project.layers.add(layer, shapes.polyline(points))
+SHAPES: dict[str, Callable[..., shapes.Curve]] = {
+    "polyline": shapes.polyline, "polygon": shapes.polygon, "rectangle": shapes.rectangle, "circle": shapes.circle,
+    "arc": shapes.arc,
+}  # fmt: skip
 
 
-def polygon(project: Project, layer: str, points: Sequence[Vector]) -> None:
-    """A closed line that does not cross itself [m]."""
-    project.layers.add(layer, shapes.polygon(points))
+def shape(kind: str, *values: Any) -> list[shapes.Curve]:
+    """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius), arc (the same
+    and two angles [degrees], counter-clockwise), or of single points (point)."""
+    return [shapes.point(at) for at in values[0]] if kind == "point" else [SHAPES[kind](*values)]
 
 
-def rectangle(project: Project, layer: str, first: Vector, second: Vector) -> None:
-    """A rectangle along the axes, between two corners [m]."""
-    project.layers.add(layer, shapes.rectangle(first, second))
-
-
-def circle(project: Project, layer: str, centre: Vector, radius: float) -> None:
-    """A circle [m]."""
-    project.layers.add(layer, shapes.circle(centre, radius))
-
-
-def arc(project: Project, layer: str, centre: Vector, radius: float, begin: float, end: float) -> None:
-    """A part of a circle, counter-clockwise from one angle to the other [degrees]."""
-    project.layers.add(layer, shapes.arc(centre, radius, begin, end))
-
-
-def points(project: Project, layer: str, at: Sequence[Vector]) -> None:
-    """Single points [m]."""
-    project.layers.add(layer, *(shapes.point(p) for p in at))
+def create(project: Project, kind: str, layer: str, *values: Any) -> None:
+    """Add a shape to a layer; see `shape`."""
+    project.layers.add(layer, *shape(kind, *values))
 
 
 def import_file(project: Project, layer: str, path: str, of: str | None = None) -> None:
     """The lines of a DXF file, or of one of its layers. Collective."""
-    found = made_once(project.comm, lambda: dxf.read_dxf(project.path(path), {of} if of else None))
+    file = project.to_read(path)
+    found = made_once(project.comm, lambda: dxf.read_dxf(file, {of} if of else None))
     project.layers.add(layer, *(curve for curves in found.values() for curve in curves))
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.commands.blocks.choosing import chosen
+from hpcdem.commands.blocks.choosing import chosen, everything
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.model.blocks.connectivity import nearest_element, nearest_point
 from hpcdem.model.blocks.groups import ELEMENT, JOINT, NODE, Ids, Range
+
+if TYPE_CHECKING:
+    from hpcdem.blocks import Blocks
+    from hpcdem.blocks.local import Local
+    from hpcdem.blocks.probes import Probe
 
 MODEL = "model"
 UNITS = {
@@ -86,31 +90,54 @@ class History:
     rows: list[tuple[int, float, float]] = field(default_factory=list)
     filed: int = 0
 
+    def __post_init__(self) -> None:
+        self._probe: Probe | None = None
+        self._waits: tuple[int, float, Local, int] | None = None
+
     @property
     def unit(self) -> str:
         return UNITS[self.kind][self.value]
+
+    @property
+    def waits(self) -> bool:
+        """Its record of this step comes with the forces of the next one."""
+        return self._waits is not None
+
+    def record(self, blocks: Blocks, goes_on: bool) -> None:
+        """Add the number of this step, once. goes_on: steps follow, in which the forces at the present positions are
+        computed anyway; those of supports are taken from there (`take`). Collective."""
+        clock = blocks.clock
+        if self.waits or (self.rows and self.rows[-1][0] == clock.step):
+            return
+        if goes_on and self.value in _FORCES:
+            probe = self._probe_of(blocks)
+            probe.find()
+            assert probe.local is not None
+            self._waits = int(clock.step), float(clock.time), probe.local, probe.local.passes
+        else:
+            self.rows.append((int(clock.step), float(clock.time), self.measure(blocks)))
+
+    def take(self, blocks: Blocks) -> None:
+        """Add the record that waits, if there is one. Collective."""
+        if self._waits is None:
+            return
+        step, time, local, passes = self._waits
+        self._waits = None
+        if local.passes == passes + 1:
+            self.rows.append((step, time, self._probe_of(blocks).reduced(self.how, local)))
+        elif step == blocks.clock.step:
+            self.rows.append((step, time, self.measure(blocks)))
+
+    def _probe_of(self, blocks: Blocks) -> Probe:
+        if self._probe is None or self._probe.sim is not blocks:
+            self._probe = blocks.probe(self.value, self.numbers)
+        return self._probe
 
     def measure(self, blocks: Any) -> float:
         """The number now. Collective, equal on all ranks."""
         if self.kind == MODEL:
             return _OF_MODEL[self.value](blocks)
-        numbers = np.array(self.numbers, np.int64)
-        if self.value in _FORCES and self.how in ("", "sum"):
-            return float(blocks.total(self.value, numbers))
-        values = np.asarray(blocks.values(self.value, numbers), np.float64)
-        there = values[~np.isnan(values)]
-        if not len(there):
-            return math.nan
-        match self.how:
-            case "sum":
-                return math.fsum(there)
-            case "mean":
-                return math.fsum(there) / len(there)
-            case "minimum":
-                return float(there.min())
-            case "maximum":
-                return float(there.max())
-        return float(values[0])
+        return self._probe_of(blocks).reduced(self.how)
 
 
 def create(
@@ -125,8 +152,8 @@ def create(
     where: Range | None = None,
 ) -> None:
     """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
-    a range (how: sum, mean, minimum, maximum), or of the model."""
-    _file_name(name)
+    a range or of all (how: sum, mean, minimum, maximum), or of the model."""
+    file_name(name)
     if name in project.histories:
         raise CommandError(f"there is a history '{name}' already")
     if value not in UNITS.get(kind, {}):
@@ -139,8 +166,10 @@ def create(
             found = chosen(project, kind, (Ids(ident, ident),))
         elif nearest is not None:
             found = np.array([_nearest(project, kind, nearest)])
+        elif where is not None:
+            found = chosen(project, kind, where)
         else:
-            found = chosen(project, kind, where or (Ids(0, 2**53),))
+            found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
         assert found is not None
         numbers = found.tolist()
     project.histories[name] = History(kind, value, numbers, how, every)
@@ -175,26 +204,41 @@ def find(project: Project, name: str) -> History:
     return project.histories[name]
 
 
-def record(project: Project) -> None:
-    """Record what is due at this step. Collective."""
-    clock = project.blocks.clock
+def record(project: Project, goes_on: bool = False) -> None:
+    """Record what is due at this step. goes_on: steps follow in this command, see `History.record`. Collective."""
+    blocks = project.blocks
     waiting = 0
-    with project.blocks.timers.around("history"):
+    with blocks.timers.around("history"), blocks.one_moment():
         for history in project.histories.values():
-            if clock.step % history.every == 0 and not (history.rows and history.rows[-1][0] == clock.step):
-                history.rows.append((int(clock.step), float(clock.time), history.measure(project.blocks)))
+            history.take(blocks)
+            if blocks.clock.step % history.every == 0:
+                history.record(blocks, goes_on)
             waiting = max(waiting, len(history.rows) - history.filed)
     if waiting >= FLUSH:
-        flush(project)
+        _write(project)
+
+
+def wait(project: Project) -> bool:
+    """Records of this step come with the forces of the next one."""
+    return any(history.waits for history in project.histories.values())
 
 
 def flush(project: Project) -> None:
     """Bring what was recorded to the files `history_<name>.csv` in the folder of the results. Collective."""
+    blocks = project.blocks
+    if wait(project):
+        with blocks.timers.around("history"), blocks.one_moment():
+            for history in project.histories.values():
+                history.take(blocks)
+    _write(project)
+
+
+def _write(project: Project) -> None:
     for name, history in project.histories.items():
         new = history.rows[history.filed :]
         if not new:
             continue
-        path = project.folder() / f"history_{_file_name(name)}.csv"
+        path = project.folder() / f"history_{file_name(name)}.csv"
         header = f"step,time [s],{history.value} [{history.unit}]"
         if not history.filed:  # a new model, or a restored one: the file holds what is in memory, no more
             append_rows(path, header, [_line(row) for row in history.rows], 0, project.comm)
@@ -207,7 +251,7 @@ def _line(row: Sequence[float]) -> str:
     return ",".join(repr(number) for number in row)
 
 
-def _file_name(name: str) -> str:
+def file_name(name: str) -> str:
     """A name that can be part of a file name. CommandError if it cannot."""
     if any(char in '/\\:*?"<>|' for char in name) or len(name.encode()) > 200:
         raise CommandError(f"'{name}' cannot be part of a file name; a history has a file of its name")
@@ -215,7 +259,8 @@ def _file_name(name: str) -> str:
 
 
 def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
-    """Write histories side by side as CSV: step, time, one column each, empty where one has no record. Collective."""
+    """Write histories side by side as CSV into the folder of the results: step, time, one column each, empty where one
+    has no record. Collective."""
     wanted = {name: find(project, name) for name in names} or project.histories
     if not wanted:
         raise CommandError("there is no history to write")
@@ -230,7 +275,9 @@ def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
     for step in sorted(by_step):
         cells = [repr(by_step[step][name]) if name in by_step[step] else "" for name in wanted]
         lines.append(",".join([str(step), repr(times[step]), *cells]))
-    write_sections(project.path(path), project.comm, lambda: [("\n".join(lines) + "\n").encode()])
+    file = project.to_write(project.result(path))
+    project.folder()
+    write_sections(file, project.comm, lambda: [("\n".join(lines) + "\n").encode()])
 
 
 def _quoted(title: str) -> str:

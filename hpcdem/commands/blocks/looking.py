@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpcdem.commands.blocks.choosing import chosen, everything
+from hpcdem.commands.blocks.choosing import everything
 from hpcdem.commands.blocks.project import Project
 from hpcdem.model.blocks.groups import Range
 
@@ -15,13 +15,13 @@ def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarr
 
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
-    """A quantity of these objects, in the order of their numbers; NaN where there is none. Collective."""
-    return project.ready(use=False).values(name, chosen(project, kind, where))
+    """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
+    return project.ready(use=False).values(name, everything(project, kind, where))
 
 
 def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
     """Exact sum of a quantity; of nodes over all corners there. Collective."""
-    return project.ready(use=False).total(name, chosen(project, kind, where))
+    return project.ready(use=False).total(name, everything(project, kind, where))
 
 
 def ratio(project: Project) -> float:

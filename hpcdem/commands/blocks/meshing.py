@@ -9,10 +9,11 @@ import numpy as np
 
 from hpcdem.commands.blocks.project import Project
 from hpcdem.errors import CommandError
-from hpcdem.model.blocks.groups import DEFAULT
+from hpcdem.model.blocks.groups import DEFAULT, ELEMENT
 from hpcdem.model.blocks.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
 from hpcdem.pre.mesh import fractures, geometry, imported, quality, structured
+from hpcdem.pre.mesh import glue as glue_of
 from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
@@ -77,8 +78,15 @@ def rectangle(
 ) -> None:
     """A regular mesh of the rectangle between two corners [m]; cells along x and y; ratio: each is so many times as
     large as the one before. Its sides are the layers left, right, bottom and top."""
-    xs, ys = (structured.spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
-    _add(project, structured.rectangle(xs, ys, kind, diagonal, (set_name, group)))
+    _add(project, structured.rectangle(*grid_lines(first, second, cells, ratio), kind, diagonal, (set_name, group)))
+
+
+def grid_lines(
+    first: tuple[float, float], second: tuple[float, float], cells: tuple[int, int], ratio: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates along x and along y [m] of such a mesh."""
+    x, y = (structured.spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
+    return x, y
 
 
 def equilateral(
@@ -105,7 +113,8 @@ def import_file(
 ) -> None:
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
     this are one [m]; scale: metres in a unit of the file."""
-    mesh = made_once(project.comm, lambda: imported.import_mesh(project.path(path), merge, scale))
+    file = project.to_read(path)
+    mesh = made_once(project.comm, lambda: imported.import_mesh(file, merge, scale))
     first = 0 if project.mesh is None else len(project.mesh.cells)
     _add(project, mesh)
     if group is not None:
@@ -129,16 +138,58 @@ def intersect(project: Project, layer: str, follow: bool = False) -> None:
     if project.in_use:
         edges = mesh.edges()
         new = ~np.isin(crack_rows(cracked, edges), crack_rows(mesh, edges))
-        project.blocks.crack(edges.faces[crack_rows(cracked, edges)[new], 0])
+        joints = edges.faces[crack_rows(cracked, edges)[new]]
+        project.blocks.crack(joints[project.alive[joints // 4].all(axis=1), 0])  # others are, once they are back
         project.mesh = cracked
     else:
         project.replace_mesh(cracked)
+
+
+def glue(
+    project: Project,
+    tolerance: float | None = None,
+    between: tuple[str, str] | None = None,
+    set_name: str = DEFAULT,
+) -> None:
+    """Bodies that were meshed separately hang together where their faces coincide: these become joints, as inside of a
+    body. tolerance [m]: points nearer than this are one; between: only faces between the elements of two groups."""
+    mesh = project.whole_mesh()
+    project.refuse_in_use("bodies are glued")
+    sides = None
+    if between is not None:
+        one, other = (project.groups[ELEMENT].members(name, set_name) for name in between)
+        numbers = np.arange(len(mesh.cells))
+        sides = np.isin(numbers, one), np.isin(numbers, other)
+    made = glue_of.glued(mesh, tolerance, sides)
+    project.merge_points(made.mesh, made.points)
+    _say(
+        project,
+        f"glue: {made.faces} faces of different bodies are joints now, {len(mesh.points) - len(made.mesh.points)} "
+        f"points have become one with another (within {made.tolerance:g} m)",
+    )
 
 
 def tell_quality(project: Project) -> None:
     """Sizes and angles of the mesh, in the log."""
     for line in quality.quality(project.whole_mesh()).lines():
         _say(project, line)
+
+
+def fracture_set(
+    orientation: tuple[str, float, float],
+    length: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    scanline: float,
+    ends_at: float,
+    reached: bool,
+) -> fractures.FractureSet:
+    """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
+    greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see pre.mesh.fractures."""
+    longest = math.inf if length[4] is None else length[4]
+    return fractures.FractureSet(
+        fractures.Orientation(*orientation), fractures.Length(*length[:4], longest), *density, scanline,
+        "reached" if reached else "random", ends_at,
+    )  # fmt: skip
 
 
 def fracture_network(
@@ -155,23 +206,15 @@ def fracture_network(
     reached: bool = False,
     least: float = 0.0,
 ) -> None:
-    """A set of fractures with given statistics inside of a layer becomes lines of another one. Collective.
-
-    orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least, greatest) [m], density: (p10, p20
-    or p21, value), scanline [degrees], ends_at, reached: see pre.mesh.fractures; least: shorter pieces at the rim are
-    left out [m].
-    """
+    """A set of fractures with given statistics (see `fracture_set`) inside of a layer becomes lines of another one;
+    least: shorter pieces at the rim are left out [m]. Collective."""
     outline = project.layers[inside]
     for hole in holes:
         _ = project.layers[hole]
     size = max(curve.length() for curve in outline) / ARC_STEPS
     if size <= 0.0:
         raise CommandError(f"layer '{inside}' has no closed line")
-    longest = math.inf if length[4] is None else length[4]
-    one = fractures.FractureSet(
-        fractures.Orientation(*orientation), fractures.Length(*length[:4], longest), *density, scanline,
-        "reached" if reached else "random", ends_at,
-    )  # fmt: skip
+    one = fracture_set(orientation, length, density, scanline, ends_at, reached)
     number, project.networks = project.networks, project.networks + 1
 
     def make() -> fractures.Fractures:

@@ -24,13 +24,15 @@ def option(
     dynamic: bool | None = None,
     collision: bool | None = None,
     large_strain: bool | None = None,
+    overlap: str | None = None,
     energy: bool | None = None,
 ) -> None:
-    """Switches; None leaves one as it is. energy: keep the energy budget from here on."""
+    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
+    energy: keep the energy budget from here on."""
     if dynamic is not None:
         project.dynamic = dynamic
-    if (dynamic, collision, large_strain) != (None, None, None):
-        project.blocks.option(dynamic=dynamic, collision=collision, large_strain=large_strain)
+    if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
+        project.blocks.option(dynamic=dynamic, collision=collision, large_strain=large_strain, overlap=overlap)
     if energy is not None:
         needed = [name for name, history in project.histories.items() if history.value in ENERGIES]
         if not energy and needed:
@@ -46,11 +48,9 @@ def time_step(
     mass_scaling: float | None = None,
 ) -> None:
     """The time step of dynamic runs [s]; see `Blocks.time_step`."""
-    if value is not None and auto is None:
-        auto = False
     project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)
-    if auto is not None:
-        project.adapts = auto
+    if value or mass_scaling or auto is not None:
+        project.adapts = bool(auto)
 
 
 def reset_velocity(project: Project) -> None:

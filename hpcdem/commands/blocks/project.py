@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from hpcdem.errors import CommandError
 from hpcdem.model.blocks.connectivity import Edges
-from hpcdem.model.blocks.groups import ELEMENT, KINDS, Groups
+from hpcdem.model.blocks.groups import ELEMENT, KINDS, NODE, Groups
 from hpcdem.model.blocks.mesh import Mesh
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import launch, run_folder
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from hpcdem.blocks import Blocks
     from hpcdem.commands.blocks.charts import Chart
     from hpcdem.commands.blocks.histories import History
+    from hpcdem.commands.running import Due
     from hpcdem.coupled import Coupled
 
 
@@ -27,13 +29,18 @@ class Project:
     the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
 
     layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object; alive (ne,) bool: elements
-    that are not null; histories, charts and frames (steps between two by name) that are kept up; framed: step of the
-    last frame by name; dynamic: motion in time, not towards equilibrium; adapts: the
-    time step may change during a run; networks: sets of fractures made so far; line:
+    that are not null; histories, charts and frames (steps between two by name) that are kept up; cracks_filed: broken
+    joints that are in their file, None: the file is not of this model yet; framed: step of the last frame by name;
+    dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
+    fractures made so far; solved: how the last `model solve` ended, reason, ratio and steps; line:
     of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
     the way to where the script is; progress: of the command that steps at this moment, see running.py; resumed: this
-    run goes on from a checkpoint of the folder; told: when the log spoke last of a line of the script that steps;
-    coupled: the particles that are stepped with the blocks; continues: the checkpoint from which they go on.
+    run goes on from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
+    when the log spoke last of a line of the script that steps; coupled: the particles that are stepped with the
+    blocks; continues: the checkpoint from which they go on, asleep: the number of these particles, which are empty
+    until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint knows nothing
+    of methods of particles; stepping: the name of that command, "" if there is none; inputs: files that the script
+    reads, by their real paths, in words; made: files that were written by name.
     """
 
     def __init__(self, blocks: Blocks, directory: Path | str = ".", outdir: Path | str = "data") -> None:
@@ -48,9 +55,16 @@ class Project:
         self.place: Callable[[], dict[str, Any] | None] = lambda: None
         self.progress: dict[str, Any] | None = None
         self.resumed = False
+        self.restored: tuple[Path, int] | None = None
         self.told: dict[int, float] = {}
         self.coupled: Coupled | None = None
         self.continues: Path | None = None
+        self.inputs: dict[str, str] = {}
+        self.made: set[str] = set()
+        self.asleep: int | None = None
+        self.calls_lost = False
+        self.due: Due | None = None
+        self.stepping = ""
         self._forget()
 
     @property
@@ -68,8 +82,16 @@ class Project:
         """Steps done."""
         return int(self.blocks.clock.step)
 
+    def refuse_inside(self, what: str) -> None:
+        """CommandError in a function that is called in the middle of a command that steps."""
+        if self.stepping:
+            raise CommandError(
+                f"{what} cannot be used by a function that is called in the middle of model {self.stepping}"
+            )
+
     def clear(self) -> None:
         """A new model."""
+        self.refuse_inside("model new")
         if self.coupled is not None:
             self.coupled.release()
         self.coupled = self.continues = None
@@ -83,12 +105,14 @@ class Project:
         self.alive = np.empty(0, bool)
         self.groups = {kind: Groups(kind) for kind in KINDS}
         self.histories: dict[str, History] = {}
+        self.cracks_filed: int | None = None
         self.charts: dict[str, Chart] = {}
         self.frames: dict[str, int] = {}
         self.framed: dict[str, int] = {}
         self.dynamic = True
         self.adapts = False
         self.networks = 0
+        self.solved: dict[str, Any] = {}
         self.taken = False
         self.in_use = False
 
@@ -96,10 +120,7 @@ class Project:
 
     def add_mesh(self, mesh: Mesh) -> None:
         """One more body. CommandError if models or conditions were assigned to the mesh already."""
-        if self.in_use:
-            raise CommandError(
-                "the mesh has models or conditions already: all bodies are meshed before the first of them is assigned"
-            )
+        self.refuse_in_use("all bodies are meshed")
         first = 0 if self.mesh is None else len(self.mesh.cells)
         self.mesh = mesh if self.mesh is None else joined(self.mesh, mesh)
         for set_name, of in mesh.groups.items():
@@ -107,6 +128,27 @@ class Project:
                 self.groups[ELEMENT].assign(numbers + first, name, set_name)
         self.alive = np.concatenate([self.alive, np.ones(len(mesh.cells), bool)])
         self.taken = False
+
+    def refuse_in_use(self, what: str) -> None:
+        """CommandError if models or conditions were assigned to the mesh already."""
+        if self.in_use:
+            raise CommandError(
+                f"the mesh has models or conditions already: {what} before the first of them is assigned"
+            )
+
+    def merge_points(self, mesh: Mesh, number: np.ndarray) -> None:
+        """The same elements with fewer points; number (np,): the new one of each. Of points that were in several groups
+        of a set the lowest counts."""
+        self.replace_mesh(mesh)
+        for sets in self.groups[NODE].sets.values():
+            lowest = np.full(len(mesh.points), len(number))
+            for members in sets.values():
+                np.minimum.at(lowest, number[members], members)
+            for name, members in sets.items():
+                sets[name] = np.unique(number[members[lowest[number[members]] == members]])
+        for history in self.histories.values():
+            if history.kind == NODE:
+                history.numbers = np.unique(number[history.numbers]).tolist()
 
     def edges(self) -> Edges:
         """The edges of the mesh."""
@@ -142,17 +184,44 @@ class Project:
             return mesh.points
         return np.column_stack([self.blocks.values(f"position_{axis}") for axis in "xy"])
 
+    def corner_positions(self) -> np.ndarray:
+        """(4 ne, 2) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
+        mesh = self.whole_mesh()
+        if not self.taken or self.step == 0:
+            return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, 2)
+        return self.blocks.corner_values("position")
+
     # ---- files ---------------------------------------------------------------------------------------------------
 
     def path(self, name: str) -> Path:
         """A file of the script: beside it, unless the name says otherwise."""
         return self.directory / name
 
+    def to_read(self, name: str, what: str = "") -> Path:
+        """A file that the script reads, beside it; nothing is written over it unless this run has made it."""
+        path = self.path(name)
+        real = os.path.realpath(path)
+        if real not in self.made:
+            self.inputs.setdefault(real, what or f"'{name}', which this run has read")
+        return path
+
+    def to_write(self, path: Path) -> Path:
+        """A file that is about to be written. CommandError if it is the script, or one that was read."""
+        real = os.path.realpath(path)
+        if real in self.inputs:
+            raise CommandError(f"{path} would be written over {self.inputs[real]}; give it another name")
+        self.made.add(real)
+        return path
+
+    def result(self, name: str) -> Path:
+        """A file in the folder of the results, unless the name says otherwise."""
+        return self.outdir / name
+
     def folder(self) -> Path:
         """The folder of the results, made and locked on the first call. Collective."""
         if not self.folder_made:
             job = self.job or run_folder.Job()
-            locked = run_folder.enter(self.outdir, self.comm, job, launch.version(), self.resumed)
+            locked = run_folder.enter(self.outdir, self.comm, job, launch.version(), self.resumed, self.restored)
             self.folder_made = True
             if not locked and self.log is not None:
                 why = f"the file system of {self.outdir} has no locks"

@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import math
 import time as clocks
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hpcdem.commands.blocks import coupling, frames, histories, saving
+from hpcdem.blocks.solving import RATIO, Watch
+from hpcdem.commands.blocks import coupling, cracks, frames, histories, saving
 from hpcdem.commands.blocks.project import Project
-from hpcdem.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.io.behind import under_way
 from hpcdem.runtime.progress import duration, rate
+from hpcdem.runtime.stopping import STOP
 
 if TYPE_CHECKING:
     from hpcdem.blocks import Blocks
 
-RATIO = 1e-5
-"""Unbalanced over all forces at which a static run is in equilibrium, if nothing else is asked for."""
 LOOK_STATIC, LOOK_DYNAMIC = 50, 100
 """Steps between two looks at the ratio, counted from the beginning of the command."""
 STRIDE = 100
 """Steps at most between two looks at the model time, as the time step may change."""
+CONTINUE = "continue"
+"""What a script may do when a run towards a ratio has failed; else it stops."""
+FAILED = ("no progress", "limit")
+"""Reasons of `blocks.Watch`; "runaway": a body moved too fast to go on."""
 QUIET_SECONDS = 10.0
 """Between two lines of the log."""
 
@@ -31,24 +36,51 @@ def step(project: Project, steps: int) -> None:
     _run(project, f"step {steps}", steps, None, None)
 
 
-def solve(project: Project, ratio: float | None = None, cycles: int | None = None, time: float | None = None) -> None:
+def solve(
+    project: Project,
+    ratio: float | None = None,
+    cycles: int | None = None,
+    time: float | None = None,
+    window: int | None = None,
+    limit: int | None = None,
+    on_failure: str = "stop",
+) -> None:
     """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whatever comes
-    first. Without any of them: until the ratio is RATIO."""
+    first. Without any of them: until the ratio is RATIO.
+
+    window, limit [steps]: when a run towards a ratio has failed, see `Blocks.watch`; it ends the script with an
+    EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
+    """
     words = [f"{name} {value:g}" for name, value in (("ratio", ratio), ("cycles", cycles), ("time", time)) if value]
     if ratio is None and cycles is None and time is None:
         ratio = RATIO
         words = [f"ratio {ratio:g}"]
     if time is not None and not project.dynamic:
         raise CommandError("time does not pass in static runs: use ratio or cycles")
-    _run(project, "solve " + " ".join(words), cycles, ratio, time)
+    first = project.step if project.progress is None else project.progress["first"]
+    text = ""
+    try:
+        reason, found, watch = _run(project, "solve " + " ".join(words), cycles, ratio, time, window, limit)
+        if reason in FAILED:
+            text = _no_equilibrium(project, watch, reason, ratio or RATIO, found)
+    except EquilibriumError as error:
+        reason, found, text = "runaway", math.nan, f"no equilibrium: {error}; {_what_moves(project)}"
+    project.solved = {"reason": reason, "ratio": found, "steps": project.step - first}
+    if text and on_failure != CONTINUE:
+        raise EquilibriumError(text)
+    if text and project.log is not None:
+        project.log.warn(text)
 
 
 def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto") -> None:
     """Static equilibrium at once, see `Blocks.solve_elastic`; the histories and frames that are due then."""
+    project.refuse_inside("model solve elastic")
+    coupling.refuse(project, "model solve elastic")
     blocks = project.ready()
     began = clocks.monotonic()
     given = {} if ratio is None else {"ratio": ratio}
     found = blocks.solve_elastic(cycles=cycles, solver=solver, **given)
+    project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
     if project.log is not None:
         where = f"line {project.line}: " if project.line else ""
         project.log.info(
@@ -61,58 +93,124 @@ def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None,
     frames.settle(project)
 
 
-def _run(project: Project, name: str, steps: int | None, ratio: float | None, time: float | None) -> None:
+def _run(
+    project: Project, name: str, steps: int | None, ratio: float | None, time: float | None,
+    window: int | None = None, limit: int | None = None,
+) -> tuple[str, float, Watch]:  # fmt: skip
+    """Step, and write what is due. Returns why it ended, "ratio", "cycles", "time", "function" (one of the particles
+    wanted it to) or one of FAILED, the last ratio that was looked at (NaN: none), and who looked."""
+    project.refuse_inside(f"model {name}")
     coupling.take_up(project)
     clock = project.ready().clock
+    _settle_time_step(project)
+    if time is not None and project.progress is None and time <= 0.5 * clock.dt and project.log is not None:
+        project.log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
         project.progress = {"first": clock.step, "end": None if time is None else clock.time + time}
+        if ratio is not None:
+            ends = steps is not None or time is not None
+            project.progress["watch"] = asdict(project.blocks.watch(window, limit, ends))
     first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
+    alone = steps if ratio is None and time is None else None  # the number of steps, if it is known
     try:
-        _advance(project, name, first, math.inf if steps is None else first + steps, math.inf if end is None else end,
-                 ratio)  # fmt: skip
+        with coupling.stepping(project, name, alone):
+            project.stepping = name
+            ended = _advance(project, name, first, math.inf if steps is None else first + steps,
+                             math.inf if end is None else end, ratio)  # fmt: skip
         frames.settle(project)
+        return ended
     finally:
         under_way.wait()  # the way out after an error, too
-        project.progress = None
+        project.progress, project.stepping = None, ""
 
 
-def _advance(project: Project, name: str, first: int, last: float, end: float, ratio: float | None) -> None:
-    """To step `last` or model time `end` [s], whatever comes first."""
-    blocks, clock = project.blocks, project.blocks.clock
+def _advance(
+    project: Project, name: str, first: int, last: float, end: float, ratio: float | None
+) -> tuple[str, float, Watch]:
+    """To step `last` or model time `end` [s], whatever comes first; see `_run`."""
+    blocks, clock, progress = project.blocks, project.blocks.clock, project.progress
+    assert progress is not None
+    # A checkpoint of a version that did not watch has none.
+    watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
+    reason, found = progress.get("ended", ["", math.nan])
     look = LOOK_DYNAMIC if project.dynamic else LOOK_STATIC
     report = _Report(project, name, last)
     frames.write_due(project)
-    while clock.step < last and clock.time < end - 0.5 * clock.dt:
-        due = min(last, _after(clock.step, STRIDE, first))
+    while clock.step < last and clock.time < end - 0.5 * clock.dt and not progress.get("done"):
+        due = min(last, _after(clock.step, STRIDE, first), coupling.next_checkpoint(project))
         due = min([due, *(_after(clock.step, every, 0) for every in _intervals(project))])
+        if histories.wait(project):
+            due = clock.step + 1
         if ratio is not None:
             due = min(due, _after(clock.step, look, first))
         try:
             request = coupling.advance(project, int(min(due - clock.step, _within(project, end))))
-        except PhysicsError:
+        except (EquilibriumError, PhysicsError):
             histories.flush(project)
+            cracks.flush(project)
             frames.write_last(project)
             raise
-        histories.record(project)
+        _settle_time_step(project)
+        more = not request and clock.step < last and clock.time < end - 0.5 * clock.dt
+        histories.record(project, more)
+        cracks.record(project)
         frames.write_due(project)
-        here = (clock.step - first) % look == 0
-        reached = ratio is not None and here and blocks.unbalanced_ratio() <= ratio
+        if ratio is not None and ((clock.step - first) % look == 0 or clock.step == last):
+            found = blocks.unbalanced_ratio()
+            reason = "ratio" if found <= ratio else watch.failed(clock.step, found, blocks.joint_counts()[2])
+            done = progress.get("done", False) or bool(reason)
+            progress.update(watch=asdict(watch), done=done, ended=[reason, found])
         report.tell(blocks)
-        if reached:  # a request is answered by the next command: nothing is left to do in this one
+        if coupling.checkpoint_is_due(project):
+            histories.flush(project)
+            cracks.flush(project)
+            saving.write_checkpoint(project)
+        if reason:  # a request is answered by the next command: nothing is left to do in this one
             break
         if request:
             _answer(project, request)
     histories.flush(project)
+    cracks.flush(project)
     report.finish(blocks)
+    over = "cycles" if clock.step >= last else "function" if progress.get("done") else "time"
+    return reason or over, found, watch
+
+
+def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, found: float) -> str:
+    """What is said of a run that has failed, with the body that slides away. Collective."""
+    step = project.step
+    why = {
+        "limit": f"after {step - watch.began} steps, the limit",
+        "no progress": f"for {step - watch.progress} steps the ratio has not fallen by a tenth",
+    }[reason]
+    return (
+        f"no equilibrium: {why}; the ratio is {found:.3g}, the least was {watch.least:.3g}, asked {ratio:g}; "
+        f"{_what_moves(project)}"
+    )
+
+
+def _what_moves(project: Project) -> str:
+    """The body that slides away, or that there is none. Collective."""
+    body = project.blocks.sliding_body()
+    if body is None:
+        return "no body slides away: joints may go on to yield, loads to change, or rounding allows no better balance"
+    return f"{body} {'m/s' if project.dynamic else 'm per step'}: hold it, or give it time to come to rest (window)"
+
+
+def _settle_time_step(project: Project) -> None:
+    """Give the clock the time step of the model as it is now: how many steps a time takes follows from it. Coupled
+    blocks have the one that was settled with the particles."""
+    if project.coupled is None:
+        project.blocks.close_model()
 
 
 def _within(project: Project, end: float) -> float:
-    """Steps to the moment nearest to a model time, at least one; `dt` is known from the first step on only. Near the
-    end one at a time if it may change on the way: where the run ends must not depend on where it was interrupted."""
+    """Steps to the moment nearest to a model time, at least one. Near the end one at a time if dt may change on the
+    way: where the run ends must not depend on where it was interrupted."""
     clock = project.blocks.clock
     if not math.isfinite(end):
         return math.inf
-    steps = max(1, math.ceil((end - clock.time) / clock.dt - 0.5)) if clock.dt > 0.0 else 1
+    steps = max(1, math.ceil((end - clock.time) / clock.dt - 0.5))
     return 1 if project.adapts and steps <= 2 * STRIDE else steps
 
 
@@ -125,6 +223,13 @@ def _after(step: int, every: int, origin: int) -> int:
     return origin + ((step - origin) // every + 1) * every
 
 
+def stop_here(project: Project, request: int) -> None:
+    """A command is about to be carried out, and none that steps has answered a signal or the time limit that asked for
+    the end: between two commands is a good place. Collective; the request is the same on all ranks."""
+    if request >= STOP:
+        _answer(project, request)
+
+
 def _answer(project: Project, request: int) -> None:
     """A signal or the time limit asked for a checkpoint, perhaps for the end."""
     stop, log, step = project.blocks.stop, project.log, project.step
@@ -132,6 +237,7 @@ def _answer(project: Project, request: int) -> None:
     if what == "none":
         return
     histories.flush(project)
+    cracks.flush(project)
     path = saving.write_checkpoint(project, automatic=what == "auto")
     if what == "stop":
         raise StoppedWithCheckpoint(

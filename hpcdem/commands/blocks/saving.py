@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -24,7 +25,7 @@ FORMAT = 1
 
 def save(project: Project, path: str) -> None:
     """The whole state to a file beside the script. Collective."""
-    _write(project, project.path(path), {"names": project.names()})
+    _write(project, project.to_write(project.path(path)), {"names": project.names()})
 
 
 def write_checkpoint(project: Project, automatic: bool = False) -> Path:
@@ -39,7 +40,9 @@ def write_checkpoint(project: Project, automatic: bool = False) -> Path:
             project.log.warn_once("names", f"{error}; checkpoints of this run hold no m_ names")
     place = project.place()
     journal = place.get("journal") if place is not None else None
-    more = {"run": {**(place or {}), "progress": project.progress}, "position": len(journal or ())}
+    particles = None if project.coupled is None else project.coupled.particles.number
+    run = {**(place or {}), "progress": project.progress, "particles": particles}
+    more = {"run": run, "position": len(journal or ())}
     _write(project, path, {"names": names, **more})
     run_folder.retire(path.parent, project.comm, project.step, project.keep)
     return path
@@ -60,8 +63,12 @@ def restore(project: Project, path: str) -> dict[str, Any]:
 
     CommandError if there is no such file, or if it is no checkpoint of blocks; the model is then as it was.
     """
+    project.refuse_inside("model restore")
     flush(project)
-    return dict(_restored(project, project.path(path)).get("names") or {})
+    file = project.to_read(path)
+    names = dict(_restored(project, file).get("names") or {})
+    project.restored = file, project.step
+    return names
 
 
 def take_up(project: Project) -> list[Any] | None:
@@ -88,6 +95,7 @@ def take_up(project: Project) -> list[Any] | None:
                 f"begins with pcdc model restore '{path}'"
             )
         project.progress, project.resumed = run.get("progress"), True
+        project.asleep, project.calls_lost = run.get("particles"), "particles" not in run
         return journal
     log.info(f"no checkpoint in {folder}: starting at the beginning")
     return None
@@ -122,6 +130,7 @@ def _state(project: Project) -> dict[str, Any]:
         "adapts": project.adapts,
         "in_use": project.in_use,
         "networks": project.networks,
+        "solved": {name: None if value != value else value for name, value in project.solved.items()},
     }
 
 
@@ -144,8 +153,10 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     project.layers, project.mesh, project.alive = layers, mesh, alive
     project.groups.update(groups)
     project.histories, project.charts, project.frames = histories, charts, dict(state["frames"])
-    project.framed = dict(state["framed"])
+    project.framed, project.cracks_filed = dict(state["framed"]), None
     project.networks = int(state["networks"])
+    solved = state.get("solved", {})  # versions before did not keep it
+    project.solved = {name: math.nan if value is None else value for name, value in solved.items()}
     project.adapts = bool(state["adapts"])
     project.dynamic, project.in_use, project.taken = bool(state["dynamic"]), bool(state["in_use"]), mesh is not None
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from hpcdem.errors import CommandError
+from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.statement import Statement
+from hpcdem.lang.pcdc.trial import python
 from hpcdem.model.blocks import groups as g
 
 if TYPE_CHECKING:
@@ -51,11 +52,6 @@ class Call:
         return {"group": given["value"], "set_name": given.get("set", g.DEFAULT)}
 
 
-def python(name: str) -> str:
-    """`poisson-ratio` as a name of Python."""
-    return name.replace("-", "_")
-
-
 def _plain(value: Any) -> Any:
     return value.name if isinstance(value, TableName) else value
 
@@ -76,6 +72,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
     "face-of": lambda v: g.OfElements(v["value"], v.get("set", g.DEFAULT)),
     "between": lambda v: g.Between(v["value"][0], v["value"][1], v.get("set", g.DEFAULT)),
     "crack": lambda v: g.OnCrack(),
+    "present": lambda v: g.Present(),
 }
 
 # ---- model ---------------------------------------------------------------------------------------------------------
@@ -89,25 +86,17 @@ def _restore(call: Call) -> None:
 # ---- geometry and mesh ---------------------------------------------------------------------------------------------
 
 
-def _shape(verb: str, *names: str) -> Callable[[Call], None]:
+def _shape(kind: str, *names: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        getattr(call.verbs.geometry, verb)(call.project, call["as-layer"], *(call[name] for name in names))
+        call.verbs.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
 
     return carry_out
 
 
 def _fractures(call: Call) -> None:
-    densities = [name for name in ("p10", "p20", "p21") if name in call.arguments]
-    if len(densities) != 1:
-        raise CommandError("fractures need one density: p10, p20 or p21")
-    orientation, length = call["orientation"], call["length"]
     call.verbs.meshing.fracture_network(
-        call.project, call["as-layer"], call["inside"],
-        orientation=(*orientation["value"], orientation.get("spread", 0.0)),
-        length=(*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
-        density=(densities[0], call[densities[0]]), seed=call["seed"], holes=call.get("hole", []),
-        scanline=call.get("scan-line", 0.0), ends_at=call.get("ends-at", 0.0), reached=call.get("reached", False),
-        least=call.get("shortest", 0.0),
+        call.project, call["as-layer"], call["inside"], **trial.fracture_words(call.arguments), seed=call["seed"],
+        holes=call.get("hole", []), least=call.get("shortest", 0.0),
     )  # fmt: skip
 
 
@@ -131,6 +120,13 @@ def _mesh_structured(call: Call) -> None:
     )  # fmt: skip
 
 
+def _mesh_glue(call: Call) -> None:
+    groups = call.get("between", {})
+    call.verbs.meshing.glue(
+        call.project, call.get("tolerance"), groups.get("value"), groups.get("set", g.DEFAULT)
+    )  # fmt: skip
+
+
 # ---- elements, faces, joints, nodes --------------------------------------------------------------------------------
 
 
@@ -145,27 +141,17 @@ def _element_model(call: Call) -> None:
     if call["model"] == "null":
         call.verbs.assigning.null(call.project, **call.properties(), where=call.where)
     else:
-        name = _MODELS[call["model"]]
+        name = trial.MODELS[call["model"]].name
         call.verbs.assigning.element_model(call.project, name, call.properties(), call.where)
 
 
 def _face_model(call: Call) -> None:
-    call.verbs.assigning.face_model(call.project, _MODELS[call["model"]], call.properties(), call.where)
+    call.verbs.assigning.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
 
 
 def _joint_model(call: Call) -> None:
-    properties = call.properties()
-    if properties.pop("np", 3) != 3:
-        raise CommandError("np is 3 in two dimensions")
-    call.verbs.assigning.joint_model(call.project, _MODELS[call["model"]], properties, call.where)
-
-
-_MODELS = {
-    "mechanical-iso-elastic": "mech_iso_elastic",
-    "contact-mohr-coulomb": "contact_mohr_coulomb",
-    "classic-intrinsic-cohesive-interface": "classic_intrinsic_cohesive_interface",
-}
-"""Names of the language and of `model.blocks.properties`."""
+    properties = {name: value for name, value in call.properties().items() if name != "np"}
+    call.verbs.assigning.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
 
 
 def _initial_stress(call: Call) -> None:
@@ -198,6 +184,18 @@ def _face_condition(call: Call) -> None:
 
 
 # ---- records -------------------------------------------------------------------------------------------------------
+
+
+def _field(call: Call) -> None:
+    distribution = next(name for name in ("weibull", "normal", "lognormal") if name in call.arguments)
+    about = {name: call[name] for name in ("least", "greatest") if name in call.arguments}
+    if "correlation" in call.arguments:
+        about["correlation"] = call["correlation"]["value"]
+        about["covariance"] = call["correlation"].get("covariance", "exponential")
+    first, second = call[distribution]
+    call.verbs.assigning.random_field(
+        call.project, call["name"], distribution=distribution, first=first, second=second, seed=call["seed"], **about
+    )
 
 
 def _history(call: Call) -> None:
@@ -237,7 +235,7 @@ VERBS: dict[str, Callable[[Call], None]] = {
     "geometry create rectangle": _shape("rectangle", "first", "second"),
     "geometry create circle": _shape("circle", "centre", "radius"),
     "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
-    "geometry create point": _shape("points", "points"),
+    "geometry create point": _shape("point", "points"),
     "geometry create fractures": _fractures,
     "geometry import": lambda c: c.verbs.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
     "geometry transform": lambda c: c.verbs.geometry.transform(c.project, **c.given()),
@@ -251,6 +249,7 @@ VERBS: dict[str, Callable[[Call], None]] = {
         c.project, c["file"], **c.group(), **{n: c[n] for n in ("merge", "scale") if n in c.arguments}
     ),
     "mesh intersect": lambda c: c.verbs.meshing.intersect(c.project, c["layer"], c.get("follow", False)),
+    "mesh glue": _mesh_glue,
     "mesh quality": lambda c: c.verbs.meshing.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
@@ -273,6 +272,8 @@ VERBS: dict[str, Callable[[Call], None]] = {
     "node reset velocity": lambda c: c.verbs.modelling.reset_velocity(c.project),
     "node reset displacement": lambda c: c.verbs.modelling.reset_displacement(c.project),
     "table create": lambda c: c.verbs.assigning.table(c.project, c["name"], c["values"]),
+    "field create": _field,
+    "field delete": lambda c: c.verbs.assigning.remove_field(c.project, c["name"]),
     "table delete": lambda c: c.verbs.assigning.remove_table(c.project, c["name"]),
     "history create": _history,
     "history delete": lambda c: c.verbs.histories.delete(c.project, c["name"]),
@@ -282,3 +283,13 @@ VERBS: dict[str, Callable[[Call], None]] = {
     "chart export": lambda c: c.verbs.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
     "output vtk": _output,
 }
+
+PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
+    "model save": lambda project, file: project.to_write(project.path(file)),
+    "model restore": lambda project, file: project.to_read(file),
+    "geometry import": lambda project, file: project.to_read(file),
+    "mesh import": lambda project, file: project.to_read(file),
+    "history export": lambda project, file: project.to_write(project.result(file)),
+    "chart export": lambda project, file: project.to_write(project.result(file)),
+}
+"""What is still to be known of a command that was carried out before the checkpoint: which file it read or made."""

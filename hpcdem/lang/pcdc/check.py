@@ -7,8 +7,10 @@ from collections import Counter
 
 from hpcdem.errors import ScriptError
 from hpcdem.lang.pcdc import source
+from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Pending
+from hpcdem.model.blocks.tables import Drawn, Over
 
 
 def read(text: str, file: str) -> Source:
@@ -21,6 +23,8 @@ def read(text: str, file: str) -> Source:
         except SyntaxError as error:  # what only the compiler finds, such as a return outside of a function
             line = error.lineno or 1
             raise ScriptError(file, line, f"{script.line(line)}: this is not correct Python: {error.msg}") from None
+        except (RecursionError, MemoryError):
+            raise source.too_deep(script, lambda text: compile(text, file, "exec")) from None
     return script
 
 
@@ -35,8 +39,9 @@ def summary(text: str, file: str) -> str:
 
 
 def _loose_names(script: Source) -> list[str]:
-    """Geometry layers and tables that are named but made nowhere. Where names are expressions nothing is said."""
-    made: dict[str, set[str]] = {"geometry layer": set(), "table": set()}
+    """Geometry layers, tables and fields that are named but made nowhere. Where names are expressions nothing is
+    said."""
+    made: dict[str, set[str]] = {"geometry layer": set(), "table": set(), "field": set()}
     used: list[tuple[int, str, str]] = []
     for statement in script.statements:
         name, given = statement.command.name, statement.arguments
@@ -44,18 +49,22 @@ def _loose_names(script: Source) -> list[str]:
             return []
         if name == "mesh structured" or name == "mesh equilateral":
             made["geometry layer"] |= {"left", "right", "bottom", "top"}
-        if "as-layer" in given or name == "table create":
+        kind = {"table create": "table", "field create": "field"}.get(name, "geometry layer")
+        if "as-layer" in given or kind != "geometry layer":
             new = given.get("as-layer", given.get("name"))
             if isinstance(new, Pending):
                 return []
-            made["table" if name == "table create" else "geometry layer"].add(new)
+            made[kind].add(new)
         for word in ("from-layer", "layer", "inside"):
             if isinstance(given.get(word), str):
                 used.append((statement.line, "geometry layer", given[word]))
         for term, value in statement.range or ():
             if term == "geometry" and isinstance(value, str):
                 used.append((statement.line, "geometry layer", value))
-        for value in given.get("properties", {}).values():
-            if hasattr(value, "name") and isinstance(value.name, str):
-                used.append((statement.line, "table", value.name))
+        for value in (*given.values(), *given.get("properties", {}).values()):
+            match value:
+                case TableName(of) | Over(of, _) if isinstance(of, str):
+                    used.append((statement.line, "table", of))
+                case Drawn(of):
+                    used.append((statement.line, "field", of))
     return [f"line {line}: no line makes the {kind} '{name}'" for line, kind, name in used if name not in made[kind]]

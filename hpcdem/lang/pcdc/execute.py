@@ -9,20 +9,22 @@ from __future__ import annotations
 import importlib
 import linecache
 import math
+import os.path
 import random
 import sys
 import traceback
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import names, source
-from hpcdem.lang.pcdc.bindings import VERBS, Call
-from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal
+from hpcdem.lang.pcdc.bindings import PASSED_OVER, VERBS, Call
+from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
 from hpcdem.lang.pcdc.source import CALL, Source
 from hpcdem.lang.pcdc.statement import Statement, shown
 from hpcdem.lang.pcdc.vector import Vector
@@ -75,11 +77,13 @@ class Interpreter:
         in which it was written, and goes on there. UsageError if that is not possible.
         """
         self.journal = Journal(self._warn_of_lost_journal)
+        self.journal.keeps_calls = not (past and getattr(self.project, "calls_lost", False))
         if past:
             self.journal.replay(list(past))
         random.seed(SEED)
         np.random.seed(SEED)  # noqa: NPY002 - what scripts use
         self.namespace["__file__"] = script.file
+        self.project.inputs[os.path.realpath(script.file)] = "the script that runs"
         self._execute(script, "exec")
 
     def line(self, script: Source) -> None:
@@ -121,7 +125,7 @@ class Interpreter:
         except BaseException as error:
             if isinstance(error, HpcdemError) and not isinstance(error, CommandError):
                 raise
-            if not isinstance(error, HpcdemError) and _in_a_command(error):
+            if not isinstance(error, (HpcdemError, RecursionError, MemoryError)) and self._in_a_command(error):
                 raise  # not the script's fault: the whole traceback is told
             raise self._explained(error, script) from None
         if self.journal is not None and self.journal.failure is not None:
@@ -140,11 +144,25 @@ class Interpreter:
                 return ScriptError(last.filename, last.lineno or 0, f"{shown(text)}: {error}{way}")
             if statement is not None:
                 return statement.error(f"{type(error).__name__}: {error}{way}")
+            if isinstance(error, (RecursionError, MemoryError)):
+                line = last.lineno or 0
+                why = f"{type(error).__name__}: {error}".rstrip(": ")
+                return HpcdemError(f"{last.filename}:{line}: {shown(script.line(line).strip())}: {why}{way}")
         trace = error.__traceback__
         while trace is not None and trace.tb_frame.f_code.co_filename not in self.sources:
             trace = trace.tb_next
         text = "".join(traceback.format_exception(type(error), error, trace or error.__traceback__)).rstrip()
         return HpcdemError(f"{script.file} ended with an error\n{text}")
+
+    def _in_a_command(self, error: BaseException) -> bool:
+        """Did it happen while a command was carried out, not in the Python of the script, which the command may have
+        called?"""
+        trace, inside = error.__traceback__, False
+        while trace is not None:
+            code = trace.tb_frame.f_code
+            inside = (inside or code is Interpreter._carry_out.__code__) and code.co_filename not in self.sources
+            trace = trace.tb_next
+        return inside
 
     # ---- one command ---------------------------------------------------------------------------------------------
 
@@ -157,10 +175,12 @@ class Interpreter:
             self._agree(index, repr(error))
             raise self._on_the_way(error) from None
         told = repr((arguments, terms))
-        self._agree(index, told)
+        asked = self._agree(index, told)
         self.project.line = statement.line if self._included_at is None else self._included_at
-        if self._passed_over(statement, told):
+        if self._passed_over(statement, arguments, told):
             return
+        if asked and self.journal is not None:
+            self.verbs.running.stop_here(self.project, asked)
         try:
             VERBS[statement.command.name](Call(self, statement, arguments, terms))
         except HpcdemError as error:
@@ -175,6 +195,8 @@ class Interpreter:
         """An error of a verb, with the line."""
         if isinstance(error, (CommandError, ScriptError)):
             return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(str(error)))
+        if isinstance(error, EquilibriumError):
+            return EquilibriumError(str(self._on_the_way(statement.error(str(error)))))
         if type(error) is HpcdemError:
             # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
             return HpcdemError(str(self._on_the_way(statement.error(str(error)))))
@@ -182,7 +204,7 @@ class Interpreter:
 
     # ---- going on from a checkpoint ------------------------------------------------------------------------------
 
-    def _passed_over(self, statement: Statement, told: str) -> bool:
+    def _passed_over(self, statement: Statement, arguments: Mapping[str, Any], told: str) -> bool:
         """Note a command, or, on the way back to a checkpoint, pass over it if it was done before that was written."""
         journal = self.journal
         if journal is None:
@@ -198,7 +220,10 @@ class Interpreter:
         except UsageError as error:
             raise self._took_another_way(error, f"{statement.file}:{statement.line}: {shown(statement.text)}") from None
         if given is not None:
-            self._take_names(given, statement.arguments["file"])
+            self._take_names(given, arguments["file"])
+        note = PASSED_OVER.get(statement.command.name)
+        if note is not None:
+            note(self.project, arguments["file"])
         return True
 
     def _warn_of_lost_journal(self) -> None:
@@ -221,10 +246,43 @@ class Interpreter:
 
     def look(self, make: Callable[[], Any]) -> Any:
         """What the script asks of the model."""
-        if self.journal is None:
+        journal = self.journal
+        return make() if journal is None else self._placed(lambda: journal.look(make))
+
+    def ask(
+        self, told: tuple[Any, ...], make: Callable[[], Any], again: Callable[[], Any] | None = None,
+        fails_again: bool = False,
+    ) -> Any:  # fmt: skip
+        """A method of particles with these arguments, see Journal.ask."""
+        journal = self.journal
+        if journal is None:
             return make()
+        return self._placed(lambda: journal.ask(_checksum(told), make, again, fails_again))
+
+    def ask_alone(self, told: tuple[Any, ...], make: Callable[[], Any], again: bool) -> Any:
+        """What this rank sees of its particles, see Journal.ask_alone."""
+        journal, alone = self.journal, self.project.comm.size == 1
+        if journal is None:
+            return make()
+        return self._placed(lambda: journal.ask_alone(_checksum(told), make, again, alone))
+
+    def function(self, call: Callable[[], object]) -> Callable[[], object]:
+        """The same function, of which the journal notes what it does in the middle of a command."""
+        journal = self.journal
+        if journal is None or not journal.keeps_calls:
+            return call
+        journal.functions.append(call)
+        return partial(journal.call, len(journal.functions) - 1)
+
+    @property
+    def keeps_calls(self) -> bool:
+        """The journal knows the methods of particles that were called."""
+        return self.journal is None or self.journal.keeps_calls
+
+    def _placed(self, make: Callable[[], Any]) -> Any:
+        """What `make` returns; the line of the script, if it takes another way there."""
         try:
-            return self.journal.look(make)
+            return make()
         except UsageError as error:
             frame: FrameType | None = sys._getframe(1)
             while frame is not None and frame.f_code.co_filename not in self.sources:
@@ -253,15 +311,17 @@ class Interpreter:
             "at": f"line {line}: {source.line(line)}",
         }  # fmt: skip
 
-    def _agree(self, index: int, told: str) -> None:
-        """Collective: all ranks are at this command with these values, or all raise ScriptError."""
-        comm = self.project.comm
+    def _agree(self, index: int, told: str) -> int:
+        """Collective: all ranks are at this command with these values, or all raise ScriptError. Returns what was asked
+        from outside a while ago (runtime.stopping), the same on all ranks."""
+        comm, stop = self.project.comm, self.project.blocks.stop
+        asked = stop.overdue_request() if stop is not None else 0
         if comm.size == 1:
-            return
+            return asked
         mark = (index << 32) | zlib.crc32(told.encode("utf-8", "backslashreplace"))
-        found = comm.max_into(np.array([mark, -mark], np.int64))
+        found = comm.max_into(np.array([mark, -mark, asked], np.int64))
         if found[0] == -found[1]:
-            return
+            return int(found[2])
         everyone = comm.allgather((index, told))
         statement = self.statements[min(i for i, _ in everyone)]
         other = next(rank for rank, one in enumerate(everyone) if one != everyone[0])
@@ -333,14 +393,8 @@ class Interpreter:
             print(*values, **{**how, "flush": True})
 
 
-def _in_a_command(error: BaseException) -> bool:
-    """Did it happen while a command was carried out, not in the Python of the script?"""
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code is Interpreter._carry_out.__code__:
-            return True
-        trace = trace.tb_next
-    return False
+def _checksum(told: tuple[Any, ...]) -> int:
+    return zlib.crc32(described(told).encode("utf-8", "backslashreplace"))
 
 
 def _way(places: list[tuple[str, int]]) -> str:

@@ -11,13 +11,15 @@ from __future__ import annotations
 import base64
 import json
 import math
+import os
 import zlib
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, HpcdemError, PhysicsError, ScriptError, UsageError
+from hpcdem.errors import CommandError, EquilibriumError, HpcdemError, PhysicsError, ScriptError, UsageError
 
 MOST = 64 << 20
 """Bytes of answers that are kept; of a script that looked at more no run can go on from a checkpoint."""
@@ -25,21 +27,29 @@ ENTRY = 32
 """Bytes that an entry counts for at least."""
 
 COMMAND, LOOK, NAMES, ERROR = "command", "look", "names", "error"
+ASK, ALONE, CALL, DONE = "ask", "alone", "call", "done"
 _ERRORS: dict[str, type[HpcdemError]] = {
-    kind.__name__: kind for kind in (HpcdemError, CommandError, PhysicsError, UsageError)
+    kind.__name__: kind for kind in (HpcdemError, CommandError, EquilibriumError, PhysicsError, UsageError)
 }
 
 
 class Journal:
-    """entries: [COMMAND, checksum], [LOOK, answer], [NAMES, variables and functions] of a restored file, [ERROR, kind,
-    file, line, message] of a command or look that failed, in order. lost: there was too much to keep, `when_lost` was
-    called. failure: the script took another way than before; it cannot get past this by catching the error."""
+    """entries, in order: [COMMAND, checksum]; [LOOK, answer]; [NAMES, variables and functions] of a restored file;
+    [ERROR, kind, file, line, message] of a command or look that failed; [ASK, checksum] of a method of particles, its
+    LOOK or ERROR follows, or [ALONE, answer] if it sees one rank only (None: there were several); [CALL, number] and
+    [DONE] around what a function did that was called in the middle of a command or method.
+
+    functions: those that are called so, by number. keeps_calls: ASK and what follows are kept, as they have not always
+    been. lost: there was too much to keep, `when_lost` was called. failure: the script took another way than before; it
+    cannot get past this by catching the error."""
 
     def __init__(self, when_lost: Callable[[], None] = lambda: None) -> None:
         self.entries: list[list[Any]] = []
         self.lost = False
         self.when_lost = when_lost
         self.failure: UsageError | None = None
+        self.functions: list[Callable[[], object]] = []
+        self.keeps_calls = True
         self._bytes = 0
         self._past: list[list[Any]] = []
         self._at = 0
@@ -75,15 +85,88 @@ class Journal:
         except HpcdemError as error:
             self.note_error(error)
             raise
-        self.note(LOOK, encoded(value))
+        if not self.lost:
+            self.note(LOOK, encoded(value))
         return value
+
+    def ask(self, checksum: int, make: Callable[[], Any], again: Callable[[], Any] | None, fails_again: bool) -> Any:
+        """The same for a method of particles, which may also change them, with these arguments. again: what is done in
+        its place on the way back, None: nothing, the answer is that of the first time. fails_again: what failed is not
+        tried again then, the error is."""
+        if not self.replays:
+            self.note(ASK, checksum)
+            return self.look(make)
+        self._meet_call(checksum)
+        if again is None:
+            self.call_again()
+            return self.look(make)
+        if fails_again:
+            self._fail_again()
+        try:
+            return again()
+        finally:
+            if self.replays and self._past[self._at][0] in (LOOK, ERROR):
+                self._next()
+
+    def ask_alone(self, checksum: int, make: Callable[[], Any], again: bool, alone: bool) -> Any:
+        """The same for what this rank sees, which is all there is if it is alone. again: ask it on the way back, too.
+        UsageError on the way back if there were several ranks the first time."""
+        if not self.replays:
+            value = make()
+            self.note(ASK, checksum)
+            self.note(ALONE, encoded(value) if alone and not self.lost else None)
+            return value
+        self._meet_call(checksum)
+        if self._past[self._at][0] != ALONE:
+            raise self._other_way(_NO_CALL)
+        answer = self._next()[1]
+        if again:
+            return make()
+        if answer is None:
+            raise UsageError("no answer")
+        return decoded(answer)
+
+    def _meet_call(self, checksum: int) -> None:
+        if self._past[self._at] != [ASK, checksum]:
+            raise self._other_way(_NO_CALL)
+        self._next()
+
+    # ---- functions that are called in the middle of a command ------------------------------------------------------
+
+    def call(self, number: int) -> object:
+        """Call a function, and note what it does."""
+        if self.replays:
+            if self._past[self._at] != [CALL, number]:
+                raise self._other_way("a function is called that was not called there before")
+            self._next()
+        else:
+            self.note(CALL, number)
+        value = self.functions[number]()
+        if not self.replays:
+            self.note(DONE)
+        elif self._next()[0] != DONE:
+            raise self._other_way("a function that is called at some steps does less than before")
+        return value
+
+    def call_again(self) -> None:
+        """Call the functions that were called in the command or method that is being passed over."""
+        while self.replays and self._past[self._at][0] == CALL:
+            number = self._past[self._at][1]
+            if number >= len(self.functions):
+                raise self._other_way("a function is not there that was called here before")
+            self.call(number)
 
     # ---- bringing it back ----------------------------------------------------------------------------------------
 
     def replay(self, entries: list[list[Any]]) -> None:
-        """Answer with these entries from now on, until they are used up. The last one is the command in which the
-        checkpoint was written."""
-        if not entries or entries[-1][0] != COMMAND:
+        """Answer with these entries from now on, until they are used up. The last one, and calls of functions in it, is
+        the command in which the checkpoint was written."""
+        inside = 0
+        last = len(entries) - 1
+        while last >= 0 and (inside or entries[last][0] == DONE):
+            inside += {DONE: 1, CALL: -1}.get(entries[last][0], 0)
+            last -= 1
+        if last < 0 or entries[last][0] != COMMAND:
             raise UsageError("the checkpoint is damaged: its journal does not end with a command")
         self._past, self._at = entries, 0
 
@@ -96,10 +179,12 @@ class Journal:
 
     def meet(self, checksum: int) -> bool:
         """The script comes to a command that it came to before. True if it is the one to go on with, False if it is to
-        be passed over. UsageError if it is another one; the error that it met is raised again."""
+        be passed over; functions that were called in it are called. UsageError if it is another one; the error that it
+        met is raised again."""
         if self._past[self._at] != [COMMAND, checksum]:
             raise self._other_way("this line is not what was carried out there before, or its values are others")
         self._next()
+        self.call_again()
         if not self.replays:
             return True
         self._fail_again()
@@ -126,6 +211,26 @@ class Journal:
             "write). Begin anew, or go on with a script of your own that begins with pcdc model restore"
         )
         return self.failure
+
+
+_NO_CALL = "this call is not what was done there before, or its values are others"
+
+
+def described(value: Any) -> str:
+    """An argument of a method as text that is the same in each run: for its checksum."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype.str}{value.shape}{zlib.crc32(np.ascontiguousarray(value).tobytes())}"
+    if isinstance(value, dict):
+        return "{" + ",".join(f"{name}:{described(value[name])}" for name in sorted(value, key=str)) + "}"
+    if isinstance(value, (tuple, list)):
+        return "(" + ",".join(map(described, value)) + ")"
+    if isinstance(value, os.PathLike):
+        return repr(os.fspath(value))
+    if value is None or isinstance(value, (str, int, float)) or is_dataclass(value):
+        return repr(value)
+    return str(getattr(value, "__qualname__", type(value).__qualname__))
 
 
 def encoded(value: Any) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
@@ -40,6 +40,13 @@ class Kind:
     """``table 'name'`` may stand for it."""
     words: tuple[str, ...] = ()
     """Words that are values."""
+    varied: bool = False
+    """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
+
+
+def varied(kind: Kind) -> Kind:
+    """The same for a property of elements, faces or joints."""
+    return replace(kind, pattern=f"{kind.pattern}|table <s> over x|y|field <s>", varied=True)
 
 
 class Unfit(ValueError):
@@ -122,13 +129,16 @@ def _listed(check: Callable[[Any], Any]) -> Callable[[Any], list]:
 
 FLOAT = Kind("<f>", "a number", number())
 POSITIVE = Kind("<f>", "a number above 0", number(0.0, above=True))
+PART = Kind("<f>", "a number above 0, at most 1", number(0.0, 1.0, above=True))
 NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
 POISSON = Kind("<f>", "a number above -1 and below 0.5", number(-1.0 + 1e-12, 0.5 - 1e-12))
 ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 1e-9))
 TABLED = Kind("<f>|table <s>", "a number or table 'name'", number(), tabled=True)
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
-INTEGER = Kind("<i>", "a whole number", whole())
+POINTS = Kind("3", "3, the points of a joint in two dimensions,", whole(3, 3))
+FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2))
+DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
 LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
 STRING = Kind("<s>", "a text in quotes", _string)
 FILE = Kind("<s>", "the name of a file in quotes", _file)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from hpcdem.errors import ScriptError
-from hpcdem.lang.pcdc import kinds, lexer, rules
+from hpcdem.lang.pcdc import kinds, lexer, rules, trial
 from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.lexer import Escape, Token, Word
-from hpcdem.lang.pcdc.statement import Statement, shown
+from hpcdem.lang.pcdc.statement import Pending, Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
+from hpcdem.model.blocks.tables import Drawn, Over
 
 
 def parse(words: str, file: str, line: int, text: str, table: Table, last_line: int = 0) -> Statement:
@@ -113,6 +114,7 @@ class _Line:
             if command.needs_option and not any(option.name in arguments for option in options):
                 raise ValueError(f"'{self.context}' needs at least one of {_joined(o.name for o in options)}")
             rules.check(command, arguments, terms)
+        trial.check(command, arguments, terms)
         return Statement(file, line, command, arguments, terms, text, tuple(self.expressions.codes), last_line)
 
     def command(self) -> Command:
@@ -236,12 +238,24 @@ class _Line:
                 raise ValueError(f"read {token}, expected {kind.meaning} for {what}")
             return found
         token = self.next(f"{kind.meaning} for {what}")
+        if kind.varied and isinstance(token, Word) and matching(token.text, [_TABLE, _FIELD]):
+            return self._varied(token)
         if kind.tabled and isinstance(token, Word) and matching(token.text, [_TABLE]):
             name = kinds.read_value(
                 kinds.STRING, self.next("the name of a table in quotes"), "'table'", self.expressions
             )
-            return _table_name(name)
+            return _later(kinds.TableName, name)
         return kinds.read_value(kind, token, what, self.expressions)
+
+    def _varied(self, token: Word) -> Any:
+        """What follows ``table`` or ``field`` in the place of a property."""
+        if matching(token.text, [_FIELD]):
+            return _later(Drawn, self.one(kinds.STRING, _FIELD))
+        name = self.one(kinds.STRING, _TABLE)
+        if self.take([_OVER]) is None:
+            word = self.next("'over x' or 'over y'")
+            raise ValueError(f"read {word}, expected 'over x' or 'over y' after the name of the table")
+        return _later(lambda name, axis: Over(name, "xy".index(axis)), name, self.one(_AXIS, _OVER))
 
     def _value_follows(self, ahead: int = 0) -> bool:
         at = self.at + ahead
@@ -265,15 +279,15 @@ class _Line:
         return tuple(terms)
 
 
-_TABLE = Option("tab{le}", ())
+_TABLE, _FIELD, _OVER = Option("tab{le}", ()), Option("field", ()), Option("over", ())
+_AXIS = kinds.choice("x", "y")
 
 
-def _table_name(name: Any) -> Any:
-    from hpcdem.lang.pcdc.statement import Pending
-
-    if isinstance(name, Pending):
-        return Pending(lambda values: kinds.TableName(name.make(values)))
-    return kinds.TableName(name)
+def _later(make: Callable[..., Any], *given: Any) -> Any:
+    """make(*given), when all is known of them."""
+    if not any(isinstance(value, Pending) for value in given):
+        return make(*given)
+    return Pending(lambda values: make(*(resolved(value, values) for value in given)))
 
 
 def _joined(names: Any) -> str:

@@ -30,8 +30,10 @@ This page is made from the table in `hpcdem/lang/pcdc/table.py`; do not edit it
   function of time.
 - Units: any consistent set; those in the tables are SI. Numbers of objects begin at 0, as in the output. Tension is
   positive.
-- File names are relative to the folder of the script; frames and histories go to the folder of the results (`data`
-  beside the script, or `--outdir`).
+- Files that are read, and those of `model save`, are named relative to the folder of the script. All else goes to the
+  folder of the results (`data` beside the script, or `--outdir`): frames, histories, what `history export` and `chart
+  export` write. Nothing is written over the script, nor over a file that the run has read and not made itself.
+- A script is a program: it runs with your rights and can do to your files what you can. Run those that you trust.
 - A run that was stopped, by `--time-limit` or a signal, goes on with `--resume` where it was, also in a loop or a
   function ([how](running.md#stopping-and-going-on)); there is a checkpoint every half hour (`--autosave`).
 - The Python of a script runs on every rank; commands are carried out by all ranks together, which must come to the same
@@ -40,7 +42,7 @@ This page is made from the table in `hpcdem/lang/pcdc/table.py`; do not edit it
 
 ## Python
 
-`pcdc` is also an object: `pcdc.time`, `pcdc.cycle`, `pcdc.ratio`, `pcdc.energies`, `pcdc.rank`;
+`pcdc` is also an object: `pcdc.time`, `pcdc.cycle`, `pcdc.ratio`, `pcdc.energies`, `pcdc.solved`, `pcdc.rank`;
 `pcdc.node(7).displacement.X`, `pcdc.element(3).stress_yy`, `pcdc.joint(12).opening`;
 `pcdc.numbers('element', group='rock', set='domain')`, `pcdc.values('node', 'velocity-x', geometry='rim')`,
 `pcdc.total('node', 'reaction-y', group='top', set='bc')`, `pcdc.history('load')` (rows of step, time, value). Every
@@ -58,6 +60,13 @@ _RANGE = """\
 
 Stands last on the line and limits a command to some objects; without it the command acts on all. All terms must hold.
 A range that chooses nothing is an error.
+
+It chooses among what is there: elements that were not taken out, nodes and faces of these, joints between two of
+them. Two kinds of commands reach what was taken out too: `group`, and `element c-model`, which brings elements back.
+
+`x`, `y` and `geometry` go by the places in the mesh, wherever things have moved since: a line of a script means the
+same objects before and after a stage of loading. With `present` they go by where things are at that moment: the
+centre of an element, a node, both ends of a face or joint.
 """
 
 

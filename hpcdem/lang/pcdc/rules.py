@@ -1,4 +1,5 @@
-"""Rules that tie several words of a line together."""
+"""Rules that tie several words of a line together. They are asked when a line is read, where nothing is said of values
+that are expressions (`Pending`), and once more when these are known."""
 
 from __future__ import annotations
 
@@ -18,21 +19,24 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
 
 def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     kind, value = arguments["object"], arguments["value"]
-    if isinstance(kind, Pending) or isinstance(value, Pending):
-        raise ValueError("the object and the value of a history are words, not expressions")
-    if value not in RECORDED[kind]:
-        raise ValueError(f"a history of {kind} can follow {', '.join(RECORDED[kind])}, not {value}")
     given = [word for word in ("id", "nearest") if word in arguments] + (["range"] if terms is not None else [])
-    if kind == "model" and given:
-        raise ValueError(f"a history of the model takes no {given[0]}")
-    if kind != "model" and len(given) != 1:
-        several = f", not {' and '.join(given)}" if given else ""
-        raise ValueError(f"a history of {kind} needs one of id, nearest and range{several}")
+    if len(given) > 1:
+        raise ValueError(f"a history needs one of id, nearest and range, not {' and '.join(given)}")
     how = [word for word in ("sum", "mean", "minimum", "maximum") if word in arguments]
-    if len(how) > 1 or (how and terms is None):
-        raise ValueError(f"{how[-1]} goes with range, and only one of sum, mean, minimum and maximum")
+    if len(how) > 1 or (how and given not in ([], ["range"])):
+        raise ValueError(f"{how[-1]} goes with range or stands for all, and only one of sum, mean, minimum and maximum")
     if terms is not None and not how:
         raise ValueError("a history of several objects needs sum, mean, minimum or maximum")
+    if isinstance(kind, Pending):
+        return
+    if not isinstance(value, Pending) and value not in RECORDED[kind]:
+        raise ValueError(f"a history of {kind} can follow {', '.join(RECORDED[kind])}, not {value}")
+    if kind == "model" and (given or how):
+        raise ValueError(f"a history of the model takes no {(given or how)[0]}")
+    if kind != "model" and not (given or how):
+        raise ValueError(
+            f"a history of {kind} needs one of id, nearest and range, or it is sum, mean, minimum or maximum of all"
+        )
 
 
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -48,13 +52,23 @@ def _dimensions(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] |
 
 
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if arguments.get("auto") is True and "value" in arguments:
-        raise ValueError("value and auto on exclude each other")
+    ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
+    said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
+    if len(said) > 1:
+        raise ValueError(f"{said[0]} and {said[1]} exclude each other: both say what the time step is")
+    if said == ["value"] and "safety" in arguments:
+        raise ValueError("value and safety exclude each other: a time step that is given is taken as it is")
 
 
 def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "elastic" in arguments and "time" in arguments:
         raise ValueError("elastic and time exclude each other: equilibrium is found at once")
+    watched = [word for word in ("window", "limit", "on-failure") if word in arguments]
+    by_ratio = "ratio" in arguments or not ({"cycles", "time"} & set(arguments))
+    if watched and ("elastic" in arguments or not by_ratio):
+        raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
+    if "limit" in watched and "cycles" in arguments:
+        raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
     if "solver" in arguments and "elastic" not in arguments:
         raise ValueError("solver goes with elastic; steps need none")
 
@@ -64,7 +78,16 @@ def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
         raise ValueError("every and off exclude each other")
 
 
+def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    given = [name for name in ("weibull", "normal", "lognormal") if name in arguments]
+    if len(given) != 1:
+        raise ValueError(
+            f"a field has one distribution, weibull, normal or lognormal, not {' and '.join(given) or 'none'}"
+        )
+
+
 _RULES = {
+    "field create": _field,
     "model new": _dimensions,
     "model time-step": _time_step,
     "model solve": _solve,

@@ -8,8 +8,10 @@ stand, in loops and functions as anywhere else. Lines keep their numbers.
 from __future__ import annotations
 
 import ast
+import bisect
 import re
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from hpcdem.errors import ScriptError
@@ -187,10 +189,29 @@ def _check_python(source: Source) -> None:
             line = min(error.lineno or 1, len(source.lines))
             text = source.line(line)
             raise ScriptError(source.file, line, f"{shown(text)}: {_python_error(error, text)}") from None
-        except (ValueError, RecursionError, MemoryError) as error:
-            raise ScriptError(
-                source.file, 1, f"this cannot be read as Python: {error or type(error).__name__}"
-            ) from None
+        except (RecursionError, MemoryError):
+            raise too_deep(source) from None
+        except ValueError as error:
+            raise ScriptError(source.file, 1, f"this cannot be read as Python: {error}") from None
+
+
+def too_deep(source: Source, reads: Callable[[str], object] = ast.parse) -> ScriptError:
+    """The error for Python that is nested too deeply for `reads`, with the first line at which it is: Python itself
+    does not tell."""
+
+    def fails(count: int) -> bool:
+        try:
+            reads("\n".join(source.python.split("\n")[:count]) + "\n")
+        except (RecursionError, MemoryError):
+            return True
+        except (SyntaxError, ValueError):
+            pass
+        return False
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        line = bisect.bisect_left(range(len(source.lines)), True, 1, key=fails)
+    return ScriptError(source.file, line, f"{shown(source.line(line).strip())}: this is nested too deeply for Python")
 
 
 def _python_error(error: SyntaxError, text: str) -> str:

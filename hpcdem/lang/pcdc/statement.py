@@ -42,10 +42,14 @@ class Statement:
 
     def resolve(self, values: tuple[Any, ...]) -> tuple[dict[str, Any], tuple[tuple[str, Any], ...] | None]:
         """Arguments and range with the values of the expressions put in. ScriptError if one of them is of the wrong
-        kind."""
+        kind, or if they do not go together."""
+        from hpcdem.lang.pcdc import rules
+
         try:
             arguments = {name: resolved(value, values) for name, value in self.arguments.items()}
             terms = None if self.range is None else tuple((name, resolved(v, values)) for name, v in self.range)
+            if self.expressions:
+                rules.check(self.command, arguments, terms)
         except ValueError as error:
             raise self.error(str(error)) from None
         return arguments, terms

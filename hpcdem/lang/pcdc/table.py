@@ -20,12 +20,15 @@ from hpcdem.lang.pcdc.kinds import (
     ANGLE,
     BOOL,
     COUNT,
+    DIMENSIONS,
     FILE,
     FLOAT,
-    INTEGER,
+    FREEDOM,
     LAST_ID,
     NOT_NEGATIVE,
     OPTIONAL_VECTOR,
+    PART,
+    POINTS,
     POISSON,
     POSITIVE,
     STRING,
@@ -36,6 +39,7 @@ from hpcdem.lang.pcdc.kinds import (
     ZERO_OR_MORE,
     Kind,
     choice,
+    varied,
 )  # fmt: skip
 
 THREE_D = "this version computes in two dimensions"
@@ -154,16 +158,20 @@ SET = Option("set", (STRING,), "the set of the group", default="'default'")
 
 # ---- models of solids (tables 1 to 3, 12) --------------------------------------------------------------------------
 
-_DENSITY = Option("den{sity}", (POSITIVE,), "density", "kg/m3", required=True)
-_YOUNG = Option("y{oung}", (POSITIVE,), "Young's modulus E", "Pa")
-_POISSON = Option("p{oisson}-r{atio}", (POISSON,), "Poisson's ratio", "1")
-_SHEAR = Option("s{hear}", (POSITIVE,), "shear modulus, with bulk in the place of young and poisson-ratio", "Pa")
-_BULK = Option("b{ulk}", (POSITIVE,), "bulk modulus, with shear in the place of young and poisson-ratio", "Pa")
-_DAMP = Option("d{amp}-f{actor}", (NOT_NEGATIVE,), "viscous damping, part of the critical; without effect in static "
-               "runs", "1", "0")  # fmt: skip
-_FRICTION = Option("fri{ction}", (ANGLE,), "friction of its surfaces where they have no contact model", "degrees", "0")
-_PENALTY = Option("pen{alty}", (POSITIVE,), "contact penalty of its surfaces where they have no contact model", "Pa",
-                  "10 E")  # fmt: skip
+_DENSITY = Option("den{sity}", (varied(POSITIVE),), "density", "kg/m3", required=True)
+_YOUNG = Option("y{oung}", (varied(POSITIVE),), "Young's modulus E", "Pa")
+_POISSON = Option("p{oisson}-r{atio}", (varied(POISSON),), "Poisson's ratio", "1")
+_SHEAR = Option(
+    "s{hear}", (varied(POSITIVE),), "shear modulus, with bulk in the place of young and poisson-ratio", "Pa"
+)
+_BULK = Option("b{ulk}", (varied(POSITIVE),), "bulk modulus, with shear in the place of young and poisson-ratio", "Pa")
+_DAMP = Option("d{amp}-f{actor}", (varied(NOT_NEGATIVE),), "viscous damping, part of the critical; without effect in "
+               "static runs", "1", "0")  # fmt: skip
+_FRICTION = Option(
+    "fri{ction}", (varied(ANGLE),), "friction of its surfaces where they have no contact model", "degrees", "0"
+)
+_PENALTY = Option("pen{alty}", (varied(POSITIVE),), "contact penalty of its surfaces where they have no contact model",
+                  "Pa", "10 E")  # fmt: skip
 _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
 
 ISO_ELASTIC = Model(
@@ -171,7 +179,9 @@ ISO_ELASTIC = Model(
     (_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP, _FRICTION, _PENALTY), one_of=_PAIRS,
 )  # fmt: skip
 NULL = Model(
-    "null", "", "The elements are taken out: excavated. Faces beside them become free.",
+    "null", "", "The elements are taken out: excavated. Faces beside them become free. Another model in a range that "
+    "names them brings them back, as new material where the void is then, free of stress; they hang together with what "
+    "lies around them, without joints, until face-joint c-model gives them some.",
     (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
             "s", "at once"),),
 )  # fmt: skip
@@ -225,7 +235,7 @@ FORCE = Model(
 )  # fmt: skip
 MOVE = Model(
     "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7", "Freedom of nodes.",
-    (Option("t{ype}", (INTEGER, OPTIONAL_VECTOR),
+    (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
             "0 free, 1 held, 2 moves along the vector only (type 0 and 1 take a vector and do not use it)",
             required=True),),
 )  # fmt: skip
@@ -261,25 +271,27 @@ CONST_HEAT = Model(
 CONTACT = Model(
     "c{ontact}-m{ohr}-c{oulomb}", "8",
     "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
-    (Option("f{riction}", (ANGLE,), "friction angle", "degrees", "0"),
-     Option("p{enalty}-n{ormal}", (POSITIVE,), "normal penalty; 10 to 100 E is usual", "Pa", "10 E"),
-     Option("p{enalty}-s{hear}", (POSITIVE,), "shear penalty", "Pa", "10 E"),
-     Option("d{amping}-t", (POSITIVE,), "stress from which contacts lose energy", "Pa", "never"),
-     Option("d{amping}-b", (POSITIVE,), "exponent of that loss", "1", "1")),
+    (Option("f{riction}", (varied(ANGLE),), "friction angle", "degrees", "0"),
+     Option("p{enalty}-n{ormal}", (varied(POSITIVE),), "normal penalty; 10 to 100 E is usual", "Pa", "10 E"),
+     Option("p{enalty}-s{hear}", (varied(POSITIVE),), "shear penalty", "Pa", "10 E"),
+     Option("d{amping}-t", (varied(POSITIVE),), "stress from which contacts lose energy", "Pa", "never"),
+     Option("d{amping}-b", (varied(POSITIVE),), "exponent of that loss", "1", "1"),
+     Option("d{amping}-r{atio}", (varied(NOT_NEGATIVE),), "normal dashpot, part of the critical damping of two "
+            "elements; the larger of two surfaces counts; without effect in static runs", "1", "0")),
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
     "Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then on.",
-    (Option("f{riction}", (ANGLE,), "friction angle", "degrees", "0"),
-     Option("c{ohesion}", (NOT_NEGATIVE,), "cohesion", "Pa", required=True),
-     Option("t{ensile}-s{trength}", (NOT_NEGATIVE,), "tensile strength", "Pa", required=True),
-     Option("gf1", (NOT_NEGATIVE,), "fracture energy, mode I", "N/m", required=True),
-     Option("gf2", (NOT_NEGATIVE,), "fracture energy, mode II", "N/m", required=True),
-     Option("p{enalty}-o{verlay}", (POSITIVE,), "penalty of a closed joint", "Pa", "10 E",
+    (Option("f{riction}", (varied(ANGLE),), "friction angle", "degrees", "0"),
+     Option("c{ohesion}", (varied(NOT_NEGATIVE),), "cohesion", "Pa", required=True),
+     Option("t{ensile}-s{trength}", (varied(NOT_NEGATIVE),), "tensile strength", "Pa", required=True),
+     Option("gf1", (varied(NOT_NEGATIVE),), "fracture energy, mode I", "N/m", required=True),
+     Option("gf2", (varied(NOT_NEGATIVE),), "fracture energy, mode II", "N/m", required=True),
+     Option("p{enalty}-o{verlay}", (varied(POSITIVE),), "penalty of a closed joint", "Pa", "10 E",
             also=("p{enalty}-o{verlap}",)),
-     Option("p{enalty}-n{ormal}", (POSITIVE,), "penalty of opening", "Pa", "10 E"),
-     Option("p{enalty}-s{hear}", (POSITIVE,), "penalty of shear", "Pa", "10 E"),
-     Option("np", (COUNT,), "integration points: 3 in two dimensions", "1", "3")),
+     Option("p{enalty}-n{ormal}", (varied(POSITIVE),), "penalty of opening", "Pa", "10 E"),
+     Option("p{enalty}-s{hear}", (varied(POSITIVE),), "penalty of shear", "Pa", "10 E"),
+     Option("np", (POINTS,), "integration points", "1", "3")),
 )  # fmt: skip
 _POROUS = (
     Option("f{luid}-den{sity}", (POSITIVE,), "", "kg/m3"), Option("f{luid}-b{ulk}", (POSITIVE,), "", "Pa"),
@@ -313,10 +325,12 @@ RANGE_TERMS = (
     Option("group", (STRING,), "members of the group", more=(SET,)),
     Option("set", (STRING,), "members of any group of the set"),
     Option("id", (ZERO_OR_MORE, LAST_ID), "the number, or from first to last; numbers begin at 0, as in the output"),
-    Option("x", (FLOAT, FLOAT), "x from ... to ..., at the present positions", "m"),
-    Option("y", (FLOAT, FLOAT), "y from ... to ...", "m"),
+    Option("x", (FLOAT, FLOAT), "x from ... to ..., in the mesh", "m"),
+    Option("y", (FLOAT, FLOAT), "y from ... to ..., in the mesh", "m"),
     Option("z", (FLOAT, FLOAT), "", later=THREE_D),
-    Option("geom{etry}", (STRING,), "lies on the lines of the geometry layer; elements: their centre is inside of it"),
+    Option("geom{etry}", (STRING,), "lies on the lines of the geometry layer; elements: their centre is inside of it; "
+           "in the mesh"),
+    Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in it",
            more=(SET,), only=_FACES),
@@ -374,7 +388,7 @@ def _properties(model: Model) -> tuple[Option, ...]:
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 2"),
-            options=(Option("dim", (COUNT,), "dimensions of space: 2", "", "2"),), manual=True),
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space: 2", "", "2"),), manual=True),
     Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
             "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
             (_leading("file", FILE, "name of the file, beside the script"),), manual=True),
@@ -387,6 +401,9 @@ _MODEL = (
             options=(
                 Option("dyn{amic}", (BOOL,), "true motion in time; off: static, towards equilibrium", default="on"),
                 Option("col{lision}", (BOOL,), "contact of surfaces", default="on"),
+                Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
+                       "step: refuse it, with the places; let a static stage move them apart; or start as they are",
+                       default="refuse"),
                 Option("mech{anical}", (BOOL,), "", later="motion and stress are always computed in this version"),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
@@ -394,27 +411,42 @@ _MODEL = (
                 Option("hyd{raulic}", (BOOL,), "", later=FLOW), Option("therm{al}", (BOOL,), "", later=HEAT),
                 Option("prop{pant}", (BOOL,), "", later=PROPPANT), Option("one-way", (BOOL,), "", later=FLOW)),
             needs_option=True, manual=True),
-    Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time.",
-            ("pcdc model time-step auto off", "pcdc model time-step value 1e-7"),
+    Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
+            "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
+            "and auto on the one said last holds and ends the others.",
+            ("pcdc model time-step auto off", "pcdc model time-step value 1e-7", "pcdc model time-step value 0"),
             options=(
-                Option("value", (POSITIVE,), "the time step itself", "s"),
-                Option("auto", (BOOL,), "on: follow the largest stable one during the run; off: keep that of the "
-                       "first step", default="off"),
-                Option("safe{ty}", (POSITIVE,), "part of the stable time step that is taken", "1", "0.8"),
-                Option("mass-s{caling}", (POSITIVE,), "nodes get as much mass as this time step needs", "s"),
+                Option("value", (NOT_NEGATIVE,), "the time step itself; 0: estimated again", "s"),
+                Option("auto", (BOOL,), "on: estimated again every 100 steps; off: at the first step and after changes "
+                       "of the model only; a value stays", default="off"),
+                Option("safe{ty}", (PART,), "part of the stability limit that is taken, by estimates and mass-scaling",
+                       "1", "0.8"),
+                Option("mass-s{caling}", (NOT_NEGATIVE,), "nodes get as much mass as this time step needs; 0: none, "
+                       "and the step is estimated again", "s"),
                 Option("hyd{raulic}", (POSITIVE,), "", later=FLOW), Option("therm{al}", (POSITIVE,), "", later=HEAT)),
             needs_option=True, manual=True),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
             "stop at ratio 1e-5. With elastic: straight to static equilibrium by linear equations, for elastic blocks "
-            "whose joints stay before their peak and whose surfaces do not touch.",
-            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic"),
+            "whose joints stay before their peak and whose surfaces do not touch. A run towards a ratio that gets "
+            "nowhere (window, limit) ends the script with exit code 3 and names the body that slides away; "
+            "`pcdc.solved['reason']` says how a run ended.",
+            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic",
+             "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
                      Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
                      Option("time", (POSITIVE,), "time that passes", "s"),
+                     Option("win{dow}", (ZERO_OR_MORE,), "towards a ratio: it has failed when the least ratio has not "
+                            "fallen by a tenth in so many steps, nor in as many as the progress so far took; 0: "
+                            "never", default="static runs: ten times as many as a wave takes there and back, at least "
+                            "20 000; dynamic ones, and beside cycles or time: 0"),
+                     Option("lim{it}", (ZERO_OR_MORE,), "towards a ratio: it has failed after so many steps; 0: never",
+                            default="static runs 1 000 000, dynamic ones 10 000 000; beside time: 0"),
+                     Option("on-f{ailure}", (choice("stop", "continue"),), "stop: with exit code 3; continue: with a "
+                            "warning, the script looks at pcdc.solved", default="stop"),
                      Option("ela{stic}", (), "at once, without steps"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic: SciPy on one rank, the same "
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
@@ -532,6 +564,13 @@ _MESH = (
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh", required=True),
                      Option("follow", (), "they are not: the edges that follow them best are taken"))),
+    Command("mesh glue", "Bodies that were meshed separately hang together where their faces coincide: these become "
+            "joints, as between the elements of a body. Faces that lie on each other only in part are refused.",
+            ("pcdc mesh glue", "pcdc mesh glue tolerance 1e-4 between 'lining' 'rock' set 'domain'"),
+            options=(Option("tol{erance}", (POSITIVE,), "ends of faces nearer than this are one", "m",
+                            "a thousandth of the shortest edge"),
+                     Option("betw{een}", (STRING, STRING), "only faces between the elements of these two groups",
+                            more=(SET,)))),
     Command("mesh qual{ity}", "Says how good the mesh is: angles, sizes.", ("pcdc mesh quality",)),
 )  # fmt: skip
 
@@ -542,17 +581,21 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'"),
             models=(ISO_ELASTIC, NULL, MOHR_COULOMB, BURGERS, ISO_HEAT), ranged="element", manual=True),
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
-            ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",), options=_properties(ISO_ELASTIC),
+            ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
+             "pcdc element property young table 'E_of_depth' over y density field 'density'"),
+            options=_properties(ISO_ELASTIC),
             ranged="element", needs_option=True),
     Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
-            "not given are zero.",
+            "not given are zero. It is that of a strain, by the moduli of this moment: where these are lowered later, "
+            "it goes down with them.",
             ("pcdc element initial stress-xx -5e6 stress-yy -10e6",
              "pcdc element initial stress-yy 0 gradient (0,25e3)"),
             options=tuple(
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa",
                        more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
                 for c in ("xx", "yy", "xy", "zz")), ranged="element", needs_option=True),
-    Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none.",
+    Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
+            "log says that nothing was changed.",
             ("pcdc element reset state",), ranged="element", manual=True),
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
@@ -571,7 +614,9 @@ _OBJECTS = (
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",),
             models=(COHESIVE, *_LATER_JOINT), ranged="face-joint"),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
-            ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",), options=_properties(COHESIVE),
+            ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
+             "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'"),
+            options=_properties(COHESIVE),
             ranged="face-joint", needs_option=True),
     Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint"),
@@ -595,22 +640,44 @@ _OBJECTS = (
 )  # fmt: skip
 
 _RECORDS = (
-    Command("tab{le} cr{eate}", "A function of time, linear from point to point, constant before and after.",
+    Command("tab{le} cr{eate}", "A function of time, or for properties of x or y; linear from point to point, constant "
+            "before and after.",
             ("pcdc table create 'blast' values (0,0) (5e-5,-60e6) (2e-4,0)",
-             "pcdc table create 'blast' values [points]"),
-            (_NAME,), (Option("val{ues}", (VECTORS,), "(time, value), times ascending", "s", required=True),)),
+             "pcdc table create 'blast' values [points]",
+             "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)"),
+            (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
+                              required=True),)),
     Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,)),
-    Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range (sum, mean, "
-            "minimum or maximum), or of the model.",
+    Command("field cr{eate}", "A random field: properties that differ from element to element, face to face, joint to "
+            "joint. Where several properties take the same field they are drawn together; another seed is another, "
+            "independent field. What was drawn stays, whatever becomes of the field.",
+            ("pcdc field create 'strength' weibull 5e6 4 seed 7",
+             "pcdc field create 'E' lognormal 40e9 8e9 seed 3 correlation 0.02 least 10e9"),
+            (_NAME,),
+            (Option("wei{bull}", (POSITIVE, POSITIVE), "scale (63 % of the values are below it) and shape"),
+             Option("norm{al}", (FLOAT, NOT_NEGATIVE), "mean and standard deviation"),
+             Option("logn{ormal}", (POSITIVE, NOT_NEGATIVE), "mean and standard deviation of the values themselves"),
+             Option("seed", (ZERO_OR_MORE,), "another seed, another field", required=True),
+             Option("corr{elation}", (POSITIVE,), "over this length neighbours are alike: the field is one of places, "
+                    "the same in any mesh", "m", "each object by itself",
+                    more=(Option("cov{ariance}", (choice("exponential", "gaussian"),), "exp(-r/L), or exp(-(r/L)2), "
+                                 "which is smooth", "", "exponential"),)),
+             Option("least", (FLOAT,), "the distribution is cut below", "", "none"),
+             Option("great{est}", (FLOAT,), "the distribution is cut above", "", "none"))),
+    Command("field del{ete}", "Forgets a random field; what was drawn from it stays.",
+            ("pcdc field delete 'strength'",), (_NAME,)),
+    Command("his{tory} cr{eate}", "Records a number during the run: of one object, of those of a range or, without "
+            "one, of all (sum, mean, minimum or maximum), or of the model.",
             ("pcdc history create 'load' node value reaction-y sum every 100 range group 'platen' set 'bc'",
              "pcdc history create 'gauge' element nearest (5,0) value stress-yy",
+             "pcdc history create 'worst' element value stress-yy minimum every 10",
              "pcdc history create 'cracks' model value broken-joints every 100"),
             (_NAME, _leading("object", choice(*RECORDED), "what it is a number of")),
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
-             Option("sum", (), "of the objects of range"), Option("mean", (), "of the objects of range"),
-             Option("min{imum}", (), "of the objects of range"), Option("max{imum}", (), "of the objects of range")),
+             *(Option(how, (), "of the objects of range, or of all")
+               for how in ("sum", "mean", "min{imum}", "max{imum}"))),
             ranged="any"),
     Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,)),
     Command("his{tory} exp{ort}", "Writes all histories, or some, side by side as CSV.",

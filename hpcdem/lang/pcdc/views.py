@@ -35,6 +35,12 @@ class Model:
         return self._look(lambda: int(self._project.blocks.clock.step))
 
     @property
+    def solved(self) -> dict[str, Any]:
+        """How the last `model solve` ended: "reason" (ratio, cycles, time; without equilibrium: no progress, limit,
+        runaway), "ratio" at the end (NaN if nobody looked), "steps" it took. Empty before the first."""
+        return self._look(lambda: dict(self._project.solved))
+
+    @property
     def rank(self) -> int:
         """This rank, from 0."""
         return int(self._project.comm.rank)
@@ -63,7 +69,8 @@ class Model:
         return View(self, "joint", number)
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
-        """Numbers of the elements, nodes, joints or faces of a group (group=, set=) or layer (geometry=)."""
+        """Numbers of the elements, nodes, joints or faces that are there: of a group (group=, set=), of a layer
+        (geometry=), or x=(from, to), y= in the mesh; with present=True by where they are now."""
         return self._look(lambda: self._verbs.looking.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
@@ -117,6 +124,8 @@ def _name(name: str) -> str:
 def _range(where: dict[str, Any]) -> g.Range | None:
     terms: list[g.Term] = []
     set_name = where.pop("set", None)
+    if where.pop("present", False):
+        terms.append(g.Present())
     for word, value in where.items():
         if word == "group":
             terms.append(g.InGroup(value, set_name or g.DEFAULT))
@@ -127,7 +136,7 @@ def _range(where: dict[str, Any]) -> g.Range | None:
         elif word in ("x", "y"):
             terms.append(g.Span("xy".index(word), float(value[0]), float(value[1])))
         else:
-            raise CommandError(f"'{word}' is none of group, set, geometry, id, x and y")
+            raise CommandError(f"'{word}' is none of group, set, geometry, id, x, y and present")
     if set_name is not None and "group" not in where:
         terms.append(g.InSet(set_name))
     return tuple(terms) or None

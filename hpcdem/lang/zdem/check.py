@@ -14,14 +14,15 @@ from typing import Any
 from hpcdem.errors import HpcdemError, ScriptError
 from hpcdem.lang.zdem import plan
 from hpcdem.lang.zdem.estimate import estimate, kind_of
-from hpcdem.lang.zdem.execute import find, refuse_lost_files
+from hpcdem.lang.zdem.execute import refuse_lost_files
 from hpcdem.lang.zdem.parser import Script
 from hpcdem.lang.zdem.plan import Run
-from hpcdem.lang.zdem.statement import Statement
+from hpcdem.lang.zdem.rules import recorded
+from hpcdem.lang.zdem.statement import Statement, find
 from hpcdem.runtime import launch, speed
 from hpcdem.runtime.progress import rate
 
-BYTES_PER_PARTICLE: Mapping[str, int] = {"print": 2300, "ps": 40, "vtk": 190, "save": 260}
+BYTES_PER_PARTICLE: Mapping[str, int] = {"print": 2900, "ps": 40, "vtk": 190, "save": 260}
 """Size of one output per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
 "print" is the .dat and the .vtkhdf together."""
 
@@ -141,13 +142,14 @@ def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | 
         found.append((f"{data}/all_<last step>.jpg", "picture of the last frame"))
     for s in statements:
         if s.command == "HIST":
-            names = {"kinetic": "kinetic energy", "step": "step", "energy": "kinetic and elastic energy"}
-            what = next(what for name, what in names.items() if name in s.arguments)
-            found.append((f"{data}/hist_{s.get('id')}.dat", f"line {s.line}: {what}"))
+            for name in (f"hist_id_{s.get('id')}.dat", f"hist_{s.get('id')}.csv"):
+                found.append((f"{data}/{name}", f"line {s.line}: {recorded(s)}"))
         elif s.command == "SET" and s.get("energy", 0) > 0:
             found.append((f"{data}/energy.csv", f"line {s.line}: the energy budget"))
         elif s.command == "PLOT":
-            found.append((f"{data}/hist_{s.get('y')}_vs_{s.get('x')}.txt", f"line {s.line}: history against history"))
+            for kind in ("txt", "png"):
+                name = f"{data}/hist_{s.get('y')}_vs_{s.get('x')}.{kind}"
+                found.append((name, f"line {s.line}: history against history"))
     return found
 
 
@@ -161,7 +163,7 @@ def _folder(statements: Sequence[Statement], outdir: Path | None = None) -> str:
 
 
 def _notes(script: Script, runs: Sequence[Run], restored: bool, outdir: Path | None) -> list[str]:
-    notes = []
+    notes = [f"line {s.line}: {warning}" for s in script.statements for warning in s.warnings]
     for index, statement in enumerate(script.statements):
         reads = statement.command == "CLUMP" or (index < 2 and statement.command in ("RESTORE", "LOAD"))
         if not reads or statement.get("file") is None:

@@ -14,10 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hpcdem import selection as sel
-from hpcdem.errors import CommandError
-from hpcdem.lang.zdem.execute import find
-from hpcdem.lang.zdem.statement import Statement
+from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.io.dat import is_frame, read_dat
+from hpcdem.lang.zdem.statement import Statement, find
 
 JAMMED = 0.547
 """Share of the area that equal disks cover when no more fit (Feder 1980, J. Theor. Biol. 87, 237)."""
@@ -342,6 +344,13 @@ def _rows(s: Statement, directory: Path) -> Mapping[str, Any] | None:
     table: dict[str, list[float]] = {"x": [], "y": [], "radius": []}
     scale = s.get("scale", 1.0)
     try:
+        if is_frame(path):
+            found = read_dat(path, ("particles",)).tables["particles"].columns
+            keep = np.ones(len(found["x"]), bool)
+            for name in ("x", "y"):
+                low, high = s.get(name) or (-math.inf, math.inf)
+                keep &= (found[name] >= low) & (found[name] < high)
+            return {name: found[name][keep] for name in table}
         with open(path, encoding="utf-8", errors="replace") as file:
             for line in file:
                 words = line.split("#")[0].split()
@@ -352,6 +361,6 @@ def _rows(s: Statement, directory: Path) -> Mapping[str, Any] | None:
                 if all(pair is None or pair[0] <= value < pair[1] for pair, value in bounds):
                     for name, value in zip(table, (x, y, r)):
                         table[name].append(value * scale)
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, KeyError, HpcdemError):
         return None
     return table

@@ -13,8 +13,8 @@ from typing import Any
 
 from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.zdem.parser import Script, parse_text
-from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, RECORDED
-from hpcdem.lang.zdem.statement import Statement
+from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, recorded
+from hpcdem.lang.zdem.statement import Statement, find
 from hpcdem.selection import Selection, has_expressions, number
 
 
@@ -36,13 +36,22 @@ def refuse_unexecuted(statements: Sequence[Statement]) -> None:
             )
 
 
+def tell_warnings(script: Script, sim: Any) -> None:
+    """What the parser read otherwise than it is written, into the log."""
+    if getattr(sim, "log", None) is not None:
+        for statement in script.statements:
+            for warning in statement.warnings:
+                sim.log.warn(f"{statement.file}:{statement.line}: {warning}")
+
+
 def refuse_lost_files(script: Script, outdir: Path | None = None) -> None:
-    """ScriptError at the first EXP or SAV that could not write its file, long before the run comes to it; looks at the
-    disk.
+    """ScriptError at the first EXP or SAV that could not write its file, or would write it over the script or a file
+    that the script reads, long before the run comes to it; looks at the disk.
 
     outdir: folder of the results where the script does not name one; it and what lies in it need not exist yet.
     """
     results = [script.directory, script.directory / "data" if outdir is None else outdir]
+    read = _files_read(script)
     for statement in script.statements:
         if statement.get("outdir"):
             folder = script.directory / statement.get("outdir")
@@ -54,8 +63,28 @@ def refuse_lost_files(script: Script, outdir: Path | None = None) -> None:
         path = script.directory / statement.get("file")
         if path.is_dir():
             raise statement.error(f"{statement.get('file')} is a folder, expected a file name")
+        if os.path.realpath(path) in read:
+            what = read[os.path.realpath(path)]
+            raise statement.error(f"{statement.get('file')} would be written over {what}; give it another name")
         if not path.parent.is_dir() and os.path.normpath(path.parent) not in map(os.path.normpath, results):
             raise statement.error(f"there is no folder {path.parent} to write {path.name} into")
+
+
+def _files_read(script: Script) -> dict[str, str]:
+    """The script, and files that its statements read unless an earlier one has written them: by their real paths, in
+    words."""
+    read, written = {os.path.realpath(script.file): "the script that runs"}, set()
+    for statement in script.statements:
+        name = statement.get("file")
+        if not name:
+            continue
+        if statement.command in ("EXP", "SAV"):
+            written.add(os.path.realpath(script.directory / name))
+            continue
+        path = find(script.directory, name)
+        if path is not None and os.path.realpath(path) not in written:
+            read.setdefault(os.path.realpath(path), f"the file that line {statement.line} reads")
+    return read
 
 
 def refuse_escapes(script: Script, folder: Path) -> None:
@@ -94,6 +123,7 @@ class Interpreter:
         """
         refuse_unexecuted(self.script.statements)
         self._refuse_lost_files(sim)
+        tell_warnings(self.script, sim)
         sim.script = self.script.text
         if resume is not None:
             if saved_script:
@@ -195,17 +225,6 @@ class _Call:
             name = self.arguments["file"]
             raise CommandError(f"there is no file {self.directory / name}, nor {self.directory / 'data' / name}")
         return found
-
-
-def find(directory: Path, name: str) -> str | None:
-    """Where a file to be read is: in `directory`, or in the folder data below it; None if in neither."""
-    for path in (directory / name, directory / "data" / name):
-        try:
-            if path.is_file():
-                return str(path)
-        except (OSError, ValueError):  # a name the system cannot have
-            continue
-    return None
 
 
 # ---- one function per command --------------------------------------------------------------------------------------
@@ -317,7 +336,7 @@ def _sav(call: _Call) -> None:
 
 
 def _hist(call: _Call) -> None:
-    what = next(name for name in RECORDED if name in call.arguments)
+    what = recorded(call.statement)
     call.verbs.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
 
 
@@ -326,8 +345,23 @@ def _plot(call: _Call) -> None:
 
 
 def _draw(call: _Call) -> None:
-    what = [name for name in call.arguments if name != "interval"]
-    call.verbs.history.draw(call.sim, call.arguments.get("interval"), what)
+    words = {name: on for name, on in call.arguments.items() if name != "interval"}
+    what, off = ([name for name, on in words.items() if on is wanted] for wanted in (True, False))
+    call.verbs.history.draw(call.sim, call.arguments.get("interval"), what, off)
+
+
+def _log(call: _Call) -> None:
+    _say(call, "the log goes to standard output; nothing to switch")
+
+
+def _pause(call: _Call) -> None:
+    _say(call, "a run waits for nobody, it goes on")
+
+
+def _say(call: _Call, text: str) -> None:
+    """A line in the log for a command without effect."""
+    if getattr(call.sim, "log", None) is not None:
+        call.sim.log.info(f"line {call.sim.line}: {call.statement.command}: {text}")
 
 
 _VERBS: dict[str, Callable[[_Call], None]] = {
@@ -354,4 +388,6 @@ _VERBS: dict[str, Callable[[_Call], None]] = {
     "HIST": _hist,
     "PLOT": _plot,
     "DRAW": _draw,
+    "LOG": _log,
+    "PAUSE": _pause,
 }

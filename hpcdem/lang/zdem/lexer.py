@@ -19,6 +19,9 @@ SEPARATORS = "()=,"
 COMMENT = re.compile(rb"[#!;]")
 LINE_END = re.compile(rb"\r\n|\n|\r")
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+LINE_BREAK_MARKS = "↵→↪↩⏎➔⮐"
+"""What stands at the end and the beginning of lines that were too long for a page of the manual."""
+JOIN = "a command is one line, so join the two parts"
 LARGEST_WHOLE = 2**53
 """Whole numbers beyond this are no longer exact in a C double, which is how ZDEM reads them."""
 
@@ -97,6 +100,10 @@ def _refuse(char: str, file: str, number: int, column: int) -> None:
         if char in "\"'":
             raise ScriptError(file, number, f"read {char} at column {column}; names are written without quotes")
         return
+    if char in LINE_BREAK_MARKS:
+        raise ScriptError(
+            file, number, f"read '{char}' at column {column}, the mark of a line that a PDF broke in two; {JOIN}"
+        )
     plain = unicodedata.normalize("NFKC", char)
     if "\uff01" <= char <= "\uff5e" or char == "\u2212":
         plain = "-" if char == "\u2212" else plain
@@ -120,12 +127,18 @@ def whole(value: float) -> int | None:
 # ---- expressions: {top}-1000.0 -------------------------------------------------------------------------------------
 
 _PIECE = re.compile(r"(?P<number>(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)|(?P<name>\{[^{}]*\})|(?P<sign>[-+*/])", re.ASCII)
+BLANKS = "; blanks are not allowed in an expression: write {top}-1000.0"
 _RANK = {"+": 1, "-": 1, "*": 2, "/": 2}
 
 
 def is_expression(token: Token) -> bool:
     """Words with a brace are expressions of the extents of the model."""
     return "{" in token.text or "}" in token.text
+
+
+def is_part(token: Token) -> bool:
+    """Words that can only be a piece of an expression that blanks have cut: ``-``, ``*2``."""
+    return token.text[0] in "*/" or token.text in ("+", "-")
 
 
 def expression(token: Token, file: str) -> Expression:
@@ -161,7 +174,7 @@ def expression(token: Token, file: str) -> Expression:
             program += _operand(piece, sign, fail)
             sign, signed, operand_next = 1.0, False, False
     if operand_next:
-        raise fail(f"a number or one of {_names()} is missing at the end")
+        raise fail(f"a number or one of {_names()} is missing at the end{BLANKS}")
     return Expression(token.text.lower(), (*program, *reversed(waiting)))
 
 

@@ -6,7 +6,7 @@ several words or several lines together are in `rules` and `plan`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -53,7 +53,7 @@ def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDE
         source = source.encode("utf-8", errors="surrogatepass")
     statements: list[Statement] = []
     for line in lexer.read_lines(source, file):
-        statement = _LineParser(line, file, table).statement()
+        statement = _LineParser(line, file, table, statements[-1] if statements else None).statement()
         rules.check_statement(statement)
         rules.check_place(statement, statements)
         statements.append(statement)
@@ -68,10 +68,11 @@ def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDE
 class _LineParser:
     """Reads one line, word by word, against the table."""
 
-    def __init__(self, line: Line, file: str, table: t.Table) -> None:
-        self.line, self.file, self.table = line, file, table
+    def __init__(self, line: Line, file: str, table: t.Table, before: Statement | None = None) -> None:
+        self.line, self.file, self.table, self.before = line, file, table, before
         self.at = 0
         self.unexecuted: list[str] = []
+        self.warnings: list[str] = []
         self.context = line.tokens[0].text
 
     # ---- words
@@ -82,7 +83,7 @@ class _LineParser:
     def next(self, expected: str) -> Token:
         token = self.peek()
         if token is None:
-            self.fail(f"{self.context}: the line ends where {expected} is expected")
+            self.fail(f"{self.context}: the line ends where {expected} is expected; a command is one line")
         self.at += 1
         return token
 
@@ -90,7 +91,16 @@ class _LineParser:
         raise ScriptError(self.file, self.line.number, message)
 
     def unexpected(self, token: Token, expected: str, hint: str = "") -> NoReturn:
+        if lexer.is_part(token):
+            hint += lexer.BLANKS
         self.fail(f"{self.context}: read {token}, expected {expected}{hint}")
+
+    def row(self, token: Token, rows: Sequence[t.AnyRow]) -> t.AnyRow | None:
+        """The row a word stands for; where it is only guessed by its first letters, with a warning."""
+        row, guessed = t.find(token.word, rows)
+        if row is not None and guessed:
+            self.warnings.append(f"{self.context}: '{token.text}' is taken for {row.name}, which begins like it")
+        return row
 
     def note(self, row: t.Row, what: str) -> None:
         if not row.executed:
@@ -108,8 +118,9 @@ class _LineParser:
             self.fail(f"{command.name}: {t.joined(missing)} missing; {_syntax_hint(command)}")
         name = command.same_as or command.name
         return Statement(
-            self.file, self.line.number, name, arguments, selection, self.line.text, tuple(self.unexecuted)
-        )
+            self.file, self.line.number, name, arguments, selection, self.line.text, tuple(self.unexecuted),
+            tuple(self.warnings),
+        )  # fmt: skip
 
     def command(self) -> t.Command:
         token = self.next("a command")
@@ -119,14 +130,27 @@ class _LineParser:
             self.note(command, command.name)
             return command
         if self.table.range_row.accepts(token.word):
-            self.fail("RANGE is no command; it stands at the end of the line of another command")
+            self.fail(f"RANGE is no command; it stands at the end of the line of another command{self.rest(token)}")
         if lexer.number(token) is not None:
-            self.fail(f"read {token}, expected a command; every line begins with a command")
+            self.fail(f"read {token}, expected a command; every line begins with a command{self.rest(token)}")
         if not token.text.isascii():
             self.fail(f"read {token}, expected a command; a comment begins with #, ! or ;")
+        rest = self.rest(token)
+        if rest:
+            self.fail(f"read {token}, expected a command{rest}")
         near = self.table.hint(token.word)
         known = "" if near else "; commands are " + t.joined(c.name for c in self.table.commands)
         self.fail(f"read {token}, expected a command{near}{known}")
+
+    def rest(self, token: Token) -> str:
+        """What to add where the line may be the second half of the one before it: lines that a PDF broke in two are
+        copied so. Empty otherwise."""
+        command = None if self.before is None else self.table.command(self.before.command.lower())
+        if command is None or self.before is None:
+            return ""
+        rows = [*command.options, *((self.table.range_row, *self.table.range_terms) if command.ranged else ())]
+        goes_on = lexer.number(token) is not None or any(row.accepts(token.word) for row in rows)
+        return f"; it looks like the rest of line {self.before.line}: {lexer.JOIN}" if goes_on else ""
 
     def leading(self, command: t.Command, arguments: dict[str, Any]) -> None:
         """Fixed words and values that follow the command itself. Words are left out of the arguments."""
@@ -145,18 +169,23 @@ class _LineParser:
         """Keywords in any order, then RANGE; returns the selection."""
         while (token := self.peek()) is not None:
             self.at += 1
-            option = command.option(token.word)
-            if option is None and self.table.range_row.accepts(token.word):
+            if t.find(token.word, command.options)[0] is None and self.table.range_row.accepts(token.word):
                 if not command.ranged:
                     self.unexpected(token, f"a keyword: {command.name} takes no RANGE")
                 return self.selection()
+            option = self.row(token, command.options) or self.switched_off(token, command)
             if option is None:
                 self.unknown(token, command)
             if option.key in arguments:
                 self.fail(f"{command.name}: {option.name} is given twice (column {token.column})")
             self.note(option, f"{command.name} {option.name}")
-            arguments[option.key] = self.value(option)
+            arguments[option.key] = self.value(option) if not option.switch else token.text[0] != "-"
         return None
+
+    def switched_off(self, token: Token, command: t.Command) -> t.Option | None:
+        """The option of a word such as ``-bline``."""
+        option = command.option(token.word[1:]) if token.text[0] == "-" else None
+        return option if option is not None and option.switch else None
 
     def unknown(self, token: Token, command: t.Command) -> NoReturn:
         words = command.words
@@ -175,24 +204,24 @@ class _LineParser:
         self.context = f"{self.context} RANGE"
         terms: list[sel.Selection] = []
         joins: list[str] = []
-        join: Token | None = None
+        join = ""
         names = t.joined(row.name for row in self.table.range_terms)
         while (token := self.peek()) is not None:
             self.at += 1
-            row = self.table.range_term(token.word)
+            row = self.row(token, self.table.range_terms)
             if row is None:
                 self.no_term(token, names)
             self.note(row, f"RANGE {row.name}")
             if row.key in ("and", "or"):
-                if join is not None or not terms:
+                if join or not terms:
                     self.unexpected(token, "a term such as x (a b) or group name before it")
-                join = token
+                join = row.key
                 continue
             if terms:
-                joins.append("or" if join is not None and join.word == "or" else "and")
+                joins.append(join)
             terms.append(self.term(row))
-            join = None
-        if not terms or join is not None:
+            join = ""
+        if not terms or join:
             self.next(f"a term ({names})")
         return sel.chain(terms, joins)
 
@@ -246,7 +275,11 @@ class _LineParser:
     def variable(self, expected: str) -> sel.Value:
         """A number or an expression."""
         token = self.next(expected)
-        return lexer.expression(token, self.file) if lexer.is_expression(token) else self.plain_number(token, expected)
+        value = lexer.expression(token, self.file) if lexer.is_expression(token) else self.plain_number(token, expected)
+        after = self.peek()
+        if after is not None and lexer.is_part(after):
+            self.unexpected(after, f"no sign after {token}")
+        return value
 
     def flag(self, kind: t.Flag, name: str) -> bool:
         return True
@@ -267,7 +300,12 @@ class _LineParser:
 
     def interval(self, kind: t.Interval, name: str) -> tuple[sel.Value, sel.Value]:
         low = self.variable(f"the lower bound of {name}")
+        signed = self.peek()
         high = self.variable(f"the upper bound of {name}")
+        if isinstance(low, sel.Expression) and signed is not None and signed.text[0] in "+-":
+            self.warnings.append(
+                f"{self.context}: {low} and '{signed.text}' are taken for two bounds of {name}{lexer.BLANKS}"
+            )
         if not sel.has_expressions((low, high)) and low > high:  # type: ignore[operator]
             self.fail(f"{self.context}: the lower bound of {name}, {low}, is above the upper bound, {high}")
         return low, high
@@ -333,6 +371,44 @@ class _LineParser:
             )
         return token.text
 
+    def either(self, kind: t.Kind, name: str, number: int) -> list[Token]:
+        """So many words with | between them, blanks around it or not; the tokens carry the words alone."""
+        pieces: list[Token] = []
+        bars = 0
+        while True:
+            token = self.next(f"{kind.meaning} for {name}")
+            pieces += [Token(word, token.line, token.column) for word in token.text.split("|") if word]
+            bars += token.text.count("|")
+            after = self.peek()
+            if len(pieces) > bars and (after is None or not after.text.startswith("|")):
+                break
+        if len(pieces) != number or bars != number - 1:
+            self.unexpected(token, f"{kind.meaning} for {name}")
+        return pieces
+
+    def groups(self, kind: t.Groups, name: str) -> tuple[str, ...]:
+        token = self.peek()
+        if token is not None and token.word == "group":
+            self.at += 1
+        return tuple(piece.word for piece in self.either(kind, name, kind.number))
+
+    def wall_ids(self, kind: t.WallIds, name: str) -> tuple[int, ...]:
+        token = self.peek()
+        if kind.optional and (token is None or not (token.word in ("wall", "id") or lexer.number(token) is not None)):
+            return ()
+        for word in ("wall", "id"):
+            token = self.peek()
+            if token is not None and token.word == word:
+                self.at += 1
+        ids = []
+        for piece in self.either(kind, name, kind.number):
+            value = lexer.number(piece)
+            whole = lexer.whole(value) if value is not None else None
+            if whole is None or whole < 0:
+                self.unexpected(piece, f"{kind.meaning} for {name}")
+            ids.append(whole)
+        return tuple(ids)
+
     def choice(self, kind: t.Choice, name: str) -> str:
         token = self.next(f"{kind.meaning} for {name}")
         values = dict(kind.choices)
@@ -357,6 +433,8 @@ _READERS: dict[type, Callable[[_LineParser, Any, str], Any]] = {
     t.Name: _LineParser.name,
     t.File: _LineParser.file_name,
     t.Choice: _LineParser.choice,
+    t.Groups: _LineParser.groups,
+    t.WallIds: _LineParser.wall_ids,
 }
 
 

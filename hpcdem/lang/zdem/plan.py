@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
+from hpcdem.fields import BOX_IDS
+from hpcdem.io.dat import is_frame
 from hpcdem.lang.zdem.lexer import LARGEST_WHOLE
-from hpcdem.lang.zdem.statement import Statement
+from hpcdem.lang.zdem.statement import Statement, find
 
 OUTPUTS = ("print", "ps", "vtk", "save")
 Velocity = tuple[float | None, float | None]
@@ -75,6 +77,9 @@ class _Known:
     dt: float | None = None
     has_step_rule: bool = False
     walls: dict[int, Velocity] = field(default_factory=dict)
+    boxed: bool = False
+    energy: bool = False
+    pressure: bool = False
     histories: set[int] = field(default_factory=set)
     every: dict[str, int | None] = field(default_factory=lambda: dict.fromkeys(OUTPUTS, 0))
 
@@ -104,10 +109,17 @@ def follow(
             case "RESTORE":
                 known = _Known(False, _step_in_name(statement.get("file")), dt, True, dict(walls or {}))
                 known.every = dict.fromkeys(OUTPUTS)
+            case "LOAD" if _names_a_frame(statement):
+                known = _Known(False, None, None, True, every=dict.fromkeys(OUTPUTS, 0))
             case "SET":
                 _set(statement, known)
+            case "BOX":
+                _box(statement, known)
             case "WALL":
                 _wall(statement, known)
+            case "PROP" if statement.get("xp") or statement.get("yp"):
+                known.pressure = True
+                _no_energy_with_pressure(statement, known)
             case "HIST":
                 known.histories.add(statement.get("id"))
             case "PLOT":
@@ -127,6 +139,12 @@ def expected_steps(
     return None if any(n is None for n in steps) else sum(n for n in steps if n is not None)
 
 
+def _names_a_frame(statement: Statement) -> bool:
+    """Whether LOAD reads a frame, which brings walls and a time step; False for a file that is not there yet."""
+    path = find(Path(statement.file).parent, statement.get("file"))
+    return path is not None and is_frame(path)
+
+
 def _step_in_name(file: str) -> int | None:
     """ZDEM names restart files after the step: 0000046000.sav."""
     stem = PurePath(file).stem
@@ -137,12 +155,30 @@ def _set(statement: Statement, known: _Known) -> None:
     for name, value in statement.arguments.items():
         if name in ("dt", "frac"):
             known.dt, known.has_step_rule = (value if name == "dt" else None), True
+        elif name == "energy":
+            known.energy = value > 0
+            _no_energy_with_pressure(statement, known)
         elif name in OUTPUTS:
             known.every[name] = max(value, 0)
 
 
+def _no_energy_with_pressure(statement: Statement, known: _Known) -> None:
+    if known.energy and known.pressure:
+        raise statement.error("the account of SET energy does not know the work of xp and yp; leave one of them out")
+
+
+def _box(statement: Statement, known: _Known) -> None:
+    taken = [] if known.boxed else [i for i in BOX_IDS.values() if i in known.walls]
+    if taken:
+        raise statement.error(f"the sides of BOX are walls 100 to 103, and there is a wall {taken[0]}; renumber it")
+    known.boxed = True
+    known.walls.update(dict.fromkeys(BOX_IDS.values(), (0.0, 0.0)))
+
+
 def _wall(statement: Statement, known: _Known) -> None:
     wall = statement.get("id")
+    if "nodes" in statement.arguments and known.boxed and wall in BOX_IDS.values():
+        raise statement.error(f"wall {wall} is a side of BOX, which BOX alone can place; give this wall another id")
     if "nodes" in statement.arguments:
         known.walls[wall] = (0.0, 0.0)
     elif wall not in known.walls and known.complete:

@@ -20,8 +20,9 @@ This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it
 - `( ) = ,` and blanks only separate: `fric=0.3`, `fric 0.3` and `(fric, 0.3)` are the same.
 - `# ! ;` begin a comment; comments may be in any text encoding, the rest is UTF-8.
 - Whole numbers may be written `100000.0`.
-- A command may be shortened to three letters or more. Keywords of up to three letters are written in full, longer ones
-  may be shortened to three letters or more. In the headings below what may be left out stands in brackets.
+- A command may be shortened to three letters or more; in the headings below what may be left out stands in brackets.
+  Keywords may be shortened to two letters or more, as long as no other of the command begins so. A longer word that is
+  none, but has the first three letters of just one keyword (`gravtiy`), is taken for that, with a warning.
 - The first command is START, RESTORE or LOAD. What follows STOP is not read.
 - The whole script is read before anything runs. The first wrong line is reported with its number, and nothing is done.
 - Units are SI. File names are relative to the folder of the script.
@@ -31,8 +32,10 @@ _RANGE = """\
 ## RANGE
 
 Stands last on the line and limits a command to some particles; without it the command acts on all. Terms are joined by
-`and` and `or`, from left to right with equal precedence; terms that follow each other without a word are joined by
-`and`. The centres of particles count. A particle is in one group, so group terms joined by `and` next to each other
+`and` and `or`, from left to right with equal precedence. `x (a b) y (c d)` is one term, a rectangle: `group sed or
+x (6 8) y (0 2)` chooses the group and all of the rectangle; other terms without a word between them are joined by
+`and`.
+The centres of particles count. A particle is in one group, so group terms joined by `and` next to each other
 select the particles of all these groups.
 """
 

@@ -15,9 +15,9 @@ from hpcdem.selection import has_expressions
 BEGINNINGS = "START, RESTORE or LOAD"
 BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")
 BOND_MODEL_2 = ("n_bond", "s_bond")
-BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext")
+BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber")
 
-RECORDED = ("kinetic", "step", "energy")
+RECORDED = ("kinetic", "step", "energy", "gstress", "gstrain", "xstress", "ystress", "xstrain", "ystrain")
 """What HIST follows."""
 
 
@@ -96,6 +96,8 @@ def _prop(s: Statement) -> None:
         raise s.error("nothing to set before RANGE" if s.selection else "nothing to set")
     first = [key for key in BOND_MODEL_1 if key in s.arguments]
     second = [key for key in BOND_MODEL_2 if key in s.arguments]
+    if "rubber" in s.arguments and not first and not second:
+        raise s.error("rubber marks the bonds of the same line; give their strengths with it")
     if first and second:
         raise s.error(f"{first[0]} and {second[0]} belong to different bond models; a bond is of one model")
 
@@ -120,6 +122,26 @@ def _imple(s: Statement) -> None:
 def _hist(s: Statement) -> None:
     if sum(name in s.arguments for name in RECORDED) != 1:
         raise s.error(f"say what to record: {', '.join(RECORDED[:-1])} or {RECORDED[-1]}")
+    stresses = [name for name in ("xstress", "ystress") if name in s.arguments]
+    if "wall" in s.arguments and not stresses:
+        raise s.error("wall belongs to xstress and ystress; strains take two walls: ystrain wall 0|3")
+    for stress in stresses:
+        if len((*s.get("wall", ()), *s.get(stress))) != 1:
+            raise s.error(f"say once of which wall: wall id 3 {stress}")
+    for strain in ("gstrain", "xstrain", "ystrain"):
+        both = s.get(strain)
+        if both is not None and both[0] == both[1]:
+            raise s.error(f"{strain} is between two, both are {both[0]}")
+
+
+def recorded(s: Statement) -> str:
+    """What a HIST line follows, in the words of `commands.history.hist`: ``kinetic``, ``gstrain group a|b``,
+    ``ystress wall 3``."""
+    name = next(name for name in RECORDED if name in s.arguments)
+    if name in ("kinetic", "step", "energy"):
+        return name
+    of = s.get(name) or s.get("wall")
+    return f"{name} {'group' if name[0] == 'g' else 'wall'} {'|'.join(map(str, of))}"
 
 
 def _output(s: Statement) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from hpcdem.errors import ScriptError
@@ -15,7 +16,7 @@ class Statement:
 
     command: its full name as in the table ("PROP" also for INI); arguments: value by lower-case option name, in the
     order written; selection: the RANGE, None for all particles; text: the line as written; unexecuted: words of the
-    line that the solver does not carry out yet.
+    line that the solver does not carry out yet; warnings: what was read otherwise than it is written.
     """
 
     file: str
@@ -25,6 +26,7 @@ class Statement:
     selection: Selection | None = None
     text: str = ""
     unexecuted: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def get(self, name: str, default: Any = None) -> Any:
         """An argument, or the default if it was not given."""
@@ -37,3 +39,14 @@ class Statement:
     def error(self, message: str) -> ScriptError:
         """An error that names this line."""
         return ScriptError(self.file, self.line, f"{self.command}: {message}")
+
+
+def find(directory: Path, name: str) -> str | None:
+    """Where a file to be read is: in `directory`, or in the folder data below it; None if in neither."""
+    for path in (directory / name, directory / "data" / name):
+        try:
+            if path.is_file():
+                return str(path)
+        except (OSError, ValueError):  # a name the system cannot have
+            continue
+    return None

@@ -12,8 +12,9 @@ author's web site, X our extension.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 from hpcdem.lang.zdem.nearest import hint
 
@@ -21,6 +22,7 @@ SOURCES = {
     "R": "command reference of the manual",
     "S": "scripts or change log of the manual",
     "W": "scripts on the author's web site",
+    "P": "scripts, frames and readers in public repositories",
     "X": "extension of hpcdem",
 }
 
@@ -129,6 +131,22 @@ class File(Kind):
 
 
 @dataclass(frozen=True)
+class Groups(Kind):
+    """The word ``group``, which may be left out, and as many names as `number`, with | between them."""
+
+    number: int = 1
+
+
+@dataclass(frozen=True)
+class WallIds(Kind):
+    """The words ``wall`` and ``id``, which may be left out, and as many ids as `number`, with | between them; nothing
+    at all where `optional`."""
+
+    number: int = 1
+    optional: bool = False
+
+
+@dataclass(frozen=True)
 class Choice(Kind):
     """One of the words of `choices`, each with the value it stands for."""
 
@@ -158,6 +176,11 @@ RADII = Radii("discrete <float> ...", "the word 'discrete' and one or more radii
 LSM = Viscosity("lsm <float>", "the word 'lsm' and a number not below 0")
 COLOR = Color("<colour>", "a colour: " + ", ".join(f"{name} ({n})" for name, n in COLORS.items()))
 NAME = Name("<name>", "a group name")
+OF_GROUP = Groups("[group] <name>", "a group name")
+OF_GROUPS = Groups("[group] <name>|<name>", "two group names with | between them", number=2)
+OF_WALL = WallIds("[wall] [id] <int>", "the id of a wall")
+THIS_WALL = WallIds("[[wall] [id] <int>]", "the id of a wall", optional=True)
+OF_WALLS = WallIds("[wall] [id] <int>|<int>", "the ids of two walls with | between them", number=2)
 FILE = File("<file>", "a file name")
 
 
@@ -185,6 +208,10 @@ class Row:
         full = self.full
         return word == full or word in self.also or (len(full) > 3 and len(word) >= 3 and full.startswith(word))
 
+    def named(self, word: str) -> bool:
+        """Is this (lower-case) word one of its full spellings?"""
+        return word in (self.name.lower(), self.full, *self.also)
+
     @property
     def full(self) -> str:
         """Longest spelling, lower case."""
@@ -198,17 +225,38 @@ class Row:
 
 @dataclass(frozen=True)
 class Option(Row):
-    """A keyword and the value behind it. unit and default are for the reader."""
+    """A keyword and the value behind it. unit and default are for the reader; switch: a - before it switches it off."""
 
     kind: Kind = FLAG
     unit: str = ""
     default: str = ""
     required: bool = False
+    switch: bool = False
 
     @property
     def key(self) -> str:
         """Its name among the arguments of a statement."""
         return self.name.lower()
+
+
+AnyRow = TypeVar("AnyRow", bound=Row)
+
+
+def find(word: str, rows: Sequence[AnyRow]) -> tuple[AnyRow | None, bool]:
+    """The row of a command or of RANGE that a (lower-case) word stands for, and whether it is only guessed.
+
+    That is the row of this name; the only one that begins with the word, of two letters or more; else the only one of
+    more than three letters that has its first three, which is how ZDEM tells words apart (published scripts with
+    `gravtiy` run there).
+    """
+    named = [row for row in rows if row.named(word)]
+    if named:
+        return named[0], False
+    begins = [row for row in rows if len(word) >= 2 and row.full.startswith(word)]
+    if begins:
+        return (begins[0], False) if len(begins) == 1 else (None, False)
+    alike = [row for row in rows if len(word) > 3 and len(row.full) > 3 and row.stem == word[:3]]
+    return (alike[0], True) if len(alike) == 1 else (None, False)
 
 
 @dataclass(frozen=True)
@@ -226,7 +274,7 @@ class Command(Row):
 
     def option(self, word: str) -> Option | None:
         """The option a (lower-case) word stands for."""
-        return next((option for option in self.options if option.accepts(word)), None)
+        return find(word, self.options)[0]
 
     @property
     def words(self) -> list[str]:
@@ -248,7 +296,7 @@ class Table:
 
     def range_term(self, word: str) -> Option | None:
         """The RANGE term a (lower-case) word stands for."""
-        return next((term for term in self.range_terms if term.accepts(word)), None)
+        return find(word, self.range_terms)[0]
 
     def hint(self, word: str) -> str:
         """The nearest command."""
@@ -291,12 +339,17 @@ _PROPERTIES = (
     Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
     Option("yv", "velocity in y", kind=FLOAT, unit="m/s"),
     Option("spin", "angular velocity, anticlockwise", kind=FLOAT, unit="rad/s"),
+    Option("xp", "pressure that pushes each particle along x: force = pressure 2 R thickness (SET thickness), until it "
+           "is changed", kind=FLOAT, unit="Pa", default="0", source="P"),
+    Option("yp", "the same along y", kind=FLOAT, unit="Pa", default="0", source="P"),
     Option("color", "colour, by name or number", also=("colour", "coloe"), kind=COLOR, source="S"),
     Option("group", "moves the particles to this group; a particle is in one group", kind=NAME, source="S"),
     Option("ebmod", "model 1 bond: Young's modulus", kind=NOT_NEGATIVE, unit="Pa"),
     Option("gbmod", "model 1 bond: shear modulus", also=("gbmmod",), kind=NOT_NEGATIVE, unit="Pa"),
     Option("tstrength", "model 1 bond: tensile strength", kind=NOT_NEGATIVE, unit="Pa"),
     Option("sstrength", "model 1 bond: cohesion", kind=NOT_NEGATIVE, unit="Pa"),
+    Option("rubber", "marks the bonds as those of a membrane: kept and written, without any effect on the motion",
+           source="P"),
     Option("n_bond", "model 2 bond: tensile strength", kind=NOT_NEGATIVE, unit="N"),
     Option("s_bond", "model 2 bond: shear strength", kind=NOT_NEGATIVE, unit="N"),
     Option("tolerate", "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default",
@@ -344,6 +397,8 @@ _SETTINGS = (
     _interval("ps", "a vector picture every so many steps"),
     _interval("vtk", "a .vtk file every so many steps"),
     _interval("energy", "a row of energy.csv every so many steps, and the energy budget at the end", source="X"),
+    Option("thickness", "of the model, in the force of PROP xp, yp and the stresses of HIST", kind=POSITIVE, unit="m",
+           default="1", source="X"),
     Option("seed", "start of the random numbers of GEN", kind=INDEX, default="5", source="X"),
     Option("wallside", "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both",
            kind=Choice("left|both", "left or both", (("left", "left"), ("both", "both"))), default="both", source="X"),
@@ -363,15 +418,17 @@ COMMANDS = (
     ),
     Command(
         "LOAD",
-        "Begins a new calculation with the particles of a text file of columns x y r [group]. Bounds that leave nobody "
-        "are an error.",
+        "Begins a new calculation with the particles of a text file of columns x y r [group], or with all that a frame "
+        "all_<step>.dat of ZDEM or hpcdem holds: particles with velocities and properties, walls, bonds, step, time "
+        "step and gravity. Bounds that leave nobody are an error.",
         leading=(Option("file", "file of particles", kind=FILE, required=True),),
         options=(
             Option("scale", "factor on x, y and r", kind=POSITIVE, default="1"),
             Option("x", "only particles of the file within these bounds, before scaling", kind=INTERVAL, unit="m"),
             Option("y", "only particles of the file within these bounds, before scaling", kind=INTERVAL, unit="m"),
         ),
-        example=("LOAD init_xyr.dat", "LOAD init_xyr.dat scale 0.1 x 1000.0 2000.0 y 2000.0 4000.0"),
+        example=("LOAD init_xyr.dat", "LOAD init_xyr.dat scale 0.1 x 1000.0 2000.0 y 2000.0 4000.0",
+                 "LOAD all_0000046000.dat"),
     ),
     Command("STOP", "Ends the run; what follows it is not read.", source="S", example=("STOP",)),
     # ---- walls
@@ -572,7 +629,8 @@ COMMANDS = (
     # ---- histories and pictures
     Command(
         "HIST",
-        "Records a number every so many steps in data/hist_<id>.dat.",
+        "Records a number every so many steps in data/hist_id_<id>.dat (step, value: the layout of ZDEM's readers) and "
+        "data/hist_<id>.csv (with the time). Stresses and strains are positive in compression and shortening.",
         source="S",
         longest="history",
         options=(
@@ -581,12 +639,29 @@ COMMANDS = (
             Option("kinetic", "record the kinetic energy", source="S"),
             Option("step", "record the number of the step", source="S"),
             Option("energy", "record the kinetic and elastic energy", source="X"),
+            Option("gstress", "record the axial stress [Pa] on an end wall made of the particles of a group: force of "
+                   "all others on it, over its width and SET thickness; the axis is across the row", kind=OF_GROUP,
+                   source="P"),
+            Option("gstrain", "record (D0 - D) / D0, D the distance of the mean positions of two groups along the axis "
+                   "in which they are farther apart, D0 that at the HIST command", kind=OF_GROUPS, source="P"),
+            Option("wall", "the wall of xstress, ystress", kind=OF_WALL, source="P"),
+            Option("xstress", "record the force in x of the particles on a wall, over its height and SET thickness "
+                   "[Pa]", kind=THIS_WALL, source="P"),
+            Option("ystress", "record the force in y of the particles on a wall, over its width and SET thickness "
+                   "[Pa]", kind=THIS_WALL, source="P"),
+            Option("xstrain", "record (D0 - D) / D0, D the distance of the middles of two walls in x", kind=OF_WALLS,
+                   source="P"),
+            Option("ystrain", "record (D0 - D) / D0, D the distance of the middles of two walls in y", kind=OF_WALLS,
+                   source="P"),
         ),
-        example=("HIST ID 1 INTERVAL 1000 , kinetic", "HIST ID 2 INTERVAL 1000 , step"),
+        example=("HIST ID 1 INTERVAL 1000 , kinetic", "HIST ID 2 INTERVAL 1000 , step",
+                 "HIST ID 3 INTERVAL 10 , gstress group top_wall",
+                 "HIST ID 4 INTERVAL 10 , gstrain group top_wall|bom_wall",
+                 "HIST ID 5 INTERVAL 10 , wall id 3 ystress", "HIST ID 6 INTERVAL 10 , ystrain wall 0|3"),
     ),
     Command(
         "PLOT",
-        "Writes one history against another at the end of the run.",
+        "Writes one history against another at the end of the run, and draws it: hist_<y>_vs_<x>.txt and .png.",
         source="S",
         leading=(
             Option("hist", "histories are all that can be plotted; the word may be left out", source="S"),
@@ -597,18 +672,29 @@ COMMANDS = (
     ),
     Command(
         "DRAW",
-        "Pictures in mid-run, draw_<step>.jpg, if the run was started with --draw; otherwise only noted in the log.",
+        "Pictures in mid-run, draw_<step>.jpg, if the run was started with --draw; otherwise only noted in the log. A "
+        "word with - before it switches off.",
         source="S",
         options=(
             Option("interval", "steps between two drawings", kind=COUNT, unit="steps", source="S"),
-            Option("bfill", "particles filled, not as circles", source="S"),
-            Option("wall", "walls", source="S"),
-            *(Option(name, doc, source="W") for name, doc in (
+            Option("bfill", "particles filled, not as circles", switch=True, source="S"),
+            Option("bline", "outlines of particles", switch=True, source="P"),
+            Option("wall", "walls", switch=True, source="S"),
+            *(Option(name, doc, switch=True, source="W") for name, doc in (
                 ("bondc", "bonds"), ("bid", "ids"), ("bang", "rotations"), ("mesh", "search cells"),
                 ("cforce", "contact forces"))),
         ),
-        example=("DRAW INTERVAL 200, bfill wall",),
+        example=("DRAW INTERVAL 200, bfill wall", "DRAW INTERVAL 100 -bline bfill bondc wall"),
     ),
+    Command(
+        "LOG",
+        "Accepted, without effect: the log goes to standard output and is kept where that is redirected to.",
+        source="P",
+        leading=(Option("state", "", kind=Choice("on|off", "on or off", (("on", "on"), ("off", "off"))), required=True,
+                        source="P"),),
+        example=("LOG on",),
+    ),
+    Command("PAUSE", "Accepted, without effect: a run waits for nobody.", source="P", example=("PAUSE",)),
 )  # fmt: skip
 
 RANGE_TERMS = (

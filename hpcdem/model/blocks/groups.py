@@ -110,7 +110,7 @@ class Ids:
 
 @dataclass(frozen=True)
 class Span:
-    """From low to high along an axis, 0: x, 1: y. Elements: their centre; faces and joints: both ends."""
+    """From low to high along an axis, 0: x, 1: y, in the mesh. Elements: their centre; faces and joints: both ends."""
 
     axis: int
     low: float
@@ -151,6 +151,11 @@ class OnCrack:
     """Joints on a crack of the mesh."""
 
 
-Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | Between | OnCrack
+@dataclass(frozen=True)
+class Present:
+    """Other terms of the range look at where things are now, not at where they are in the mesh."""
+
+
+Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | Between | OnCrack | Present
 Range = tuple[Term, ...]
 """All terms must hold."""

@@ -9,6 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from hpcdem.errors import CommandError
 
@@ -48,13 +51,18 @@ class Property:
 
 @dataclass(frozen=True)
 class Model:
-    """What can be assigned to elements, faces or joints. derive: fills in what follows from the values given."""
+    """What can be assigned to elements, faces or joints. derive: fills in what follows from the values given, which are
+    numbers or arrays; CommandError if one cannot be."""
 
     name: str
     on: str
     doc: str
     properties: tuple[Property, ...]
-    derive: Callable[[dict[str, float]], None] = lambda values: None
+    derive: Callable[[dict[str, Any]], None] = lambda values: None
+
+    def has(self, name: str) -> bool:
+        """Whether it has a property of this name."""
+        return any(one.name == name for one in self.properties)
 
     def property(self, name: str) -> Property:
         """The property of this name; CommandError listing those there are."""
@@ -76,13 +84,35 @@ class Model:
             elif one.name not in values and not one.optional:
                 raise CommandError(f"model {self.name} needs {one.name} ({one.unit}: {one.doc})")
         self.derive(values)
-        return {one.name: values[one.name] for one in self.properties}
+        return {one.name: float(values[one.name]) for one in self.properties}
+
+    def complete_each(self, given: Mapping[str, float | np.ndarray], n: int) -> np.ndarray | None:
+        """The same for n objects at once, values being numbers or arrays (n,): (n, properties), or None if `complete`
+        refuses one of them."""
+        values: dict[str, Any] = {}
+        for name, value in given.items():
+            one, each = self.property(name), np.broadcast_to(np.asarray(value, np.float64), (n,))
+            inside = (one.low <= each if one.low_itself else one.low < each) & (each <= one.high)
+            if not (inside & (np.isfinite(each) | (one.default == math.inf))).all():
+                return None
+            values[name] = each
+        for one in self.properties:
+            if one.name not in values and one.default is not None:
+                values[one.name] = np.full(n, one.default)
+            elif one.name not in values and not one.optional:
+                return None
+        try:
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                self.derive(values)
+        except CommandError:
+            return None
+        return np.column_stack([values[one.name] for one in self.properties])
 
 
 MODULI = ("young", "poisson_ratio", "shear", "bulk")
 
 
-def _elastic(values: dict[str, float]) -> None:
+def _elastic(values: dict[str, Any]) -> None:
     """All four moduli from two of them."""
     given = [name for name in MODULI if name in values]
     if len(given) != 2:
@@ -96,7 +126,8 @@ def _elastic(values: dict[str, float]) -> None:
         shear, bulk = young / (2.0 * (1.0 + poisson)), young / (3.0 * (1.0 - 2.0 * poisson))
     elif given == ["young", "shear"]:
         poisson = young / (2.0 * shear) - 1.0
-        bulk = young * shear / (3.0 * (3.0 * shear - young)) if young != 3.0 * shear else math.inf
+        with np.errstate(divide="ignore"):
+            bulk = young * shear / np.asarray(3.0 * (3.0 * shear - young))
     elif given == ["young", "bulk"]:
         poisson, shear = 0.5 - young / (6.0 * bulk), 3.0 * bulk * young / (9.0 * bulk - young)
     elif given == ["poisson_ratio", "shear"]:
@@ -108,12 +139,14 @@ def _elastic(values: dict[str, float]) -> None:
     else:
         young = 9.0 * bulk * shear / (3.0 * bulk + shear)
         poisson = young / (2.0 * shear) - 1.0
-    if not (-1.0 < poisson < 0.5 and young > 0.0 and math.isfinite(bulk)):
-        raise CommandError(f"the moduli give Poisson's ratio {poisson:g}, which must lie between -1 and 0.5")
+    good = (-1.0 < poisson) & (poisson < 0.5) & (young > 0.0) & np.isfinite(bulk)
+    if not np.all(good):
+        wrong = np.asarray(poisson)[~np.asarray(good)].flat[0] if np.ndim(poisson) else poisson
+        raise CommandError(f"the moduli give Poisson's ratio {wrong:g}, which must lie between -1 and 0.5")
     values.update(young=young, poisson_ratio=poisson, shear=shear, bulk=bulk)
 
 
-def _penalties(values: dict[str, float]) -> None:
+def _penalties(values: dict[str, Any]) -> None:
     values.setdefault("penalty_shear", values["penalty_normal"])
 
 
@@ -149,6 +182,7 @@ CONTACT_MOHR_COULOMB = Model(
         Property("penalty_shear", "Pa", "shear penalty; as penalty_normal", optional=True),
         Property("damping_t", "Pa", "largest normal stress while surfaces approach", math.inf, **_POSITIVE),
         Property("damping_b", "1", "exponent of the overlap while they part", 1.0, low=1.0),
+        Property("damping_ratio", "1", "normal dashpot, part of the critical of two elements; dynamic mode only", 0.0),
     ),
     _penalties,
 )
@@ -172,12 +206,14 @@ COHESIVE = Model(
 )  # fmt: skip
 
 
-def _cohesive(values: dict[str, float]) -> None:
+def _cohesive(values: dict[str, Any]) -> None:
     for name in ("penalty_overlay", "penalty_shear"):
         values.setdefault(name, values["penalty_normal"])
     for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
-        if values[strength] > 0.0 and values[energy] <= 0.0:
-            raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {values[strength]:g} Pa, got 0")
+        lost = (np.asarray(values[strength]) > 0.0) & (np.asarray(values[energy]) <= 0.0)
+        if lost.any():
+            where = float(np.asarray(values[strength])[lost].flat[0])
+            raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {where:g} Pa, got 0")
 
 
 MODELS = {model.name: model for model in (MECH_ISO_ELASTIC, CONTACT_MOHR_COULOMB, COHESIVE)}
@@ -202,17 +238,26 @@ class Rows:
     def __init__(self) -> None:
         self.rows: list[tuple[str, tuple[float, ...]]] = [("", ())]
         self._found: dict[tuple[str, tuple[float, ...]], int] = {self.rows[0]: 0}
+        self._columns: dict[tuple[str, float], np.ndarray] = {}
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def row(self, of: Model, values: Mapping[str, float]) -> int:
         """Number of the row with these complete values."""
-        key = of.name, tuple(values[p.name] for p in of.properties)
-        if key not in self._found:
-            self._found[key] = len(self.rows)
-            self.rows.append(key)
-        return self._found[key]
+        return int(self.numbers(of, np.array([[values[p.name] for p in of.properties]]))[0])
+
+    def numbers(self, of: Model, values: np.ndarray) -> np.ndarray:
+        """Rows (n,) with these complete values (n, properties)."""
+        out = np.empty(len(values), np.int32)
+        for i, one in enumerate(zip(*values.T.tolist()) if len(values) else ()):
+            key = of.name, one
+            row = self._found.get(key)
+            if row is None:
+                row = self._found[key] = len(self.rows)
+                self.rows.append(key)
+            out[i] = row
+        return out
 
     def values(self, row: int) -> dict[str, float]:
         """The values of a row by name; empty for row 0."""
@@ -223,9 +268,16 @@ class Rows:
         """The name of its model, "" for row 0."""
         return self.rows[row][0]
 
-    def column(self, name: str, default: float = 0.0) -> list[float]:
-        """One property of all rows; `default` where a row has none of this name."""
-        return [self.values(r).get(name, default) for r in range(len(self.rows))]
+    def column(self, name: str, default: float = 0.0) -> np.ndarray:
+        """One property of all rows (rows,), not to be changed; `default` where a row has none of this name."""
+        known = self._columns.get((name, default), np.empty(0))
+        if len(known) < len(self.rows):
+            place = {m.name: [p.name for p in m.properties].index(name) for m in MODELS.values() if m.has(name)}
+            new = [numbers[place[of]] if of in place else default for of, numbers in self.rows[len(known) :]]
+            known = np.concatenate([known, new])
+            known.flags.writeable = False
+            self._columns[name, default] = known
+        return known
 
     def state(self) -> list:
         """As JSON values."""
@@ -235,6 +287,8 @@ class Rows:
     def restored(state: list) -> Rows:
         """Inverse of `state`."""
         made = Rows()
-        made.rows = [(name, tuple(numbers)) for name, numbers in state]
+        for name, numbers in state[1:]:  # properties that are new since then have their defaults
+            new = [one.default or 0.0 for one in MODELS[name].properties[len(numbers) :]]
+            made.rows.append((name, (*numbers, *new)))
         made._found = {key: k for k, key in enumerate(made.rows)}
         return made

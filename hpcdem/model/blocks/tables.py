@@ -1,4 +1,5 @@
-"""Tables: piecewise linear functions of model time, constant beyond their ends."""
+"""Tables: piecewise linear functions of model time or of a coordinate, constant beyond their ends; what may stand for
+the number of a property."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from hpcdem.errors import CommandError
 
 @dataclass(frozen=True)
 class Table:
-    """times (n,) f8 [s], strictly ascending; values (n,) f8."""
+    """times (n,) f8 [s], strictly ascending, or coordinates [m]; values (n,) f8."""
 
     times: np.ndarray
     values: np.ndarray
@@ -39,6 +40,29 @@ class Table:
         """Value at a time [s]."""
         return float(np.interp(time, self.times, self.values))
 
+    def at(self, coordinates: np.ndarray) -> np.ndarray:
+        """Values (n,) at coordinates (n,) [m]."""
+        return np.interp(coordinates, self.times, self.values)
+
     def pairs(self) -> list[list[float]]:
         """(time, value) pairs as JSON values."""
         return np.column_stack([self.times, self.values]).tolist()
+
+
+@dataclass(frozen=True)
+class Over:
+    """A property that follows a table over x (axis 0) or y (1) in the mesh."""
+
+    table: str
+    axis: int
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A property that is a random field, by its name."""
+
+    field: str
+
+
+Value = float | Over | Drawn | np.ndarray
+"""Of a property: one number for all objects, or a rule, or one for each of the objects that are given (n,)."""

@@ -161,6 +161,39 @@ def break_bonds(t, blocks, ptr, partner, bond, chosen):
     return gone
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def overstretched(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, bonds, n_mat, spheres, chosen):
+    """Bonds of block t with both ends chosen that are past their tensile limit where they are: how many (of pairs whose
+    earlier end the block owns), and the widest gap [m] at which one of them would hold."""
+    cut, lo, _, poff, _ = blocks
+    number, widest = 0, 0.0
+    p = poff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j, kind = partner[k], bond[k]
+            if kind == 0 or not (chosen[i] and chosen[j]):
+                continue
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            reach = ri + rj
+            u = reach - math.sqrt((hot[j, X] - hot[i, X]) ** 2 + (hot[j, Y] - hot[i, Y]) ** 2)
+            two_rt = 4.0 * ri * rj / reach
+            area = laws.bond_area(two_rt, spheres)
+            law = bonds[kind]
+            if law[KIND] == laws.ELASTIC_BOND:
+                fn, _ = laws.elastic_bond(law[E_MOD], law[G_MOD], area, reach, u)
+                limit = law[TENSILE] * area
+            else:
+                q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
+                fn, _ = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
+                limit = law[TENSILE]
+            if u < 0.0 and laws.bond_failure(law[KIND], fn, 0.0, law[TENSILE], law[SHEAR], 0.0, area) == (
+                laws.BREAKS_IN_TENSION
+            ):
+                number += 1
+                widest = max(widest, limit * u / fn)
+    return number, widest
+
+
 def bond_table(bonds: np.ndarray) -> np.ndarray:
     """Bond types for the force loop: (types, 4) f8 [E, G, tensile, shear].
 

@@ -77,17 +77,10 @@ def fill_body(hot, ihot, icold, n_left, density, damp, shape, dt, body):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def survey(hot, n_left, n_own, origin, dt, out):
-    """Largest path since the list was built squared, speed squared, |v| dt / R, and 1 if a number is not finite.
-
-    origin (n_own, 2) f8: positions when the list was built. out (4,) f8. All four are maxima, so their global
-    value does not depend on how particles are shared out. A running maximum would drop NaN; it is asked for on its own.
-    """
-    path2 = 0.0
-    speed2 = 0.0
-    stride = 0.0
-    broken = 0.0
-    for c in range(n_own):
+def _survey(hot, n_left, first, end, origin, dt, out):
+    """Add the owned particles first : end to what `survey` has found."""
+    path2, speed2, stride, broken = out[PATH2], out[SPEED2], out[STRIDE], out[BROKEN]
+    for c in range(first, end):
         i = n_left + c
         dx = hot[i, X] - origin[c, 0]
         dy = hot[i, Y] - origin[c, 1]
@@ -100,3 +93,19 @@ def survey(hot, n_left, n_own, origin, dt, out):
         speed2 = max(speed2, v2)
         stride = max(stride, math.sqrt(v2) * abs(dt) / hot[i, RADIUS])
     out[PATH2], out[SPEED2], out[STRIDE], out[BROKEN] = path2, speed2, stride, broken
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def survey(hot, n_left, n_own, origin, dt, without, out):
+    """Largest path since the list was built squared, speed squared, |v| dt / R, and 1 if a number is not finite; of all
+    but the owned particles `without` (m,) i8, ascending.
+
+    origin (n_own, 2) f8: positions when the list was built. out (4,) f8. All four are maxima, so their global
+    value does not depend on how particles are shared out. A running maximum would drop NaN; it is asked for on its own.
+    """
+    out[PATH2], out[SPEED2], out[STRIDE], out[BROKEN] = 0.0, 0.0, 0.0, 0.0
+    first = 0
+    for c in without:
+        _survey(hot, n_left, first, c, origin, dt, out)
+        first = c + 1
+    _survey(hot, n_left, first, n_own, origin, dt, out)

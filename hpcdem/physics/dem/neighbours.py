@@ -19,7 +19,7 @@ from numba import njit, prange
 from hpcdem.cells import COLUMN, column
 from hpcdem.fields import GID, RADIUS, WIDTH, X, Y
 from hpcdem.memory import aligned
-from hpcdem.physics.dem import histories, wall_slots
+from hpcdem.physics.dem import fast, histories, wall_slots
 from hpcdem.physics.dem.contacts import LONGEST2
 from hpcdem.physics.dem.histories import BOND, EXTRA, PARTNER, SHEAR, Histories
 
@@ -32,6 +32,7 @@ SLOTS_PER_ROW = 6
 """Room for the list at first; discs of similar size need half of it."""
 SLOTS_IN_CLUMPS = 24
 """The same where members of clumps lie upon each other; such pairs leave the list again."""
+NO_ROWS, NO_REACH = np.empty(0, np.int64), np.empty(0)
 
 
 class Blocks(NamedTuple):
@@ -167,14 +168,32 @@ def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
-    t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    t, begin, room, more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
     where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
 
-    bond2 [m^2]: bonded pairs are listed up to this distance, negative if there are none. Returns slots needed, bonds
-    placed, longest bonded distance squared.
+    bond2 [m^2]: bonded pairs are listed up to this distance, negative if there are none; more (k,) i8: pairs of fast
+    particles (fast.py). Returns slots needed, bonds placed, longest bonded distance squared.
     """
+    n, placed, longest2 = _fill_near(
+        t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+        where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+    )  # fmt: skip
+    if len(more) == 0 or n + len(more) > room:
+        return n + len(more), placed, longest2
+    n = fast.merge(t, begin, n, more, cut, lo, poff, ptr, row, partner, fs, bond, u_made)
+    if len(hrows) > 0:  # of a restart, where lists are those of earlier places, fast ones may touch by now
+        _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made)
+    return n, placed, longest2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill_near(
+    t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+):  # fmt: skip
+    """The pairs that are nearer than contact plus skin, or bonded; as `_fill`."""
     n = _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, row, partner)
     if n > room:
         return n, 0, 0.0
@@ -198,12 +217,12 @@ def _fill_blocks(n_blocks, need, placed, longest2, begin, room, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def _fill_blocks_threaded(
     n_blocks, need, placed, longest2, begin, room,
-    hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+    more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
     where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
 ):  # fmt: skip
     for t in prange(n_blocks):
         need[t], placed[t], longest2[t] = _fill(
-            t, begin[t], room[t], hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
+            t, begin[t], room[t], more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
             where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
         )  # fmt: skip
 
@@ -244,6 +263,15 @@ class ContactLists:
         """What the contacts of the owned particles remember now."""
         return histories.taken_out(self, ihot)
 
+    def force_rows(self) -> np.ndarray:
+        """Rows (n_own,) of `force` in which the owned particles have their sums."""
+        rows = np.empty(self.n_own, np.int64)
+        cut, lo, _, _, foff = self.blocks
+        for t in range(self.n_blocks):
+            a, b = cut[t], cut[t + 1]
+            rows[a - self.n_left : b - self.n_left] = foff[t] - lo[t] + np.arange(a, b)
+        return rows
+
     def owned_forces(self) -> np.ndarray:
         """Sum of contact forces and torque on each owned particle, (n_own, 3) f8 copy."""
         out = np.empty((self.n_own, 3))
@@ -278,15 +306,16 @@ def gauge(hot, n_left, n_own, box):
     return largest, 0.0 if inside else 1.0
 
 
-def make_blocks(cell: np.ndarray, n_left: int, n_own: int, n_blocks: int) -> Blocks:
-    """Cut the owned rows into n_blocks runs of equal length, and find the rows each may touch (cell ascending)."""
+def make_blocks(cell: np.ndarray, n_left: int, n_own: int, n_blocks: int, columns: int = 1) -> Blocks:
+    """Cut the owned rows into n_blocks runs of equal length, and find the rows each may touch (cell ascending), up to
+    so many columns away."""
     cut = n_left + (np.arange(n_blocks + 1, dtype=np.int64) * n_own) // n_blocks
     lo, hi = cut[:-1].copy(), cut[:-1].copy()
     for t in range(n_blocks):
         if cut[t + 1] > cut[t]:
             # All of the columns before and after: rows beyond them cannot reach in, so they are no rows of the list.
-            lo[t] = np.searchsorted(cell, int(column(cell[cut[t]]) - 1) * COLUMN - COLUMN // 2)
-            hi[t] = np.searchsorted(cell, int(column(cell[cut[t + 1] - 1]) + 2) * COLUMN - COLUMN // 2)
+            lo[t] = np.searchsorted(cell, int(column(cell[cut[t]]) - columns) * COLUMN - COLUMN // 2)
+            hi[t] = np.searchsorted(cell, int(column(cell[cut[t + 1] - 1]) + columns + 1) * COLUMN - COLUMN // 2)
     rows = np.maximum(cut[1:] - lo, 0) + 1
     poff = np.concatenate(([0], np.cumsum(rows)[:-1])).astype(np.int64)
     foff = np.concatenate(([0], np.cumsum(hi - lo)[:-1])).astype(np.int64)
@@ -307,16 +336,19 @@ def build(
     bond_reach: float,
     n_blocks: int,
     clump: np.ndarray | None = None,
+    fast_ones: fast.Fast | None = None,
+    columns: int = 1,
 ) -> ContactLists:
     """Make the lists for particles stored in global order.
 
     hot (n, 8) f8 rows [left ghosts | owned | right ghosts]; cell (n,) i8: keys of their cells of this side [m]; hist:
     of the owned particles, that of the c-th stands at where[c]; walls (w, 8) f8; largest radius [m]; skin [m];
     bond_reach [m]: bonded pairs are listed up to this distance, 0 if there are none; clump (n,) i8: number of the rigid
-    clump of each row, -1 for none: members of one clump are no pairs (None: there are no clumps).
+    clump of each row, -1 for none: members of one clump are no pairs (None: there are no clumps); fast_ones: particles
+    with a reach of their own, whose partners lie up to so many columns away.
     """
     ihot = hot.view(np.int64)
-    lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks))
+    lists = ContactLists(n_left, n_own, make_blocks(cell, n_left, n_own, n_blocks, columns))
     blocks = lists.blocks
     span = np.maximum(blocks.cut[1:] - blocks.lo, 0)
     lists.ptr = np.zeros(int((span + 1).sum()), np.int64)
@@ -324,6 +356,11 @@ def build(
     room = (SLOTS_PER_ROW if clump is None else SLOTS_IN_CLUMPS) * span + 64
     siblings = np.empty(0, np.int64) if clump is None else clump
     bond2 = bond_reach**2 if bond_reach > 0.0 else -1.0
+    more, fast_rows, reach = NO_ROWS, NO_ROWS, NO_REACH
+    if fast_ones is not None and len(fast_ones):
+        fast_rows, at = fast_ones.among(ihot[:, GID])
+        reach = fast_ones.reach[at]
+        more = fast.pairs(hot, cell, fast_rows, reach, 0.5 * skin, columns, siblings)
     fill = _fill_blocks if n_blocks == 1 else _fill_blocks_threaded
     while True:
         begin = np.concatenate(([0], np.cumsum(room)[:-1])).astype(np.int64)
@@ -332,7 +369,7 @@ def build(
             lists.ptr, np.empty(m, np.int32), np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m),
         )  # fmt: skip
         fill(
-            n_blocks, need, placed, longest2, begin, room, hot, ihot, cell, siblings, n_left, n_own,
+            n_blocks, need, placed, longest2, begin, room, more, hot, ihot, cell, siblings, n_left, n_own,
             blocks.cut, blocks.lo, blocks.hi, blocks.poff, skin, bond2,
             where, hist.ptr, hist.rows, hist.rows.view(np.int64), *slots,
         )  # fmt: skip
@@ -343,5 +380,5 @@ def build(
     lists.bonds_placed = int(placed.sum())
     lists.tally[:, LONGEST2] = longest2
     lists.n_pairs = int(need.sum())
-    wall_slots.place(lists, hot, cell, hist, where, walls, side, largest, skin)
+    wall_slots.place(lists, hot, cell, hist, where, walls, side, largest, skin, fast_rows, reach)
     return lists

@@ -19,9 +19,10 @@ from hpcdem.physics.dem.walls import P1X, P1Y, P2X, P2Y, closest
 
 def place(
     lists: Any, hot: np.ndarray, cell: np.ndarray, hist: Histories, where: np.ndarray, walls: np.ndarray,
-    side: float, largest: float, skin: float,
+    side: float, largest: float, skin: float, fast_rows: np.ndarray, reach: np.ndarray,
 ) -> None:  # fmt: skip
-    """Give the lists their wall slots, with histories; arguments as in neighbours.build."""
+    """Give the lists their wall slots, with histories; arguments as in neighbours.build. fast_rows (m,): storage rows
+    of the fast particles, ascending, and their reach [m] (fast.py)."""
     memory = _who_remembers(where, hist.ptr, hist.partner)
     n = room = lists.n_own // 16 + 64
     while n >= room:
@@ -29,7 +30,7 @@ def place(
         rows, which, fs, at_side = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), np.empty(room)
         n = _find(
             hot, cell, lists.n_left, lists.n_own, walls, side, largest, skin, memory, where,
-            hist.ptr, hist.partner, hist.fs, hist.extra, rows, which, fs, at_side,
+            hist.ptr, hist.partner, hist.fs, hist.extra, fast_rows, reach, rows, which, fs, at_side,
         )  # fmt: skip
     lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side = (
         column[:n].copy() for column in (rows, which, fs, at_side)
@@ -84,9 +85,10 @@ def _is_near(wall, x, y, reach):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _find(
     hot, cell, n_left, n_own, walls, side, largest, skin, memory, where, hptr, hpartner, hfs, hextra,
-    slot_row, slot_wall, slot_fs, slot_side,
+    fast_rows, fast_reach, slot_row, slot_wall, slot_fs, slot_side,
 ):  # fmt: skip
-    """Owned particles within R + skin of a wall, or with a history there, sorted by row then wall.
+    """Owned particles within R + skin of a wall (of fast ones half the skin is their reach), or with a history there,
+    sorted by row then wall.
 
     Returns the number of slots needed; slots past the end of the arrays are counted only.
     """
@@ -94,6 +96,7 @@ def _find(
     begin, end = np.empty(n_walls, np.int64), np.empty(n_walls, np.int64)
     n, m = 0, 0
     i, stop = n_left, n_left + n_own
+    f = first_not_before(fast_rows, i, 0, len(fast_rows))
     while i < stop:
         at = column(cell[i])
         beyond = (at + 1) * COLUMN - COLUMN // 2
@@ -112,6 +115,8 @@ def _find(
                     following = min(following, max(i, begin[w]))
             if m < len(memory):
                 following = min(following, n_left + memory[m])
+            if f < len(fast_rows):
+                following = min(following, fast_rows[f])
             i = following
             if i >= column_end:
                 break
@@ -121,12 +126,16 @@ def _find(
                 first, last = hptr[c], hptr[c + 1]
                 m += 1
             x, y, reach = hot[i, X], hot[i, Y], hot[i, RADIUS] + skin
+            is_fast = f < len(fast_rows) and fast_rows[f] == i
+            if is_fast:
+                reach += fast_reach[f] - 0.5 * skin
+                f += 1
             for w in range(n_walls):
                 known = -1
                 for q in range(first, last):
                     if hpartner[q] == -1 - w:
                         known = q
-                if known < 0 and not (begin[w] <= i < end[w] and _is_near(walls[w], x, y, reach)):
+                if known < 0 and not ((is_fast or begin[w] <= i < end[w]) and _is_near(walls[w], x, y, reach)):
                     continue
                 if n < len(slot_row):
                     slot_row[n], slot_wall[n] = i, w

@@ -3,8 +3,12 @@
 phi = 3 min(lambda_k) inside a triangle, lambda_k its barycentric coordinates. An edge of one triangle, the contactor,
 with length L and outward normal n takes the force -P L n int phi dt from the other, the target, t from 0 to 1 along the
 edge; it falls on the two ends by the first moment of phi, and its opposite on the corners of the target by lambda at
-the centre of the force. All three edges of both triangles are contactors. phi along an edge is piecewise linear, so all
-integrals are exact.
+the centre of the force. Free edges of both triangles are contactors (the opposite sides of an inner edge would take
+opposite forces). phi along an edge is piecewise linear, so all integrals are exact.
+
+A row of the list has one set of properties for all its edges. Where edges of a pair differ it stands in several rows,
+each with some of the edges; where the target has faces of several kinds the row has one edge, and takes the properties
+of the face that this edge touches, as it lies now (`_choose`).
 
 Friction: each (edge, target) remembers a force F_s along the edge, F_s -= P_s l v_s dt, |F_s| <= tan(phi) F_n, with l
 the part of the edge inside the target and v_s the sliding speed at the centre of the force (Cundall & Strack 1979).
@@ -25,6 +29,7 @@ from hpcdem.physics.lanes import (
     CAPACITY,
     GROUP,
     U,
+    as_bits,
     four_columns,
     lane,
     put_four_columns,
@@ -37,20 +42,26 @@ BATCH = 32
 ENOUGH = 32
 """Pairs that are worked on together, at least."""
 
-# Columns of the table of pairs (m, 4): normal penalty, shear penalty [Pa], tangent of the friction angle, and which of
-# the two triangles is half of a quad (1: the first, 2: the second, 3: both); its third edge lies inside the quad.
-PENALTY, SHEAR, TAN_PHI, HALVES = range(4)
+# Columns of the table of pairs (m, 4): normal penalty, shear penalty [Pa], tangent of the friction angle, and a code.
+# Code, an integer (its bits): 1 where the first triangle is half of a quad, 2 the second (its third edge lies inside),
+# and 4 << k for each contactor k, edges 0 to 2 of the first triangle, then those of the second.
+PENALTY, SHEAR, TAN_PHI, CODE = range(4)
 PAIR = 4
+ALL_EDGES = 4 * 63
 # What a pair remembers (m, 6): F_s [N/m] of the edges of the first, then of the second triangle.
 EDGES = 6
-# Normal damping, where a model asks for it: table (m, 2) of T [Pa] and exponent b, memory (m, 12): largest overlap [m]
-# of the six edges, then the normal stress there [Pa].
-LARGEST_STRESS, EXPONENT = 0, 1
-DAMPER = 2
+# Normal damping, where a model asks for it: table (m, 3) of T [Pa], exponent b, dashpot [Pa s/m], memory (m, 12):
+# largest overlap [m] of the six edges, then the normal stress there [Pa].
+LARGEST_STRESS, EXPONENT, DASHPOT = 0, 1, 2
+DAMPER = 3
+# Faces that a target can be touched at (q, 10): a corner of the target at which the face begins (END 1) or ends (-1),
+# the face as a combination of the target's first two edges from its first corner, and the properties it then has.
+CORNER, END, ALONG_2, ALONG_3, PROPERTIES = 0, 1, 2, 3, 4
+CHOICE = PROPERTIES + 3 + DAMPER
 
 (AX1, AY1, AX2, AY2, AX3, AY3, _, _, BX1, BY1, BX2, BY2, BX3, BY3, _, _,
  AVX1, AVY1, AVX2, AVY2, AVX3, AVY3, _, _, BVX1, BVY1, BVX2, BVY2, BVX3, BVY3, _, _,
- P, PS, MU, HALF, FS, _, _, _, _, _) = (lane(k) for k in range(42))  # fmt: skip
+ P, PS, MU, WHICH, FS, _, _, _, _, _) = (lane(k) for k in range(42))  # fmt: skip
 _A = ((AX1, AY1), (AX2, AY2), (AX3, AY3))
 _B = ((BX1, BY1), (BX2, BY2), (BX3, BY3))
 _VA = ((AVX1, AVY1), (AVX2, AVY2), (AVX3, AVY3))
@@ -58,13 +69,16 @@ _VB = ((BVX1, BVY1), (BVX2, BVY2), (BVX3, BVY3))
 _IN_B = tuple(tuple(lane(42 + 3 * c + k) for k in range(3)) for c in range(3))
 """Lanes of the barycentric coordinates of the corners of A in B; and the other way round."""
 _IN_A = tuple(tuple(lane(51 + 3 * c + k) for k in range(3)) for c in range(3))
-WITHIN_A, WITHIN_B = lane(72), lane(73)
+ON = 72
+"""First of the lanes of the six edges: 1 where it is a contactor, else 0."""
+_ON = tuple(lane(ON + k) for k in range(6))
+WITHIN_A, WITHIN_B = lane(78), lane(79)
 """1 where the triangle is half of a quad, else 0."""
-LESS = lane(74)
+LESS = lane(80)
 """What damping leaves of the normal force of the edge at hand."""
 FORCES = 60
 """First of the lanes of the forces (fx, fy) on the three corners of A, then of B."""
-LANES = 75
+LANES = 81
 ROOM = CAPACITY
 _ONE, _TWO, _THREE, _FOUR = U(1), U(2), U(3), U(4)
 _NEXT, _AFTER, _LAST = lane(1), lane(2), lane(4)
@@ -214,17 +228,16 @@ def edge_integral(a1, a2, a3, b1, b2, b3, aside):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _edge(
-    xa, ya, xb, yb, ua, wa, ub, wb, u1, w1, u2, w2, u3, w3, a1, a2, a3, b1, b2, b3, aside, outer, penalty, stiff, mu,
-    old, less, dt,
+    xa, ya, xb, yb, ua, wa, ub, wb, u1, w1, u2, w2, u3, w3, a1, a2, a3, b1, b2, b3, aside, penalty, stiff, mu, old,
+    less, dt,
 ):  # fmt: skip
     """One edge of the contactor, from (xa, ya) to (xb, yb), in the target: normal force times `less` and friction.
 
-    u, w: velocities of the ends a, b and of the target's corners 1, 2, 3; a_k, b_k, aside: see `edge_integral`; outer:
-    0 where the edge lies inside a quad, else 1; old: F_s so far. Returns F_s, the force (x, y) on the contactor, where
-    along the edge it acts, and the barycentric coordinates of that place in the target.
+    u, w: velocities of the ends a, b and of the target's corners 1, 2, 3; a_k, b_k, aside: see `edge_integral`;
+    penalty: 0 where the edge is no contactor, so that nothing acts; old: F_s so far. Returns F_s, the force (x, y) on
+    the contactor, where along the edge it acts, and the barycentric coordinates of that place in the target.
     """
     zero, one, length, _ = edge_integral(a1, a2, a3, b1, b2, b3, aside)
-    zero, one = outer * zero, outer * one
     ex, ey = xb - xa, yb - ya
     size = math.sqrt(ex * ex + ey * ey)
     inverse = 1.0 / size
@@ -252,8 +265,7 @@ def _edge_loop(side, m):
     (xa, ya), (xb, yb), (ua, wa), (ub, wb) = own[m], own[m2], mine[m], mine[m2]
     (u1, w1), (u2, w2), (u3, w3) = hers
     (a1, a2, a3), (b1, b2, b3) = (_IN_B, _IN_A)[side][m], (_IN_B, _IN_A)[side][m2]
-    old, aside, inner = lane(36 + 3 * side + m), (WITHIN_B, WITHIN_A)[side], (WITHIN_A, WITHIN_B)[side]
-    last = 1.0 if m == 2 else 0.0  # only the third edge can lie inside a quad
+    old, aside, on = lane(36 + 3 * side + m), (WITHIN_B, WITHIN_A)[side], lane(ON + 3 * side + m)
     first, second, target = (lane(FORCES + k) for k in (6 * side + 2 * m, 6 * side + 2 * m2, 6 - 6 * side))
 
     @njit(cache=True, nogil=True, error_model="numpy")
@@ -264,8 +276,8 @@ def _edge_loop(side, m):
                 lanes[ua + e], lanes[wa + e], lanes[ub + e], lanes[wb + e],
                 lanes[u1 + e], lanes[w1 + e], lanes[u2 + e], lanes[w2 + e], lanes[u3 + e], lanes[w3 + e],
                 lanes[a1 + e], lanes[a2 + e], lanes[a3 + e], lanes[b1 + e], lanes[b2 + e], lanes[b3 + e],
-                1e30 * lanes[aside + e], 1.0 - last * lanes[inner + e],
-                lanes[P + e], lanes[PS + e], lanes[MU + e], lanes[old + e], lanes[LESS + e], dt,
+                1e30 * lanes[aside + e], lanes[on + e] * lanes[P + e], lanes[PS + e], lanes[MU + e], lanes[old + e],
+                lanes[LESS + e], dt,
             )  # fmt: skip
             lanes[old + e] = shear
             rest = 1.0 - t
@@ -294,19 +306,25 @@ def _damp(n, side, m, slots, dampers, largest, lanes):
 
     While surfaces approach sigma = min(sigma_try, T), sigma_try the mean normal stress on the part inside; below the
     largest overlap o_max it is min(sigma_try, sigma(o_max) (o / o_max)^b). o: largest of 3-lambda depth times the mean
-    altitude of the target.
+    altitude of the target. A dashpot adds c v, v the speed of approach at the centre of the force, without pulling
+    (Cundall & Strack 1979), on edges that look against the nearest side of the target: others, at acute corners, would
+    hold back what parts.
     """
     size = U(CAPACITY)
+    on = U((ON + 3 * side + m) * CAPACITY)
+    x_a, x_b = U((8 * side + 2 * m) * CAPACITY), U((8 * side + 2 * ((m + 1) % 3)) * CAPACITY)
+    v_a, v_b, v_t = x_a + U(16 * CAPACITY), x_b + U(16 * CAPACITY), U((24 - 8 * side) * CAPACITY)
     from_a, from_b = U((42 + 9 * side + 3 * m) * CAPACITY), U((42 + 9 * side + 3 * ((m + 1) % 3)) * CAPACITY)
     target, within = U((8 - 8 * side) * CAPACITY), WITHIN_B if side == 0 else WITHIN_A
     for e in range(U(n)):
         k = slots[e]
         most, exponent = dampers[DAMPER * k + LARGEST_STRESS], dampers[DAMPER * k + EXPONENT]
+        dashpot = dampers[DAMPER * k + DASHPOT]
         lanes[LESS + e] = 1.0
-        if most == math.inf and exponent == 1.0:
+        if (most == math.inf and exponent == 1.0 and dashpot == 0.0) or lanes[on + e] == 0.0:
             continue
         a, b, t = from_a + e, from_b + e, target + e
-        zero, _, length, deepest = edge_integral(
+        zero, one, length, deepest = edge_integral(
             lanes[a], lanes[a + size], lanes[a + _TWO * size], lanes[b], lanes[b + size], lanes[b + _TWO * size],
             1e30 * lanes[within + e],
         )  # fmt: skip
@@ -326,7 +344,76 @@ def _damp(n, side, m, slots, dampers, largest, lanes):
             largest[at], largest[at + EDGES] = overlap, stress
         else:
             stress = min(wanted, largest[at + EDGES] * (overlap / largest[at]) ** exponent)
+        if dashpot > 0.0:
+            place, c = one / zero, v_t + e
+            ex, ey = lanes[x_b + e] - lanes[x_a + e], lanes[x_b + size + e] - lanes[x_a + size + e]
+            vx = lanes[v_a + e] + place * (lanes[v_b + e] - lanes[v_a + e])
+            vy = lanes[v_a + size + e] + place * (lanes[v_b + size + e] - lanes[v_a + size + e])
+            least, against = math.inf, 0.0
+            for k3 in range(_THREE):
+                part = lanes[a + k3 * size] + place * (lanes[b + k3 * size] - lanes[a + k3 * size])
+                vx -= part * lanes[c + _TWO * k3 * size]
+                vy -= part * lanes[c + (_TWO * k3 + _ONE) * size]
+                if part < least and (k3 != _ONE or lanes[within + e] == 0.0):
+                    q, r = t + _TWO * ((k3 + _ONE) % _THREE) * size, t + _TWO * ((k3 + _TWO) % _THREE) * size
+                    least = part
+                    against = ex * (lanes[r] - lanes[q]) + ey * (lanes[r + size] - lanes[q + size])
+            approach = (vx * ey - vy * ex) / math.sqrt(ex * ex + ey * ey)
+            if against < 0.0:
+                stress = max(0.0, stress + dashpot * approach)
         lanes[LESS + e] = stress / wanted
+
+
+@njit(cache=True, error_model="numpy")
+def inside(xa, ya, xb, yb, x1, y1, x2, y2, x3, y3):
+    """The part t0..t1 of the edge from a to b that lies in a triangle; t1 <= t0: none."""
+    ux, uy, wx, wy = x1 - x3, y1 - y3, x2 - x3, y2 - y3
+    det = ux * wy - uy * wx
+    a1, b1 = ((xa - x3) * wy - (ya - y3) * wx) / det, ((xb - x3) * wy - (yb - y3) * wx) / det
+    a2, b2 = (ux * (ya - y3) - uy * (xa - x3)) / det, (ux * (yb - y3) - uy * (xb - x3)) / det
+    t0, t1 = _clip(a1, b1 - a1, 0.0, 1.0)
+    t0, t1 = _clip(a2, b2 - a2, t0, t1)
+    return _clip((1.0 - a1) - a2, (a1 - b1) + (a2 - b2), t0, t1)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _choose(n, slots, first, second, x_place, x, pairs, dampers, chosen, choice_begin, choices):
+    """Properties of those of n rows whose target has faces of several kinds, into pairs and dampers: of the face that
+    is nearest to the middle of the part inside, among those that look against the edge if there are any."""
+    for e in range(n):
+        k = slots[e]
+        c = chosen[k]
+        if c < 0:
+            continue
+        code = as_bits(pairs[PAIR * k + CODE]) >> 2
+        m = 0
+        while code >> m & 1 == 0:
+            m += 1
+        own, other = (first[k], second[k]) if m < 3 else (second[k], first[k])
+        a, b, t = x_place[own] + 2 * (m % 3), x_place[own] + 2 * ((m + 1) % 3), x_place[other]
+        ex, ey = x[b] - x[a], x[b + 1] - x[a + 1]
+        t0, t1 = inside(
+            x[a], x[a + 1], x[b], x[b + 1], x[t], x[t + 1], x[t + 2], x[t + 3], x[t + 4], x[t + 5]
+        )  # fmt: skip
+        middle = 0.5 * (t0 + t1) if t1 > t0 else 0.5
+        px, py = x[a] + middle * ex, x[a + 1] + middle * ey
+        best, nearest, against = -1, math.inf, False
+        for q in range(choice_begin[c], choice_begin[c + 1]):
+            face = choices[q]
+            corner = t + 2 * int(face[CORNER])
+            gx = face[ALONG_2] * (x[t + 2] - x[t]) + face[ALONG_3] * (x[t + 4] - x[t])
+            gy = face[ALONG_2] * (x[t + 3] - x[t + 1]) + face[ALONG_3] * (x[t + 5] - x[t + 1])
+            gx, gy = face[END] * gx, face[END] * gy  # away from the corner
+            dx, dy = px - x[corner], py - x[corner + 1]
+            along = min(1.0, max(0.0, (dx * gx + dy * gy) / (gx * gx + gy * gy)))
+            distance = (dx - along * gx) ** 2 + (dy - along * gy) ** 2
+            opposed = face[END] * (ex * gx + ey * gy) < 0.0
+            if best < 0 or (opposed and not against) or (opposed == against and distance < nearest):
+                best, nearest, against = q, distance, opposed
+        for p in range(3):
+            pairs[PAIR * k + p] = choices[best, PROPERTIES + p]
+        for p in range(min(len(dampers), DAMPER)):
+            dampers[DAMPER * k + p] = choices[best, PROPERTIES + 3 + p]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -373,13 +460,19 @@ def _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers
         two_columns(
             lanes, FS + U(4 * CAPACITY) + e, memory, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
         )
+    for e in range(U(n)):
+        code = as_bits(lanes[WHICH + e])
+        lanes[_ON[0] + e] = 1.0 if code & 4 != 0 else 0.0
+        lanes[_ON[1] + e] = 1.0 if code & 8 != 0 else 0.0
+        lanes[_ON[2] + e] = 1.0 if code & 16 != 0 else 0.0
+        lanes[_ON[3] + e] = 1.0 if code & 32 != 0 else 0.0
+        lanes[_ON[4] + e] = 1.0 if code & 64 != 0 else 0.0
+        lanes[_ON[5] + e] = 1.0 if code & 128 != 0 else 0.0
+        lanes[WITHIN_A + e] = 1.0 if code & 1 != 0 else 0.0
+        lanes[WITHIN_B + e] = 1.0 if code & 2 != 0 else 0.0
     for c in range(U(12)):
         for e in range(U(n)):
             lanes[U(FORCES * CAPACITY) + c * U(CAPACITY) + e] = 0.0
-    for e in range(U(n)):
-        half = lanes[HALF + e]
-        lanes[WITHIN_A + e] = 1.0 if (half == 1.0) | (half == 3.0) else 0.0
-        lanes[WITHIN_B + e] = 1.0 if half >= 2.0 else 0.0
     _a_in_b(n, lanes)
     _b_in_a(n, lanes)
     if len(dampers) > 0:
@@ -411,7 +504,10 @@ def _put(n, slots, out, memory, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _forces(t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, touching, out, dt):
+def _forces(
+    t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin, choices,
+    touching, out, dt,
+):  # fmt: skip
     lanes, slots = np.zeros(LANES * CAPACITY), np.zeros(ROOM, np.int64)
     candidates, flags = np.zeros(BATCH + GROUP, np.int64), np.zeros(BATCH + GROUP, np.int64)
     x, v, pairs, memory = x.reshape(x.size), v.reshape(v.size), pairs.reshape(pairs.size), memory.reshape(memory.size)
@@ -442,6 +538,8 @@ def _forces(t, threads, first, second, x_place, v_place, x, v, pairs, memory, da
             continue
         for e in range(n, n + GROUP):
             slots[e] = slots[max(n - 1, 0)]
+        if len(chosen) > 0:
+            _choose(n, slots, first, second, x_place, x, pairs, dampers, chosen, choice_begin, choices)
         if n > 0:
             _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, dt, lanes)
         _put(n, slots, out, memory, lanes)
@@ -453,19 +551,58 @@ def forces(threads, *args):
     """Forces of all pairs; histories move on by dt.
 
     first, second (m,) i8: bodies of each pair; x_place, v_place (bodies,) i8: where their corners begin in x and v
-    (flat); pairs (m, 4), memory (m, 6), dampers (m, 2), largest (m, 12): see above, the last two without rows if
-    nothing is damped; touching (m,) u1: pairs that overlap; out (m, 12) [N/m]: forces on the corners of the first and
-    of the second body, valid where they touch.
+    (flat); pairs (m, 4), memory (m, 6), dampers (m, 3), largest (m, 12): see above, the last two without rows if
+    nothing is damped; chosen (m,) i8: rows whose properties are chosen, number in choice_begin, else -1; choice_begin
+    (n + 1,) i8: rows of choices (q, 10); without rows if there are none; touching (m,) u1: pairs that overlap; out
+    (m, 12) [N/m]: forces on the corners of the first and of the second body, valid where they touch.
     """
     for t in range(threads):
         _forces(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, touching, out, dt):
+def forces_threaded(
+    threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin, choices,
+    touching, out, dt,
+):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
-        _forces(t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, touching, out, dt)
+        _forces(
+            t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin,
+            choices, touching, out, dt,
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def depths(first, second, free, x_place, x, depth):
+    """How deep the free edges (bits of `free`) of the two bodies of each pair are in the other one: depth (m, 3) [m],
+    and where. It is the distance to the nearest side of the target, so no more than the radius of its inscribed circle.
+    """
+    x = x.reshape(x.size)
+    for p in range(len(first)):
+        depth[p] = 0.0
+        for side in range(2):
+            own, other = (first[p], second[p]) if side == 0 else (second[p], first[p])
+            o, t = x_place[own], x_place[other]
+            for m in range(3):
+                if free[own] >> m & 1 == 0:
+                    continue
+                a, b = o + 2 * m, o + 2 * ((m + 1) % 3)
+                t0, t1 = inside(
+                    x[a], x[a + 1], x[b], x[b + 1], x[t], x[t + 1], x[t + 2], x[t + 3], x[t + 4], x[t + 5]
+                )  # fmt: skip
+                if not t1 > t0:
+                    continue
+                for k in range(9):
+                    part = t0 + (t1 - t0) * k / 8
+                    px, py = x[a] + part * (x[b] - x[a]), x[a + 1] + part * (x[b + 1] - x[a + 1])
+                    least = math.inf
+                    for c in range(3):
+                        q, r = t + 2 * c, t + 2 * ((c + 1) % 3)
+                        gx, gy = x[r] - x[q], x[r + 1] - x[q + 1]
+                        least = min(least, (gx * (py - x[q + 1]) - gy * (px - x[q])) / math.sqrt(gx * gx + gy * gy))
+                    if least > depth[p, 0]:
+                        depth[p, 0], depth[p, 1], depth[p, 2] = least, px, py
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,7 +1,8 @@
 """Who may touch whom until something has moved half the buffer: pairs of triangles whose boxes come near each other.
 
-Only triangles (or halves of quads, along the shorter diagonal) of elements with a free face are looked at. The pairs
-found are all whose boxes, half the buffer wider on every side, overlap: that does not depend on how they are found.
+Only triangles (or halves of quads, along the shorter diagonal) with a corner on a free face are looked at. The pairs
+found are all in which the box around the free faces of one and that around the other, half the buffer wider on every
+side, overlap: that does not depend on how they are found.
 
 Left out are two elements whose common face holds, and two that share no face but a point around which they still hang
 together. Across an open face they touch, also where it ends (at the tip of a crack): otherwise they would sink into
@@ -10,6 +11,8 @@ each other there, and be thrown apart when the crack goes on.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -17,8 +20,9 @@ from hpcdem.cells import COLUMN, index
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def boxes(body_place, x, buffer, box):
-    """Boxes (n, 4) left, bottom, right, top of triangles, `buffer` / 2 wider; body_place: where in flat x."""
+def boxes(body_place, free, x, buffer, box, around_faces):
+    """Boxes (n, 4) left, bottom, right, top of triangles, and around their free edges (bits of `free`; without any:
+    nowhere), `buffer` / 2 wider; body_place: where in flat x."""
     x = x.reshape(x.size)
     half = 0.5 * buffer
     for i in range(len(body_place)):
@@ -27,6 +31,20 @@ def boxes(body_place, x, buffer, box):
         box[i, 1] = min(x[p + 1], x[p + 3], x[p + 5]) - half
         box[i, 2] = max(x[p], x[p + 2], x[p + 4]) + half
         box[i, 3] = max(x[p + 1], x[p + 3], x[p + 5]) + half
+        around_faces[i, :2], around_faces[i, 2:] = math.inf, -math.inf
+        for k in range(3):
+            if free[i] >> k & 1:
+                a, b = p + 2 * k, p + 2 * ((k + 1) % 3)
+                around_faces[i, 0] = min(around_faces[i, 0], min(x[a], x[b]) - half)
+                around_faces[i, 1] = min(around_faces[i, 1], min(x[a + 1], x[b + 1]) - half)
+                around_faces[i, 2] = max(around_faces[i, 2], max(x[a], x[b]) + half)
+                around_faces[i, 3] = max(around_faces[i, 3], max(x[a + 1], x[b + 1]) + half)
+
+
+@njit(cache=True, error_model="numpy")
+def _meet(a, b):
+    """Whether two boxes overlap."""
+    return max(a[0], b[0]) <= min(a[2], b[2]) and max(a[1], b[1]) <= min(a[3], b[3])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -79,7 +97,9 @@ def _connected(e, f, cells, partner, closed):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pairs(key, order, body, box, side, element, number, owned, cells, partner, closed, first, second):
+def _pairs(
+    key, order, body, box, around_faces, side, element, number, owned, cells, partner, closed, first, second
+):  # fmt: skip
     """Pairs of bodies into first, second (either of length 0: count only)."""
     write = len(first) > 0
     n = 0
@@ -101,6 +121,8 @@ def _pairs(key, order, body, box, side, element, number, owned, cells, partner, 
                 # A pair that shares several cells counts in that of the corner of what the boxes have in common.
                 if index(left, side) * COLUMN + index(bottom, side) != key[order[a]]:
                     continue
+                if not (_meet(around_faces[i], box[j]) or _meet(around_faces[j], box[i])):
+                    continue
                 if _connected(element[i], element[j], cells, partner, closed):
                     continue
                 if write:
@@ -112,13 +134,14 @@ def _pairs(key, order, body, box, side, element, number, owned, cells, partner, 
 
 
 def find(
-    box: np.ndarray, element: np.ndarray, number: np.ndarray, owned: np.ndarray, cells: np.ndarray,
-    partner: np.ndarray, closed: np.ndarray,
+    box: np.ndarray, around_faces: np.ndarray, element: np.ndarray, number: np.ndarray, owned: np.ndarray,
+    cells: np.ndarray, partner: np.ndarray, closed: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Pairs (i, j) of bodies, i the one of the lower number, in ascending order of (number of i, number of j).
 
-    box (n, 4) of each body; element (n,): its element, number (n,): its own, both of the whole model; owned (n,) bool:
-    pairs of which no body is owned are left out; cells, partner, closed: the mesh, and which faces hold together.
+    box, around_faces (n, 4) of each body, see `boxes`; element (n,): its element, number (n,): its own, both of the
+    whole model; owned (n,) bool: pairs of which no body is owned are left out; cells, partner, closed: the mesh, and
+    which faces hold together.
     """
     if len(box) < 2:
         return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -130,7 +153,7 @@ def find(
     key, body = np.empty(entries, np.int64), np.empty(entries, np.int64)
     _spread(box, side, key, body)
     order = np.argsort(key, kind="stable")
-    args = key, order, body, box, side, element, number, owned, cells, partner, closed
+    args = key, order, body, box, around_faces, side, element, number, owned, cells, partner, closed
     count = _pairs(*args, nothing, nothing)
     first, second = np.empty(count, np.int64), np.empty(count, np.int64)
     if count:

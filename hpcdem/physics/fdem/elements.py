@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.physics.fdem import joints, laws
-from hpcdem.physics.fdem.joints import INTACT, KINETIC, MEMORY, NONE, STEP, YIELDED
+from hpcdem.physics.fdem.joints import INTACT, KINETIC, MEMORY, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
 from hpcdem.physics.lanes import (
     CAPACITY,
     U,
@@ -229,6 +229,15 @@ def _put_velocities(n, first, rows, wide, v, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _kinetic(e, lanes):
+    """Kinetic energy [J/m] of a triangle at the half step before."""
+    v2 = 0.0
+    for c in (VX1, VY1, VX2, VY2, VX3, VY3):
+        v2 += lanes[c + U(e)] ** 2
+    return 0.5 * lanes[MASS + U(e)] * v2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow, table, beyond, step, lanes, tally):
     """Joints behind their peak: those on the list of block b, and those that get there now."""
     if _any_past_peak(n, lanes) < 0:
@@ -240,6 +249,7 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow
                     follow[slot], head[b] = head[b], slot
                     for m in range(MEMORY):
                         memory[slot, m] = 0.0
+                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
                     tally[NEW_YIELDED] += 1
     slot = head[b]
     while slot >= 0:
@@ -256,11 +266,7 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow
         lanes[out], lanes[out + _NEXT], lanes[out + _B], lanes[out + _B + _NEXT] = fax, fay, fbx, fby
         if now != state[slot]:
             state[slot] = now
-            memory[slot, STEP] = step
-            v2 = 0.0
-            for c in (VX1, VY1, VX2, VY2, VX3, VY3):
-                v2 += lanes[c + U(e)] ** 2
-            memory[slot, KINETIC] = 0.5 * lanes[MASS + U(e)] * v2
+            memory[slot, STEP], memory[slot, KINETIC] = step, _kinetic(e, lanes)
             tally[NEW_BROKEN] += 1
         slot = follow[slot]
 
@@ -493,6 +499,15 @@ def _part_rate(p, vel, c, cs, sn):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _quad_kinetic(c, vel):
+    """The same of a quad."""
+    v2 = 0.0
+    for m in range(4):
+        v2 += c[Q_WEIGHT + m] * (vel[2 * m] ** 2 + vel[2 * m + 1] ** 2)
+    return 0.5 * v2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _quads(
     t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
@@ -517,6 +532,7 @@ def _quads(
                 if left < 0.0:
                     state[slot] = YIELDED
                     memory[slot] = 0.0
+                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _quad_kinetic(c[i], vel)
                     tally[t, NEW_YIELDED] += 1
             before = state[slot]
             fax, fay, fbx, fby, now = joints.yielded_edge(
@@ -526,11 +542,7 @@ def _quads(
                 memory[slot] = 0.0
             elif now != before:
                 state[slot] = now
-                memory[slot, STEP] = step
-                v2 = 0.0
-                for m in range(4):
-                    v2 += c[i, Q_WEIGHT + m] * (vel[2 * m] ** 2 + vel[2 * m + 1] ** 2)
-                memory[slot, KINETIC] = 0.5 * v2
+                memory[slot, STEP], memory[slot, KINETIC] = step, _quad_kinetic(c[i], vel)
                 tally[t, NEW_BROKEN] += 1
             bound[2 * k] += fax
             bound[2 * k + 1] += fay

@@ -26,9 +26,10 @@ KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR = range(6)
 PER_O_T, PER_S_T, PER_KOP, PER_HALF_SHEAR = range(4)
 
 # What a joint remembers behind its peak, per Gauss point from a to b: largest opening and slip, damage; then how it
-# broke (0: it has not), at which step, and the kinetic energy of the element at that moment.
-OPENED, SLIPPED, DAMAGE, MODE, STEP, KINETIC = 0, 3, 6, 9, 10, 11
-MEMORY = 12
+# broke (0: it has not), at which step, and the kinetic energy of the element at that moment; and step and kinetic
+# energy when it passed its peak.
+OPENED, SLIPPED, DAMAGE, MODE, STEP, KINETIC, PEAK_STEP, PEAK_KINETIC = 0, 3, 6, 9, 10, 11, 12, 13
+MEMORY = 14
 
 NONE, INTACT, YIELDED, BROKEN = 0, 1, 2, 3
 """State of an edge. BROKEN: its strength is gone; it presses and rubs until contact takes over at the next rebuild."""

@@ -6,7 +6,8 @@ omega^2 of a corner of mass m is at most the sum of
 - joints: 2 k / m, k = half the largest penalty of each joint at the corner,
 - contact: 2 k / m, k = 3 P (1 / h_t + 1 / h_c) L / 2 per face of length L, h: altitudes.
 
-dt < (2 / omega) (sqrt(1 + xi^2) - xi) with viscous damping, xi = eta omega_e^2 / (2 (lambda + 2 mu) omega).
+dt < (2 / omega) (sqrt(1 + xi^2) - xi) with viscous damping, xi = eta omega_e^2 / (2 (lambda + 2 mu) omega) +
+c / (m omega), c: what the dashpots of the contacts can give at the corner, twice as much between two of them.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ def gradients2(a, b, c, d):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stable(omega2, omega_e2, eta, modulus):
+def _stable(omega2, omega_e2, eta, modulus, drag):
     """Time step of one corner."""
     if omega2 <= 0.0:
         return math.inf
     omega = math.sqrt(omega2)
-    xi = 0.5 * eta * omega_e2 / (modulus * omega)
+    xi = 0.5 * eta * omega_e2 / (modulus * omega) + drag / omega
     return 2.0 / omega * (math.sqrt(1.0 + xi * xi) - xi)
 
 
@@ -55,19 +56,19 @@ def _omega_quad(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _corner(omega_e2, true_mass, mass, spring, eta, modulus):
+def _corner(omega_e2, true_mass, mass, spring, drag, eta, modulus):
     """Stable time step of a corner; added mass lowers what the element gives in proportion."""
     own = omega_e2 * true_mass / mass
-    return _stable(own + 2.0 * spring / mass, own, eta, modulus)
+    return _stable(own + 2.0 * spring / mass, own, eta, modulus, drag / mass)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, safety, target, mass):
+def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, dashpots, safety, target, mass):
     """Largest stable time step over the corners of the owned elements [s].
 
     triangles, quads: tables of elements.py; first: storage row of the first owned element; springs (n_own, 4) [N/m per
-    m] of joints and contact; mass (n, 4): true masses. With target > 0 masses are raised until safety times the limit
-    is no less than it.
+    m] of joints and contact; dashpots (n_own, 4) [N s/m per m] of contact; mass (n, 4): true masses. With target > 0
+    masses are raised until safety times the limit is no less than it.
     """
     least = math.inf
     for i in range(len(triangle_rows) + len(quad_rows)):
@@ -79,10 +80,10 @@ def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, safety
             omega2, eta, modulus = _omega_quad(c), c[Q_ETA], c[Q_LAMBDA] + c[Q_TWO_MU]
         for k in range(n):
             true = mass[r, k]
-            dt = _corner(omega2, true, true, springs[r - first, k], eta, modulus)
+            dt = _corner(omega2, true, true, springs[r - first, k], dashpots[r - first, k], eta, modulus)
             while safety * dt < target:
                 mass[r, k] *= max((target / (safety * dt)) ** 2, 1.0 + 1e-6)
-                dt = _corner(omega2, true, mass[r, k], springs[r - first, k], eta, modulus)
+                dt = _corner(omega2, true, mass[r, k], springs[r - first, k], dashpots[r - first, k], eta, modulus)
             least = min(least, dt)
     return least
 

@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.errors import HpcdemError
+from hpcdem.fields import sides_of_box
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
 
 Walls = dict[int, tuple[tuple[float, float], tuple[float, float]]]
-_COLUMNS = ("gid", "x", "y", "r", "color", "group")
+_COLUMNS = ("gid", "x", "y", "r", "color", "group", "fixed")
+_HELD = 3
+"""Fixed along x and y (see `fields.FIX_BITS`)."""
 
 
 def _no_pairs() -> np.ndarray:
@@ -25,7 +28,8 @@ class Grains:
     """The particles of a frame in the order of ids, and its walls (id: ((x1, y1), (x2, y2)), BOX -1 to -4).
 
     gid, x, y, r [m], color, group (names): (n,) each; bonds, contacts: (m, 2) ids of the pairs, where they were read;
-    time [s]; ini: the state before the first step of a command.
+    time [s]; ini: the state before the first step of a command; fixed (n,): held along x and y, as rows of
+    particles are that stand for walls.
     """
 
     step: int
@@ -40,6 +44,11 @@ class Grains:
     ini: bool = False
     bonds: np.ndarray = field(default_factory=_no_pairs)
     contacts: np.ndarray = field(default_factory=_no_pairs)
+    fixed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+
+    def __post_init__(self) -> None:
+        if len(self.fixed) != len(self.gid):
+            object.__setattr__(self, "fixed", np.zeros(len(self.gid), bool))
 
     def __len__(self) -> int:
         return len(self.gid)
@@ -56,7 +65,7 @@ class Grains:
     def drawn(self, walls: int = 5) -> Frame:
         """A frame that holds what pictures need, walls in this colour; without the sides of the BOX."""
         columns = {"gid": self.gid, "x": self.x, "y": self.y, "radius": self.r, "color": self.color}
-        shown = {i: ends for i, ends in self.walls.items() if i >= 0}
+        shown = {i: ends for i, ends in self.walls.items() if i not in sides_of_box(self.walls)}
         ends = np.array([*shown.values()], dtype=float).reshape(-1, 2, 2)
         table = {"id": np.array([*shown], np.int64), "p1": ends[:, 0], "p2": ends[:, 1]}
         table["color"] = np.full(len(shown), walls, np.int32)
@@ -79,7 +88,8 @@ def grains(path: Path, ini: bool = False, tables: tuple[str, ...] = ()) -> Grain
     row = np.asarray(p.get("group", np.full(len(gid), -1)), dtype=np.int64)[order]
     pairs = {name: _pairs(frame, name) for name in tables}
     group = names[np.where((row >= 0) & (row < len(names)), row, len(names) - 1)]
-    return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs)
+    fixed = (np.asarray(p.get("fix", np.zeros(len(gid))), dtype=np.int64)[order] & _HELD) == _HELD
+    return Grains(frame.step, gid[order], x, y, r, color, group, _walls(frame), frame.time, ini, **pairs, fixed=fixed)
 
 
 def _walls(frame: Frame) -> Walls:
@@ -133,7 +143,7 @@ def gone(first: Walls, last: Walls, wall: int) -> float:
 
 def driving_wall(first: Walls, last: Walls) -> int | None:
     """Id of the wall whose middle went farthest along x, None where none went."""
-    ways = {i: gone(first, last, i) for i in first if i >= 0}
+    ways = {i: gone(first, last, i) for i in first if i not in sides_of_box(first)}
     wall = max(ways, key=lambda i: ways[i], default=None)
     return wall if wall is not None and ways[wall] > 0.0 else None
 

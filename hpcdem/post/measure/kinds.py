@@ -110,7 +110,8 @@ def faults_part(scene: Scene) -> Faults | None:
         request = plan.request
         section = read_section(request.folder / "ss" / "data" / f"{scene.file.path.stem}.npz")
         p, move = section.particles, np.array([request.xmove, request.ymove])
-        x, y, field = section.x + move[0], section.y + move[1], section.fields["distortional"]
+        x, y, field = section.mean_strain()
+        x, y = x + move[0], y + move[1]
         ends = zip(section.walls["id"], section.walls["p1"] + move, section.walls["p2"] + move)
         walls: Walls = {int(i): (tuple(a.tolist()), tuple(b.tolist())) for i, a, b in ends}
         rows = p["x"] + move[0], p["y"] + move[1], p["radius"], p["color"]

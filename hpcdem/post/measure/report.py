@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.fields import sides_of_box
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
-from hpcdem.io.frames import FrameFile
-from hpcdem.post.measure import cracks, figures, kinds
+from hpcdem.io.frames import FrameFile, left_out, list_frames
+from hpcdem.post.measure import block_figures, blocks, cracks, emission, figures, kinds
 from hpcdem.post.measure import walls as curves
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.kinds import Done, Sheet
-from hpcdem.post.measure.scene import KINDS, Plan, Request, Scene, look, make_plan
+from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, Plan, Request, Scene, look, make_plan
 
 _T = TypeVar("_T")
 
@@ -49,11 +50,14 @@ def run(comm: Any, log: Any, request: Request) -> list[Path]:
     what is asked for. Raises HpcdemError on all ranks."""
     began = time.monotonic()
     what = [kind for kind in KINDS if kind in request.what or not request.what]
+    of_blocks = on_first(comm, lambda: _of_blocks(request))
+    if of_blocks and not on_first(comm, lambda: bool(list_frames(request.folder))):
+        what = [kind for kind in what if kind in request.what and kind not in BLOCK_KINDS]
     of_frames = [kind for kind in what if kind in FRAMES]
     written: list[Path] = []
     if of_frames:
         plan, final = on_first(comm, lambda: make_plan(request, of_frames))
-        _tell(log, plan)
+        on_first(comm, lambda: _tell(log, plan, final, of_frames))
         parts = _measure(comm, log, plan, of_frames)
     on_first(comm, lambda: request.target.mkdir(parents=True, exist_ok=True))
     for kind in what:
@@ -67,16 +71,25 @@ def run(comm: Any, log: Any, request: Request) -> list[Path]:
         elif files:
             log.info(f"{kind}: {', '.join(path.name for path in files)}")
         written += files
+    written += _blocks(comm, log, request, of_blocks) if of_blocks else []
     log.info(f"{request.target}: {len(written)} files in {time.monotonic() - began:.1f} s")
     return written
 
 
-def _tell(log: Any, plan: Plan) -> None:
+def _tell(log: Any, plan: Plan, final: Grains, what: Sequence[str]) -> None:
     first, last = plan.frames[0], plan.frames[-1]
     count = "1 frame" if first is last else f"{len(plan.frames)} frames, {first.path.stem} to {last.path.stem}"
     wall = "no wall moves along x" if plan.wall is None else f"wall {plan.wall} moves"
     hint = "; --from 0 for those before it moves" if plan.request.first is None and first.step > 0 else ""
     log.info(f"{count}; {wall}{hint}; columns of {plan.cell:g} m")
+    held, of_bed = int(final.fixed.sum()), [kind for kind in ("surface", "wedge", "tracks") if kind in what]
+    if held and of_bed and held < len(final):
+        log.info(
+            f"{held} particles are fixed along x and y, as rows that stand for walls: "
+            f"they do not count for {', '.join(of_bed)}"
+        )
+    if others := left_out(plan.request.folder):
+        log.warn(others)
 
 
 def _tried(work: Callable[[], list[Path]], must: bool) -> tuple[list[Path], str | None]:
@@ -143,6 +156,85 @@ def _one_field(parts: list[dict[str, Any]]) -> None:
             part["faults"] = kinds.without_fields(part["faults"])
 
 
+# --- blocks ----------------------------------------------------------------------------------------------------
+
+
+def _of_blocks(request: Request) -> list[str]:
+    """What can be measured of blocks in the folder, of what is asked for. Raises HpcdemError where a word asks for
+    blocks, and there are none."""
+    frames = blocks.frames(request)
+    there = {"cracks": bool(frames), "fragments": bool(frames)}
+    there["emission"] = bool(frames) or (request.folder / emission.TABLE).is_file()
+    for kind in request.what:
+        if kind in BLOCK_KINDS and kind not in KINDS and not there[kind]:
+            raise HpcdemError(f"{kind}: {request.folder} holds no frames of blocks of these steps")
+    if any(there.values()) and request.colors and not list_frames(request.folder):
+        raise UsageError("--colors: blocks have groups, no colours")
+    return [kind for kind in BLOCK_KINDS if there[kind] and (kind in request.what or not request.what)]
+
+
+def _blocks(comm: Any, log: Any, request: Request, what: Sequence[str]) -> list[Path]:
+    """Collective: what is asked for of blocks."""
+    files = on_first(comm, lambda: blocks.frames(request))
+    if files:
+        on_first(comm, lambda: blocks.chosen(blocks.read(files[0], request), request))  # are there such groups?
+        first, last = files[0].path.stem, files[-1].path.stem
+        log.info(
+            f"{len(files)} frames of blocks, {first} to {last}" if len(files) > 1 else f"1 frame of blocks, {first}"
+        )
+        others = on_first(comm, lambda: "" if list_frames(request.folder) else left_out(request.folder))
+        if others:
+            log.warn(others)
+    n = len(files) if {"cracks", "fragments"} & set(what) else 0
+    mine, error = [], None
+    try:
+        for file in files[n * comm.rank // comm.size : n * (comm.rank + 1) // comm.size]:
+            mine.append(blocks.part(blocks.read(file, request), request, what))
+    except HpcdemError as failure:
+        error = str(failure)
+    comm.agree(error)
+    parts = [one for part in comm.gather(mine) or [] for one in part]
+    written: list[Path] = []
+    for kind in what:
+        work = lambda: _write_blocks(kind, request, files, parts)  # noqa: B023, E731
+        paths, problem = on_first(comm, lambda: _tried(work, bool(request.what)))  # noqa: B023
+        if problem is not None:
+            log.info(f"left out: {problem}")
+        elif paths:
+            log.info(f"{kind}: {', '.join(path.name for path in paths)}")
+        written += paths
+    return written
+
+
+def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: list[blocks.Part]) -> list[Path]:
+    """Tables and figure of one measurement of blocks."""
+    name = "cracks_joints" if kind == "cracks" else kind
+    if kind == "emission":
+        if not len(blocks.events_of(request, files)):
+            raise _NothingThere(f"emission: no joint broke in {request.folder}")
+        found = blocks.emitted(request, files)
+        sheets = blocks.emission_sheets(found)
+        draw = lambda: block_figures.emitted(found)  # noqa: E731
+    else:
+        if kind == "cracks" and not parts[-1].cracks.joints:
+            raise _NothingThere(f"cracks: the blocks in {request.folder} have no joints")
+        sheets = blocks.cracks_sheets(parts) if kind == "cracks" else blocks.fragments_sheets(parts)
+        draw = lambda: _draw_blocks(kind, request, files, parts)  # noqa: E731
+    paths = [write_sheet(request.target, sheet) for sheet in sheets]
+    if request.formats:
+        figure = draw()
+        paths += [figures.save(figure, request.target / f"{name}.{suffix}") for suffix in request.formats]
+    return paths
+
+
+def _draw_blocks(kind: str, request: Request, files: list[FrameFile], parts: list[blocks.Part]) -> Any:
+    state = blocks.read(files[-1], request)
+    if kind == "fragments":
+        return block_figures.fragments(parts, state)
+    known = (request.folder / emission.TABLE).is_file()
+    return block_figures.cracks(parts, state, blocks.events_of(request, files) if known else None)
+
+
 # --- files -----------------------------------------------------------------------------------------------------
 
 
@@ -183,7 +275,7 @@ def _wallforce(request: Request) -> list[Path]:
     if missing:
         raise UsageError(f"--wall {missing[0]}: not in {path}; there are {', '.join(map(str, sorted(found)))}")
     driver = curves.driver(found)
-    asked = request.walls or tuple(wall for wall in found if wall >= 0) or tuple(found)
+    asked = request.walls or tuple(wall for wall in found if wall not in sides_of_box(found)) or tuple(found)
     chosen = {wall: found[wall] for wall in asked}
     head = ("step", "time[s]", "wall", "dx[m]", "dy[m]", "way[m]", "fx[N]", "fy[N]", "work[J]")
     rows = (

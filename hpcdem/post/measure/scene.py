@@ -25,7 +25,9 @@ from hpcdem.post.measure.grains import (
 )
 
 KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
-"""What can be measured, by its word on the command line."""
+"""What can be measured of particles, by its word on the command line."""
+BLOCK_KINDS = ("cracks", "fragments", "emission")
+"""What can be measured of blocks."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class Request:
     last frame before the wall moves to the last; xmove, ymove: added to all coordinates; width: of columns and cells;
     formats: of figures; strain, length, skin: threshold, shortest band and height above the base for faults; increment:
     strain from frame to frame even if there are sections; ids, points, number: particles to follow; log: of the run.
+    history: name of that which is drawn with the emission, none: none; bins: of its rate; completeness: magnitude Mc;
+    released: energies since the peak of the joints; joule: J per unit of energy in the files.
     """
 
     folder: Path
@@ -59,6 +63,11 @@ class Request:
     points: tuple[tuple[float, float], ...] = ()
     number: int = 1
     log: Path | None = None
+    history: str | None = None
+    bins: int = 100
+    completeness: float | None = None
+    released: bool = False
+    joule: float = 1.0
     color_names: dict[int, str] = field(default_factory=dict)
 
     @property
@@ -169,9 +178,13 @@ def _followed(request: Request, first: Grains, last: Grains) -> np.ndarray:
 
 
 def bed_of(g: Grains) -> Grains:
-    """Without flying bits, unless there is nothing else."""
+    """Without flying bits and without what is held fast, as rows of particles that stand for walls; unless there is
+    nothing else."""
     kept = drawing.in_large_pieces(g.x, g.y, g.r)
-    return g.take(kept) if kept.any() else g
+    for some in (kept & ~g.fixed, kept):
+        if some.any():
+            return g.take(some)
+    return g
 
 
 @dataclass
@@ -191,7 +204,7 @@ class Scene:
 
     @cached_property
     def bed(self) -> Grains:
-        """Those asked for without flying bits."""
+        """Those asked for without flying bits and fixed ones."""
         return bed_of(self.grains)
 
     @property

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.errors import HpcdemError
+from hpcdem.fields import sides_of_box
 from hpcdem.io.disk import explain
 
 HEADER = "step,time,wall,x1,y1,x2,y2,fx,fy"
@@ -80,6 +81,6 @@ def read_walls(path: str | os.PathLike, first: int | None = None, last: int | No
 
 def driver(curves: dict[int, Curve]) -> int | None:
     """The wall with the longest way, None where none moved."""
-    ways = {wall: float(curve.way[-1]) for wall, curve in curves.items() if wall >= 0}
+    ways = {wall: float(curve.way[-1]) for wall, curve in curves.items() if wall not in sides_of_box(curves)}
     best = max(ways, key=lambda w: ways[w], default=None)
     return best if best is not None and ways[best] > 0.0 else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,15 +16,19 @@ from typing import Any
 
 from hpcdem.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, make_folder
+from hpcdem.io.axes import View
 from hpcdem.io.disk import explain
+from hpcdem.io.frames import FORMATS, earlier_stems, left_out
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
-from hpcdem.post.section import Section, read_section
+from hpcdem.post.plots import SAVED, saving
+from hpcdem.post.section import read_section
 from hpcdem.post.sections import panels, survey
 from hpcdem.post.sections.files import write_grids, write_tables
 from hpcdem.post.sections.pages import Style, panels_of_a_page, section_page, series_page
+from hpcdem.post.series import draw_all
 
 _NAME = re.compile(r"all_(\d+)(_ini)?\.npz")
-BITMAPS = ("jpg", "png")
+BITMAPS = ("jpg", "png", "tiff")
 DPI = 300
 
 
@@ -40,7 +44,7 @@ class Request:
     addball: bool = False
     delball: bool = False
     colorbar: bool = True
-    labels: str = "off"
+    labels: str = "on"
     colormap: Path | None = None
     sigma1: tuple[float, float] | None = None
     width: float = 14.0
@@ -49,10 +53,11 @@ class Request:
     maxstress: float = 300.0
 
 
-def draw_folder(request: Request, comm: Any, log: Any) -> None:
-    """Collective: draw and write everything. log: `info(text)`, `warn(text)`. Raises HpcdemError on all ranks."""
+def draw_folder(request: Request, comm: Any, log: Any, workers: int = 1) -> None:
+    """Collective: draw and write everything, on one rank by `workers` processes. log: `info(text)`, `warn(text)`.
+    Raises HpcdemError on all ranks."""
     ss = request.folder / "ss"
-    files = _collective(comm, lambda: section_files(ss / "data"))
+    files = _collective(comm, lambda: _of_this_run(request.folder, log))
     tables = _collective(comm, lambda: colour_tables(request))
     for table in {id(t): t for t in tables.values()}.values():
         for note in table.notes:
@@ -64,38 +69,92 @@ def draw_folder(request: Request, comm: Any, log: Any) -> None:
     style = Style(tables, request.width, request.colorbar, request.labels, request.sigma1)
     for sub in ("data2ps", "Tmp", "ps"):
         make_folder(ss / sub, comm)
-
-    def one_section(path: Path) -> None:
-        section = read_section(path)
-        write_tables(section, ss / "data2ps")
-        write_grids(section, ss / "Tmp")
-        figure = section_page(section, seen, request.kinds, style, captions[section.name])
-        ending = "sigma1" if request.sigma1 else "strain_stress"
-        save(figure, ss, f"{section.name}_{ending}", request.formats)
-
-    def one_series(kind: panels.Kind, part: Sequence[Path], name: str) -> None:
-        def sections() -> Iterator[tuple[Section, str]]:
-            for path in part:
-                section = read_section(path)
-                yield section, captions[section.name]
-
-        save(series_page(sections(), len(part), seen, kind, style), ss, name, request.formats)
-
-    tasks: list[tuple[Callable[..., None], tuple[Any, ...]]] = [(one_section, (path,)) for path in files]
+    tasks: list[OneSection | OneSeries] = [
+        OneSection(path, ss, seen, request.kinds, style, captions[path.stem], request.formats) for path in files
+    ]
     if len(files) > 1:
         pages = math.ceil(len(files) / panels_of_a_page(seen, style))
         room = math.ceil(len(files) / pages)
-        parts = [files[k : k + room] for k in range(0, len(files), room)]
+        parts = [tuple(files[k : k + room]) for k in range(0, len(files), room)]
         for kind in request.kinds:
             for k, part in enumerate(parts, 1):
-                bars = "_sigma1" if request.sigma1 and kind is panels.DISTORTIONAL else ""
-                number = f"_{k}" if len(parts) > 1 else ""
-                tasks.append((one_series, (kind, part, f"series_{kind.key}{bars}{number}")))
-    _shared(tasks, comm)
+                bars = "_sigma1" if request.sigma1 and kind.key == panels.DISTORTIONAL.key else ""
+                name = f"series_{kind.key}{bars}" + (f"_{k}" if len(parts) > 1 else "")
+                said = tuple(captions[path.stem] for path in part)
+                tasks.append(OneSeries(name, part, ss, seen, kind, style, said, request.formats))
+    log.info(f"{len(files)} sections of {request.folder}: {len(tasks)} pages")
+    draw_all(tasks, comm, workers, log.info)
     log.info(
-        f"{len(files)} sections of {request.folder}, {len(tasks)} pages: pictures in {ss} and {ss / 'ps'}, "
-        f"numbers in {ss / 'data2ps'}, grids in {ss / 'Tmp'}"
+        f"{len(tasks)} pages: pictures in {ss} and {ss / 'ps'}, numbers in {ss / 'data2ps'}, grids in {ss / 'Tmp'}"
     )
+
+
+@dataclass(frozen=True)
+class OneSection:
+    """The page, tables and grids of one section."""
+
+    path: Path
+    ss: Path
+    seen: View
+    kinds: tuple[panels.Kind, ...]
+    style: Style
+    caption: str
+    formats: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the section."""
+        return self.path.stem
+
+    def __call__(self) -> None:
+        """Draw and write it."""
+        section = read_section(self.path)
+        write_tables(section, self.ss / "data2ps")
+        write_grids(section, self.ss / "Tmp")
+        figure = section_page(section, self.seen, self.kinds, self.style, self.caption)
+        ending = "sigma1" if self.style.stress_bars else "strain_stress"
+        save(figure, self.ss, f"{section.name}_{ending}", self.formats)
+
+
+@dataclass(frozen=True)
+class OneSeries:
+    """A page with one kind of several sections."""
+
+    name: str
+    part: tuple[Path, ...]
+    ss: Path
+    seen: View
+    kind: panels.Kind
+    style: Style
+    captions: tuple[str, ...]
+    formats: tuple[str, ...]
+
+    def __call__(self) -> None:
+        """Draw it."""
+        pairs = ((read_section(path), caption) for path, caption in zip(self.part, self.captions))
+        figure = series_page(pairs, len(self.part), self.seen, self.kind, self.style)
+        save(figure, self.ss, self.name, self.formats)
+
+
+def _of_this_run(folder: Path, log: Any) -> list[Path]:
+    """The sections of a folder of frames, without those of an earlier run's frames. Raises HpcdemError."""
+    earlier = earlier_stems(folder) if folder.is_dir() else frozenset()
+    found = section_files(folder / "ss" / "data")
+    files = [path for path in found if path.stem not in earlier]
+    if len(files) < len(found):
+        log.warn(f"of {len(found)} sections {len(found) - len(files)} are left out: {left_out(folder)}")
+    old = [path.stem for path in files if _is_newer(folder, path)]
+    if old:
+        log.warn(f"{len(old)} frames have been written again since `hpcdem -s`, {old[0]} first: run it again")
+    if not files:
+        raise HpcdemError(f"{folder / 'ss' / 'data'} holds sections of an earlier run only: run `hpcdem -s {folder}`")
+    return files
+
+
+def _is_newer(folder: Path, section: Path) -> bool:
+    """Whether the frame of a section has been written after it."""
+    frames = [folder / f"{section.stem}.{kind}" for kind in FORMATS]
+    return any(path.is_file() and path.stat().st_mtime_ns > section.stat().st_mtime_ns for path in frames)
 
 
 def section_files(folder: Path) -> list[Path]:
@@ -134,16 +193,9 @@ def save(figure: Any, ss: Path, name: str, formats: Sequence[str]) -> None:
 
     for kind in formats:
         path = (ss if kind in BITMAPS else ss / "ps") / f"{name}.{kind}"
-        options: dict[str, Any] = {}
-        if kind == "jpg":
-            options["pil_kwargs"] = {"quality": 92, "subsampling": 0}  # thin coloured bands need their full colour
-        elif kind == "png":
-            options["metadata"] = {"Software": None}
-        elif kind in ("pdf", "svg"):
-            options["metadata"] = {"CreationDate": None} if kind == "pdf" else {"Date": None}
-        fixed: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
-        with matplotlib.rc_context(fixed), atomic_path(path) as temporary:
-            figure.savefig(temporary, format="eps" if kind == "ps" else kind, dpi=DPI, **options)
+        written = "eps" if kind == "ps" else kind
+        with matplotlib.rc_context(SAVED), atomic_path(path) as temporary:
+            figure.savefig(temporary, format=written, dpi=DPI, **saving(written))
             if kind == "ps":
                 _without_date(temporary)
 
@@ -211,5 +263,5 @@ def _name_changes(outlines: Sequence[survey.Outline], request: Request, log: Any
 
 def refuse(request: Request) -> None:
     """UsageError for what cannot be drawn."""
-    if request.sigma1 and panels.DISTORTIONAL not in request.kinds:
+    if request.sigma1 and all(kind.key != panels.DISTORTIONAL.key for kind in request.kinds):
         raise UsageError("zdemss: --sigma1 ON draws over the distortional strain: it cannot go with --strainshear OFF")

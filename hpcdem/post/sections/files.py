@@ -9,27 +9,48 @@ import numpy as np
 from hpcdem.io.agreed import atomic_path
 from hpcdem.post.section import UNITS, Section
 
-GRIDS = ("volumetric", "distortional", "mean", "shear")
+DRAWN = {
+    "invariant": ("distortional", "1", lambda v: v * abs(v)),
+    "difference": ("shear", "Pa", lambda v: 2.0 * v),
+}
+"""What pages draw of a field: signed J2, whose root is the distortional strain, and s1 - s2."""
+GRIDS = ("volumetric", "distortional", "mean", "shear", *DRAWN)
 
 
 def write_tables(section: Section, folder: Path) -> None:
-    """strain_<name>.out: x y volumetric distortional; stress_<name>.out: x y mean shear s1 s2 direction.
+    """strain_<name>.out: x y volumetric distortional invariant; stress_<name>.out: x y mean shear s1 s2 direction
+    difference.
 
     One line per node, row by row from the bottom, NaN where there is no material. SI units, named in the first line;
-    stress positive in compression, direction: angle of s1 from the x axis, anticlockwise.
+    stress positive in compression, shear: half of the difference s1 - s2, direction: angle of s1 from the x axis,
+    anticlockwise.
     """
     x, y = np.meshgrid(section.x, section.y)
     f = section.fields
     mean, shear = f["mean"], f["shear"]
     _write(
         folder / f"strain_{section.name}.out",
-        {"x[m]": x, "y[m]": y, "volumetric[%]": f["volumetric"], "distortional[1]": f["distortional"]},
+        {
+            "x[m]": x,
+            "y[m]": y,
+            "volumetric[%]": f["volumetric"],
+            "distortional[1]": f["distortional"],
+            "invariant[1]": _drawn(section, "invariant"),
+        },
     )
     _write(
         folder / f"stress_{section.name}.out",
         {"x[m]": x, "y[m]": y, "mean[Pa]": mean, "shear[Pa]": shear, "s1[Pa]": mean + shear, "s2[Pa]": mean - shear,
-         "direction[rad]": f["direction"]},
+         "direction[rad]": f["direction"], "difference[Pa]": _drawn(section, "difference")},
     )  # fmt: skip
+
+
+def _drawn(section: Section, name: str) -> np.ndarray:
+    """A field, or what is drawn of one."""
+    if name not in DRAWN:
+        return section.fields[name]
+    field, _, value = DRAWN[name]
+    return value(section.fields[field])
 
 
 def _write(path: Path, columns: dict[str, np.ndarray]) -> None:
@@ -58,6 +79,6 @@ def write_grids(section: Section, folder: Path) -> None:
                     if len(values):
                         variable.actual_range = np.array([values[0], values[-1]])
                 z = file.createVariable("z", "f8", ("y", "x"))
-                z[:] = section.fields[name]
-                z.long_name, z.units = name, UNITS[name]
+                z[:] = _drawn(section, name)
+                z.long_name, z.units = name, DRAWN[name][1] if name in DRAWN else UNITS[name]
                 z._FillValue = np.float64(np.nan)

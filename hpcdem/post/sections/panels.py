@@ -1,7 +1,8 @@
 """One panel: one thing of one section, drawn into matplotlib axes whose data unit is the metre.
 
-A field becomes a picture of true colours: values are interpolated linearly between the nodes, then coloured, and
-painted where there are particles. Nothing is transparent, since PostScript cannot be.
+A field becomes a picture of true colours, painted where there are particles: values are interpolated linearly between
+the nodes, strains of the nearest particle taken as they are, then coloured. Nothing is transparent, since PostScript
+cannot be.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from hpcdem.errors import HpcdemError
+from hpcdem.fields import sides_of_box
 from hpcdem.io import colours
 from hpcdem.io.frame import Frame, Table
 from hpcdem.post import layers, raster
@@ -22,9 +24,9 @@ from hpcdem.post.section import Section
 INK = "#000000"
 LINE = 0.5
 """Width of surface, walls and bars [points]."""
-BAND, SHADE = 1.0, 0.45
-"""Where |distortional strain| is larger, a stress is painted in this part of its brightness: strained bands show as
-dark ones."""
+BAND, SMOOTH_BAND, SHADE = 2.0, 1.0, 0.45
+"""Where |distortional strain| is larger (SMOOTH_BAND: where it is a mean over the grid), a stress is painted in this
+part of its brightness: strained bands show as dark ones. 2 is the second invariant 4 of the manual's pages."""
 FIELD_PIXELS = 1000
 """About as many pixels of a field side by side in a panel; at most FINEST to a cell."""
 FINEST = 8
@@ -36,32 +38,45 @@ VECTOR_DISCS, DISC_PIXELS = 30000, 2400
 
 @dataclass(frozen=True)
 class Kind:
-    """What a panel can show. key: field of the section; unit: of the colour bar, one is `scale` SI units."""
+    """What a panel can show. key: field of the section; unit: of the colour bar, one is `scale` SI units; squared:
+    whether the square is drawn, with the sign of the field."""
 
     key: str
     title: str
     unit: str = ""
     scale: float = 1.0
     strain: bool = False
+    squared: bool = False
 
     @property
     def heading(self) -> str:
         """Title with its unit."""
         return f"{self.title} ({self.unit})" if self.unit else self.title
 
+    def shown(self, values: np.ndarray) -> np.ndarray:
+        """What is drawn of values of the field, in `unit`."""
+        return (values * np.abs(values) if self.squared else values) / self.scale
+
 
 DEFORMATION = Kind("deformation", "Deformation")
 VOLUMETRIC = Kind("volumetric", "Volumetric strain", "%", strain=True)
-DISTORTIONAL = Kind("distortional", "Distortional strain", strain=True)
+DISTORTIONAL = Kind("distortional", "Distortional strain J\N{SUBSCRIPT TWO}", strain=True, squared=True)
+"""The second invariant of the deviator, as the manual's pages draw it; the field is its root."""
+ROOT = Kind("distortional", "Distortional strain \N{SQUARE ROOT}J\N{SUBSCRIPT TWO}", strain=True)
 MEAN = Kind("mean", "Mean stress", "MPa", 1e6)
-SHEAR = Kind("shear", "Maximum shear stress", "MPa", 1e6)
+_DIFFERENCE = (
+    "\N{GREEK SMALL LETTER SIGMA}\N{SUBSCRIPT ONE} \N{MINUS SIGN} \N{GREEK SMALL LETTER SIGMA}\N{SUBSCRIPT THREE}"
+)
+SHEAR = Kind("shear", f"Shear stress {_DIFFERENCE}", "MPa", 0.5e6)
+"""What the manual's pages draw as maximum shear stress; the field is half of it."""
+HALF_SHEAR = Kind("shear", f"Maximum shear stress ({_DIFFERENCE})/2", "MPa", 1e6)
 KINDS = (DEFORMATION, VOLUMETRIC, DISTORTIONAL, MEAN, SHEAR)
 """From top to bottom."""
 
 
 def draw(section: Section, kind: Kind, ax: Any, table: ColourTable | None) -> None:
     """Draw one kind; the limits of the axes are set already. table: colours of its values, in its unit."""
-    if kind is DEFORMATION:
+    if kind == DEFORMATION:
         draw_particles(section, ax)
     else:
         assert table is not None
@@ -96,10 +111,11 @@ def draw_field(section: Section, kind: Kind, ax: Any, table: ColourTable) -> Non
     pixels = Pixels.over(section, right - left)
     if pixels is None:
         return
-    shades = table.colours(pixels.values(section.fields[kind.key]) / kind.scale)
+    strain = 1 if section.smooth else 0
+    shades = table.colours(kind.shown(pixels.values(section.fields[kind.key], strain if kind.strain else 1)))
     if not kind.strain:
-        bands = np.abs(pixels.values(section.fields[DISTORTIONAL.key])) > BAND
-        shades[bands] *= SHADE
+        bands = np.abs(pixels.values(section.fields[DISTORTIONAL.key], strain))
+        shades[bands > (SMOOTH_BAND if section.smooth else BAND)] *= SHADE
     painted = np.isfinite(shades[..., :1]) & pixels.material[..., None]
     _paint(ax, np.where(painted, shades, 1.0), pixels.extent)
 
@@ -109,7 +125,7 @@ def draw_outline(section: Section, ax: Any) -> None:
     if len(section.surface):
         ax.plot(*np.transpose(section.surface), color=INK, linewidth=LINE, zorder=3.0, solid_joinstyle="round")
     if len(section.walls.get("id", ())):
-        own = section.walls["id"] >= 0  # not the sides of BOX
+        own = ~np.isin(section.walls["id"], [*sides_of_box(section.walls["id"])])
         _segments(ax, section.walls["p1"][own], section.walls["p2"][own], LINE)
 
 
@@ -156,15 +172,15 @@ class Pixels:
         extent = (side * low[0], side * high[0], side * low[1], side * high[1])
         return cls((y - section.y[0]) / section.size, (x - section.x[0]) / section.size, material, extent)
 
-    def values(self, field: np.ndarray) -> np.ndarray:
-        """A field (ny, nx) at the pixels: linear between nodes, the nearest node's value up to one and a half cells
-        from where there is one, NaN farther off."""
+    def values(self, field: np.ndarray, order: int = 1) -> np.ndarray:
+        """A field (ny, nx) at the pixels: linear between nodes, or with order 0 that of the nearest node; the nearest
+        node's value up to one and a half cells from where there is one, NaN farther off."""
         empty = ~np.isfinite(field)
         if empty.all():
             return np.full(self.material.shape, np.nan)
         distance, nearest = ndimage.distance_transform_edt(empty, return_indices=True)
         places = np.meshgrid(self.rows, self.columns, indexing="ij")
-        result = ndimage.map_coordinates(field[tuple(nearest)], places, order=1, mode="nearest")
+        result = ndimage.map_coordinates(field[tuple(nearest)], places, order=order, mode="nearest")
         return np.where(ndimage.map_coordinates(distance, places, order=1, mode="nearest") <= 1.5, result, np.nan)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.errors import UsageError
+from hpcdem.fields import sides_of_box
 from hpcdem.io.axes import View
 from hpcdem.post.section import Section
 
@@ -44,7 +45,9 @@ def outline(section: Section, before: Section | None = None) -> Outline:
     reach, sides = (np.inf, -np.inf), {}
     if len(section.walls.get("id", ())):
         p1, p2 = (np.asarray(section.walls[k], dtype=float) for k in ("p1", "p2"))
-        own = section.walls["id"] >= 0  # BOX is a limit, not a part of the model
+        own = ~np.isin(
+            section.walls["id"], [*sides_of_box(section.walls["id"])]
+        )  # BOX is a limit, no part of the model
         ends = np.concatenate([p1[own, 0], p2[own, 0]])
         reach = (float(np.min(ends, initial=np.inf)), float(np.max(ends, initial=-np.inf)))
         upright = np.abs(p2[:, 1] - p1[:, 1]) > np.abs(p2[:, 0] - p1[:, 0])

@@ -16,6 +16,8 @@ from hpcdem.pre.mesh.geometry import Curve, sampled
 
 GROWTH = 0.2
 """Edges grow by this much of the distance from a refined layer, where nothing else is said: neighbours by a fifth."""
+MOST_ELEMENTS = 20_000_000
+"""More are refused before they are made."""
 MOST_SAMPLES = 500_000
 """Points along a refined layer at most."""
 
@@ -108,3 +110,9 @@ def positive(value: float, what: str) -> None:
     """CommandError unless the value is a positive number."""
     if not (math.isfinite(value) and value > 0.0):
         raise CommandError(f"{what} must be positive, not {value:g}")
+
+
+def not_too_many(elements: float, what: str) -> None:
+    """CommandError if so many elements are more than can be made; what: makes them, in words."""
+    if not elements <= MOST_ELEMENTS:
+        raise CommandError(f"{what} would make some {elements:.2g} elements, more than {MOST_ELEMENTS:.0g}")

@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcdem.errors import CommandError
 from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.pre.mesh.sizes import not_too_many
 
 DIAGONALS = {
     "right": "one diagonal, from lower left to upper right",
@@ -30,6 +31,7 @@ def spaced(start: float, end: float, n: int, ratio: float = 1.0) -> np.ndarray:
         raise CommandError(f"a structured mesh needs at least one element in each direction, not {n}")
     if not (math.isfinite(ratio) and ratio > 0.0):
         raise CommandError(f"the ratio of neighbouring elements must be positive, not {ratio:g}")
+    not_too_many(n, f"{n} intervals in one direction")
     k = np.arange(n + 1)
     if ratio == 1.0:
         part = k / n
@@ -62,6 +64,7 @@ def rectangle(
     if kind == "tri" and diagonal not in DIAGONALS:
         raise CommandError(f"diagonal '{diagonal}' is not known, choose from {', '.join(DIAGONALS)}")
     nx, ny = len(xs) - 1, len(ys) - 1
+    not_too_many(nx * ny * (1 if kind == "quad" else 4 if diagonal == "both" else 2), f"cells {nx} {ny}")
     points = np.array(np.meshgrid(xs, ys)).reshape(2, -1).T
     j, i = (v.ravel() for v in np.mgrid[:ny, :nx])
     a = j * (nx + 1) + i
@@ -97,6 +100,8 @@ def equilateral(
         raise CommandError(
             f"an equilateral mesh needs a positive width, height and size, not {width:g}, {height:g}, {size:g}"
         )
+    not_too_many(width / size * height / size * 2.31, f"size {size:g}")
+    not_too_many(max(width, height) / size, f"size {size:g}")
     nx, ny = max(1, round(width / size)), max(1, round(height / (size * math.sqrt(0.75))))
     xs, ys = spaced(x0, x0 + width, nx), spaced(y0, y0 + height, ny)
     half = np.concatenate([xs[:1], 0.5 * (xs[1:] + xs[:-1]), xs[-1:]])

@@ -23,10 +23,10 @@ from hpcdem.pre.mesh.geometry import Layers, sampled
 from hpcdem.pre.mesh.planar import Plane
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.regions import GRID, edges_of_curve, faces, noded, polygon_of
-from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField
+from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField, not_too_many
 from hpcdem.pre.mesh.smoothing import smoothed
 
-MOST_ELEMENTS, MOST_EDGES = 20_000_000, 1_000_000
+MOST_EDGES = 1_000_000
 """More elements, or edges on lines, are refused at once: the size is a slip of units."""
 DELAUNAY, FRONTAL_DELAUNAY, FRONTAL_QUADS = 5, 6, 8
 """Numbers of gmsh's algorithms: triangles in no pattern; near equilateral; those that pair up to quads."""
@@ -215,10 +215,7 @@ def _not_too_many(layers: Layers, wishes: Wishes, sizes: SizeField) -> None:
         at = at[shapely.contains_xy(polygon, at[:, 0], at[:, 1])]
         h = np.minimum(sizes(at), region.size or math.inf)
         elements += polygon.area * float((1.0 / (0.433 * h * h)).mean()) if len(at) else 0.0
-    if elements > MOST_ELEMENTS:
-        raise CommandError(
-            f"mesh size {sizes.base:g} would make some {elements:.2g} elements, more than {MOST_ELEMENTS:.0g}"
-        )
+    not_too_many(elements, f"mesh size {sizes.base:g}")
 
 
 # --- lines inside ------------------------------------------------------------------------------------------------

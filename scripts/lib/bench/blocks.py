@@ -224,6 +224,7 @@ def shattered(sim: Any, side: int) -> None:
 
 def _swell(sim: Any, factor: float) -> None:
     """Every element grows about its middle."""
+    sim.option(overlap="keep")
     sim.open_model()
     corners = sim.x[:, :6].reshape(-1, 3, 2)
     middle = corners.mean(axis=1, keepdims=True)

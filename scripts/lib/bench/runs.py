@@ -26,7 +26,9 @@ def say(text: str) -> None:
 def one(workload: Workload, sav: Path, layout: Layout, repeat: int, steps: int, **more: Any) -> Row:
     """One run of ours as a line."""
     warm = warm_for(workload.bed, steps)
-    found = launch.ours("run", layout, file=str(sav), pushed=workload.pushed, warm=warm, steps=steps)
+    found = launch.ours(
+        "run", layout, file=str(sav), pushed=workload.pushed, strays=workload.strays, warm=warm, steps=steps
+    )
     found.pop("output")
     head = {
         "code": "hpcdem", "workload": workload.name, "ranks": layout.ranks, "threads": layout.threads,

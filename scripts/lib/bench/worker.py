@@ -53,8 +53,32 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
     sim = restored(job)
     if job["pushed"]:
         sim.wall(beds.LEFT, xv=MATERIAL.speed)
+    if job["strays"]:
+        throw(sim)
     window = measured(sim, job["warm"], job["steps"])
     return window | {"contacts_per_particle": contacts(sim) / sim.count, "digest": digest(sim)} | versions()
+
+
+LOOSE, STRAY_SPEED = 20, 120.0
+"""Particles that roll on the surface, at 10 to 20 m/s; speed of the one that falls below the floor [m/s]: 2.4 m per
+step, a tenth of the skin."""
+
+
+def throw(sim: hpcdem.Simulation) -> None:
+    """A disc that has fallen through the floor, with a speed that stays, and others above the surface."""
+    ends, first, radius = sim.extents(), int(sim.engine.next_gid), MATERIAL.radius
+    for k in range(LOOSE + 1):
+        x = ends["left"] + (k + 0.5) / (LOOSE + 1) * (ends["right"] - ends["left"])
+        y = ends["bottom"] - 4.0 * radius if k == 0 else ends["top"] + 2.0 * radius
+        sim.ball(x, y, radius, id=first + k)
+    stray, loose = f"id {first} {first}", f"id {first + 1} {first + LOOSE}"
+    sim.prop(
+        f"id {first} {first + LOOSE}", density=MATERIAL.density, shear=MATERIAL.shear, poiss=MATERIAL.poiss,
+        fric=MATERIAL.fric, damp=MATERIAL.damp, hertz=True,
+    )  # fmt: skip
+    sim.prop(loose, xv=15.0)
+    sim.fix("x", "y", where=stray)
+    sim.prop(stray, yv=-STRAY_SPEED)
 
 
 def measured(sim: hpcdem.Simulation, warm: int, steps: int) -> dict[str, Any]:

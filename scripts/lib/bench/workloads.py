@@ -128,12 +128,13 @@ class Bed:
 
 @dataclass(frozen=True)
 class Workload:
-    """A bed, and whether its left wall pushes."""
+    """A bed, whether its left wall pushes, and whether there are particles much faster than all others."""
 
     name: str
     bed: Bed
     pushed: bool = False
     about: str = ""
+    strays: bool = False
 
 
 def workloads(unit: int = 12500) -> dict[str, Workload]:
@@ -141,6 +142,7 @@ def workloads(unit: int = 12500) -> dict[str, Workload]:
     rows = (
         Workload("bed-12k", Bed(unit), about="dense Hertz bed at rest"),
         Workload("push-12k", Bed(unit), True, "the same, pushed by its left wall"),
+        Workload("stray-12k", Bed(unit), about="at rest; a disc falls below it, some roll on it", strays=True),
         Workload("bed-100k", Bed(unit, 8), about="eight units side by side, at rest"),
         Workload("push-100k", Bed(unit, 8), True, "the same, pushed by its left wall"),
         Workload("linear-100k", Bed(unit, 8, "linear"), about="linear springs, at rest"),

@@ -84,24 +84,39 @@ def carry_out(world: World, seed: int, index: int, chain: list[Kind], ranks: tup
         result = "missed"
     case.close(keep=result == "failed")
     return {
-        "kind": (made or [chain[0].name])[0], "chain": made[1:], "seed": f"{seed}-{index}", "ranks": list(ranks),
+        "model": world.reference.model.key, "kind": (made or [chain[0].name])[0], "chain": made[1:],
+        "seed": f"{seed}-{index}", "ranks": list(ranks),
         "moments": case.moments, "lost": case.lost, "result": result, "why": [skipped] if skipped else case.problems,
         "folder": str(case.folder) if result == "failed" else "", "seconds": round(time.monotonic() - began, 2),
     }  # fmt: skip
 
 
 def campaign(
-    number: int, seed: int, kinds: list[Kind], add: Callable[[Row], None], jobs: int = 2, most_ranks: int = 3
+    number: int,
+    seed: int,
+    kinds: list[Kind],
+    add: Callable[[Row], None],
+    jobs: int = 2,
+    most_ranks: int = 3,
+    models: tuple[str, ...] = ("particles",),
 ) -> list[Row]:
-    """All cases; those whose runs have one rank several at a time. add: is handed each result as it comes."""
+    """All cases, of these models by turns; those whose runs have one rank several at a time. add: is handed each result
+    as it comes."""
     if runs.mpiexec() is None:
         most_ranks = 1
     folder = Path(tempfile.mkdtemp(prefix="hpcdem-faults-"))
-    reference, other = model.undisturbed(folder / "reference"), model.undisturbed(folder / "other", model.OTHER)
-    say(f"undisturbed run: {reference.seconds:.1f} s; cases in {folder}")
-    world, rows, lock = World(reference, other, folder, most_ranks), [], threading.Lock()
+    worlds = []
+    for key in models:
+        of = model.MODELS[key]
+        reference = model.undisturbed(folder / key / "reference", of)
+        worlds.append(World(reference, model.undisturbed(folder / key / "other", of, of.other), folder, most_ranks))
+        say(f"undisturbed run of {key}: {reference.seconds:.1f} s; cases in {folder}")
+    rows: list[Row] = []
+    lock = threading.Lock()
 
     def one(index: int, chain: list[Kind], ranks: tuple[int, ...]) -> None:
+        # So many kinds come by turns that each of them meets each of the models.
+        world = worlds[(index + index // len(kinds)) % len(worlds)]
         row = carry_out(world, seed, index, chain, ranks)
         with lock:
             rows.append(row)
@@ -115,8 +130,9 @@ def campaign(
     for case in cases:
         if case not in alone:
             one(*case)
-    if world.cluster is not None and not isinstance(world.cluster, str):
-        world.cluster.stop()
+    for world in worlds:
+        if world.cluster is not None and not isinstance(world.cluster, str):
+            world.cluster.stop()
     if not any(row["result"] == "failed" for row in rows):
         import shutil
 

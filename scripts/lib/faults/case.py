@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from faults import judge, runs
-from faults.model import LAST, STEPBAR, Reference, write_script
+from faults.model import Model, Reference, write_script
 from faults.runs import End, Job
 
 DONE, FAILED, USAGE, STOPPED = 0, 1, 2, 85
@@ -53,10 +53,20 @@ class Case:
     cleanup: list[Callable[[], object]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.script = write_script(self.folder)
+        self.script = write_script(self.folder, self.model)
+        self.options += self.model.options
         self.data = self.folder / "data"
         self._expected: int | None = None
         self._row = 0
+
+    @property
+    def model(self) -> Model:
+        """What is run."""
+        return self.world.reference.model
+
+    def reached(self) -> int:
+        """The last step that a row tells of."""
+        return judge.reached(self.data, self.model)
 
     # ---- runs --------------------------------------------------------------------------------------------------------
 
@@ -72,7 +82,7 @@ class Case:
     ) -> Job:  # fmt: skip
         """Begin, or go on with what is there."""
         self._expected = judge.newest(self.data, self.spoiled)
-        self._row = judge.reached(self.data)
+        self._row = self.reached()
         words = [*runs.resume_words(self.script, self.data), *self.options, *options]
         name = f"log{len(self.jobs)}"
         job = runs.start(words, ranks or self.next_ranks(), self.folder, plan, limit, name, **variables)
@@ -85,9 +95,10 @@ class Case:
         if begins and least == 0 and self.rng.random() < 0.08:
             time.sleep(self.rng.uniform(0.0, 1.5))
         else:
-            last = LAST - 2 * STEPBAR if begins else LAST - 1500  # a signal shall not come when the run is over
-            target = self.rng.randint(min(max(least, judge.reached(self.data) + 1), last), last)
-            while (judge.reached(self.data) < target or not (begins or job.at_work())) and not job.ended():
+            last, every = self.model.last, self.model.every
+            last -= 2 * every if begins else last // 5  # a signal shall not come when the run is over
+            target = self.rng.randint(min(max(least, self.reached() + 1), last), last)
+            while (self.reached() < target or not (begins or job.at_work())) and not job.ended():
                 time.sleep(0.002)
             time.sleep(self.rng.uniform(0.0, 0.02))
         return self.note(job)
@@ -96,7 +107,7 @@ class Case:
         """Remember the step of a fault that comes now; False if the run is over already."""
         if job.ended():
             return False
-        self.moments.append(judge.reached(self.data))
+        self.moments.append(self.reached())
         return True
 
     def until(self, ready: Callable[[], object], job: Job, pause: float = 0.001) -> bool:
@@ -129,9 +140,9 @@ class Case:
     def _went_on(self, end: End) -> None:
         found = re.search(r"going on from (\S+), step (\d+)", end.out)
         if found is not None:
-            step = int(found[2])
+            step = int(found[2]) + self.model.ahead
             self.lost += max(0, self._row - step)
-            if step < (self._expected or 0):
+            if step < (self._expected or 0) + self.model.ahead:
                 self.problem(f"went on from step {step}, a whole checkpoint of step {self._expected} is there", end)
         elif "starting at the beginning" in end.out:
             self.problem(f"starts at the beginning, a whole checkpoint of step {self._expected} is there", end)
@@ -146,6 +157,7 @@ class Case:
     def kept(self, before: set[str]) -> None:
         """All these files are still there."""
         missing = sorted(before - judge.final_names(self.data) - self.spoiled)
+        missing = [name for name in missing if not name.startswith("auto_")]  # the last two are kept
         if "--keep" in self.options:
             missing = [name for name in missing if not name.endswith(".sav")]
         if missing:
@@ -160,7 +172,7 @@ class Case:
         self.kept(before)
         for why in judge.other_end(self.data, self.world.reference, self.spoiled):
             self.problem(why)
-        if not self.problems and self.lost > 2 * LAST:
+        if not self.problems and self.lost > 2 * self.model.last:
             self.problem(f"{self.lost} steps were done twice")
 
     def done(self) -> bool:

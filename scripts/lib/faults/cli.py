@@ -11,6 +11,8 @@ from pathlib import Path
 
 import click
 
+from faults.model import MODELS
+
 HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
@@ -23,10 +25,12 @@ HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 @click.option("--from", "lines_file", metavar="FILE", help="Make the report of these JSON lines; nothing is run.")
 @click.option("--jobs", type=click.IntRange(1), default=2, metavar="J", help="Runs of one rank at a time [2].")
 @click.option("--ranks", type=click.IntRange(1, 3), default=3, metavar="R", help="Most ranks of a run [3].")
+@click.option("--model", "models", multiple=True, type=click.Choice(list(MODELS)),
+              help="What is run, by turns [all].")  # fmt: skip
 @click.option("--list", "lists", is_flag=True, help="The kinds of fault.")
 def faults(
     number: int, seed: int, names: tuple[str, ...], json_file: str | None, page: str | None, lines_file: str | None,
-    jobs: int, ranks: int, lists: bool,
+    jobs: int, ranks: int, models: tuple[str, ...], lists: bool,
 ) -> None:  # fmt: skip
     """Disturb runs of a small model, go on with them, and compare their end with that of the undisturbed run, bit by
     bit. Exit code 1 if one of them was lost. See docs/reliability.md."""
@@ -45,7 +49,7 @@ def faults(
     began = time.monotonic()
 
     def add(row: dict) -> None:
-        chain = " + ".join([row["kind"], *row["chain"]])
+        chain = f"{row['model']}: " + " + ".join([row["kind"], *row["chain"]])
         say(f"{row['result']:9} {row['seconds']:5.1f} s  {chain} (ranks {row['ranks']}, steps {row['moments']})")
         for why in row["why"]:
             say(f"          {why}")
@@ -56,7 +60,7 @@ def faults(
     if lines_file:
         rows = [json.loads(line) for line in Path(lines_file).read_text().splitlines()]
     else:
-        rows = campaign(number, seed, chosen, add, jobs, ranks)
+        rows = campaign(number, seed, chosen, add, jobs, ranks, models or tuple(MODELS))
     minutes = (time.monotonic() - began if not lines_file else sum(row["seconds"] for row in rows)) / 60.0
     say(", ".join(f"{n} {name}" for name, n in Counter(row["result"] for row in rows).items()) + f"; {minutes:.1f} min")
     if page:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 import h5py
 import numpy as np
 
-from faults.model import Reference
+from faults.model import PARTICLES, Model, Reference, files
 from hpcdem.errors import HpcdemError
 from hpcdem.io import checkpoint
 
@@ -26,12 +27,13 @@ APART = ("run", "resumed", "began")
 
 
 def final_names(data: Path) -> set[str]:
-    """Frames and checkpoints that a folder holds, by their names alone."""
-    try:
-        names = os.listdir(data)
-    except OSError:
-        return set()
-    return {name for name in names if name.endswith((".sav", *FRAMES)) and not name.startswith("hist_")}
+    """Frames and checkpoints that a folder holds, by their names below it."""
+    return {name for name in files(data) if name.endswith((".sav", *FRAMES)) and not is_series(name)}
+
+
+def is_series(name: str) -> bool:
+    """Whether a file grows row by row, or is made of such."""
+    return Path(name).name.startswith(("hist_", "history_"))
 
 
 def contents(path: Path) -> dict[str, bytes]:
@@ -117,10 +119,15 @@ def newest(data: Path, spoiled: set[str] = frozenset()) -> int | None:  # type: 
     return max(steps, default=None)
 
 
-def reached(data: Path) -> int:
+def in_order(data: Path) -> list[Path]:
+    """The checkpoints of a folder by their steps."""
+    return sorted(data.glob("*.sav"), key=lambda path: (re.sub(r"\D", "", path.name), path.name))
+
+
+def reached(data: Path, model: Model = PARTICLES) -> int:
     """The last step that the row of a series tells of."""
     try:
-        with open(data / "walls.csv", "rb") as file:
+        with open(data / model.series, "rb") as file:
             file.seek(max(0, os.fstat(file.fileno()).st_size - 400))
             lines = file.read().split(b"\n")
     except OSError:

@@ -48,6 +48,8 @@ def text(rows: list[Row], setting: dict[str, Any]) -> str:
         f"{setting['cores']} cores, {setting['mpi']}. In {missed['missed']} more the run was over before the fault "
         f"came, {missed['skipped']} could not be made on this machine."
     )
+    by_model = Counter(row.get("model", "particles") for row in rows if row["result"] not in ("skipped", "missed"))
+    head += " Runs of " + ", ".join(f"{key}: {n}" for key, n in by_model.items()) + "."
     return "\n\n".join([head, table(rows), about(rows)])
 
 

@@ -142,9 +142,9 @@ class Soak:
         ownership, tally = self.sim.engine.ownership, self.tally
         renew = ownership.renew
 
-        def counted(*values: Any) -> None:
+        def counted(*values: Any, **options: Any) -> None:
             before = ownership.borders[1:-1].copy()
-            renew(*values)
+            renew(*values, **options)
             after = ownership.borders[1:-1]
             tally.border_moves += bool(len(before) and len(before) == len(after) and (before != after).any())
 

@@ -206,3 +206,42 @@ def test_a_bond_made_across_a_gap_starts_in_tension(tmp_path):
     steps(sim, 1)
     assert pair(sim, 0, 1).fn == pytest.approx(-3.0 * exact.STIFFNESS, rel=1e-10)
     assert pair(sim, 0, 2) is None
+
+
+class Warned(list):
+    """A log that keeps warnings."""
+
+    def warn(self, text: str) -> None:
+        self.append(text)
+
+    def info(self, text: str) -> None:
+        pass
+
+    def warn_once(self, key: str, text: str) -> None:
+        pass
+
+
+@pytest.mark.parametrize("disk", ["off", "on"])
+@pytest.mark.parametrize("keys", [{"ebmod": 3e8, "tstrength": 2.1e7}, {"n_bond": 2e9}], ids=["elastic", "contact"])
+def test_bonds_that_break_at_once_are_announced(tmp_path, keys, disk):
+    """As many as then break, of like and unlike pairs; the widest gap that would hold is T/E (Ra + Rb), or N/kn; one
+    that is a little narrower holds, and nothing is said if all do."""
+    sim = model(tmp_path, disk=disk)
+    sim.log = log = Warned()
+    gaps = np.linspace(2.0, 14.0, 25)
+    for k, gap in enumerate(gaps):
+        radius = 40.0 + 20.0 * (k % 2)
+        particles.ball(sim, 2 * k, 0.0, 1000.0 * k, 60.0)
+        particles.ball(sim, 2 * k + 1, 60.0 + radius + gap, 1000.0 * k, radius)
+    properties.prop(sim, density=1.0, kn=4e8, ks=1e8)
+    properties.fix(sim, ("x", "y", "spin"))
+    last = np.where(np.arange(25) % 2, 120.0, 100.0) * 0.07 if "ebmod" in keys else np.full(25, 10.0)
+    breaks = int((gaps > last).sum())
+    bonds.bond(sim, **keys, tolerate=20.0)
+    assert len(log) == 1 and log[0].startswith(f"{breaks} of these bonds are past their tensile limit")
+    widest = float(log[0].split()[-2])
+    assert widest == pytest.approx(last[gaps > last].max(), rel=1e-5)
+    steps(sim, 1)
+    assert sim.broken() == (breaks, 0) and 0 < breaks < 25
+    again = bonds.bond(sim, **keys, tolerate=float(last.min()) - 1e-9)
+    assert again == 0 and len(log) == 1

@@ -35,7 +35,7 @@ def test_shortened_example_runs_to_its_figure(launch: Launcher, tmp_path: Path) 
     done = launch(1, "short.sc", cwd=tmp_path, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     (figure,) = re.findall(r"^figure: (\S+)$", done.stdout, flags=re.MULTILINE)
-    assert (tmp_path / figure).stat().st_size > 10_000 and (tmp_path / "curve.png").stat().st_size > 5000
+    assert (tmp_path / figure).stat().st_size > 10_000 and (tmp_path / "data" / "curve.png").stat().st_size > 5000
     assert re.search(r"^strength \d+\.\d MPa, 0 joints broken$", done.stdout, flags=re.MULTILINE)
 
 
@@ -44,7 +44,7 @@ def test_whole(launch: Launcher, tmp_path: Path) -> None:
     (tmp_path / "specimen.sc").write_text(TEXT)
     done = launch(1, "specimen.sc", cwd=tmp_path, timeout=3600)
     assert done.returncode == 0, done.stdout + done.stderr
-    with open(tmp_path / "curve.csv", newline="", encoding="utf-8") as file:
+    with open(tmp_path / "data" / "curve.csv", newline="", encoding="utf-8") as file:
         curve = np.array([[float(cell) for cell in row[1:]] for row in list(csv.reader(file))[1:]])
     strain, stress = 0.01 * curve[:, 0], 1e6 * curve[:, 1]
     # Elastic joints between elements, and the three open ones, make it softer than the rock, E / (1 - nu2).

@@ -82,4 +82,4 @@ def test_example_with_a_line_of_its_own(launch, tmp_path):
     assert done.returncode == 0, done.stderr
     (wider,) = re.findall(r"^at the end it is (\S+) mm wider", done.stdout, flags=re.MULTILINE)
     assert 0.01 < float(wider) < 1.0
-    assert (tmp_path / "ucs.png").stat().st_size > 10_000
+    assert (tmp_path / "data" / "ucs.png").stat().st_size > 10_000

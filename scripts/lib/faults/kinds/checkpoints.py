@@ -16,21 +16,22 @@ from faults.kinds import kind
 
 def _stopped(case: Case) -> list[Path]:
     """A run that was killed after its second checkpoint; the checkpoints, the last one last."""
-    if not case.data.exists() or len(list(case.data.glob("*.sav"))) < 3:
+    most = len(judge.in_order(case.world.reference.data)) - 1  # of those that nobody asked for, two are kept
+    if not case.data.exists() or len(list(case.data.glob("*.sav"))) < min(3, most):
         job = case.start()
-        number = case.rng.randint(3, 20)
+        number = case.rng.randint(min(3, most), min(20, most))
         case.until(lambda: len(list(case.data.glob("*.sav"))) >= number, job, 0.005)
         for pid in job.rank_pids():
             job.signal(pid, signal.SIGKILL)
         case.end(job, quiet=job.ranks > 1)
-    return sorted(case.data.glob("*.sav"))
+    return judge.in_order(case.data)
 
 
 def _damaged(case: Case, damage: Callable[[bytearray], bytes | bytearray]) -> None:
     """One checkpoint, or the last few, are damaged; the run goes on from the last one that is whole."""
     found = _stopped(case)
     for path in found[-case.rng.choice((1, 1, 1, 2, 3)) :]:
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
         path.write_bytes(damage(bytearray(path.read_bytes())))
     _goes_on(case, found)
 
@@ -99,7 +100,7 @@ def foreign(case: Case) -> None:
 @kind(".sav of the future", "the last checkpoint has a later version of the layout: it is passed over")
 def future(case: Case) -> None:
     found = _stopped(case)
-    case.moments.append(judge.reached(case.data))
+    case.moments.append(case.reached())
     with h5py.File(found[-1], "r+") as file:
         file.attrs["version"] = 99
     _goes_on(case, found)
@@ -108,7 +109,7 @@ def future(case: Case) -> None:
 @kind(".sav missing", "the last checkpoints were removed: the one before is taken; without any, the beginning")
 def missing(case: Case) -> None:
     found = _stopped(case)
-    case.moments.append(judge.reached(case.data))
+    case.moments.append(case.reached())
     for path in found[-case.rng.choice((1, 2, len(found))) :]:
         path.unlink()
 
@@ -119,14 +120,14 @@ def another(case: Case) -> None:
     _stopped(case)
     if case.done():  # before it could be killed: nobody will look at checkpoints any more
         return
-    last = sorted(case.world.other.data.glob("*.sav"))[-1]
-    place = case.data / ("9" + last.name[1:])
+    last = judge.in_order(case.world.other.data)[-1]
+    place = case.data / "9999999999.sav"
     shutil.copyfile(last, place)
-    case.moments.append(judge.reached(case.data))
+    case.moments.append(case.reached())
     case.spoiled.add(place.name)
     job = case.start()
     case._expected = None
-    case.end(job, {USAGE}, "must not be changed")
+    case.end(job, {USAGE}, "must not be changed|the script was changed")
     case.refused = True
     place.unlink()
     case.spoiled.discard(place.name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import time
@@ -11,7 +12,6 @@ from faults import judge
 from faults.case import DONE, FAILED, Case, Skipped
 from faults.kinds import kind
 from faults.kinds.kill import strike
-from faults.model import LAST
 from faults.runs import Job
 
 CANNOT = r"cannot (write|make|read)"
@@ -93,7 +93,7 @@ def small(case: Case) -> None:
     job = case.start()
     end = case.end(job, {FAILED, DONE}, FULL)
     if end.code:
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
     disk.size("64m")
 
 
@@ -103,11 +103,11 @@ def small(case: Case) -> None:
     most=1,
 )
 def quota(case: Case) -> None:
-    largest = max(path.stat().st_size for path in case.world.reference.data.iterdir())
+    largest = max((case.world.reference.data / name).stat().st_size for name in case.world.reference.names)
     job = case.start(limit=case.rng.randint(1, max(2, largest // 1024)), ranks=1)
     end = case.end(job, {FAILED, DONE}, "larger than is allowed")
     if end.code:
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
 
 
 @kind(
@@ -120,7 +120,7 @@ def error(case: Case) -> None:
     job = strike(case, call, suffix, case.rng.choice(("EIO", "ENOSPC", "EDQUOT", "EROFS")))
     end = case.end(job, {FAILED, DONE}, CANNOT)
     if end.code:
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
 
 
 @kind("disk becomes read-only", "the file system is remounted read-only in mid-run; the run ends with a message")
@@ -169,21 +169,26 @@ def removed(case: Case) -> None:
       "temporary file; the run ends with a message, and goes on when the folder is gone")  # fmt: skip
 def folder(case: Case) -> None:
     job = case.start()
-    if not case.until(lambda: judge.reached(case.data) > 0, job):
+    if not case.until(lambda: case.reached() > 0, job):
         case.end(job, {DONE})
         return
-    now = max(judge.reached(case.data), judge.newest(case.data) or 0)
+    now = max(case.reached(), (judge.newest(case.data) or 0) + case.model.ahead)
     later = [
         name
         for name in case.world.reference.names
-        if name.endswith((".sav", ".vtkhdf", ".dat")) and not name.startswith("hist")
-        and now + 600 < int(name.removeprefix("all_")[:10]) <= LAST
+        if name.endswith((".sav", ".vtkhdf", ".dat")) and not judge.is_series(name) and "auto_" not in name
+        and now + 600 < _step(name) + (0 if name.startswith("sand/") else case.model.ahead) <= case.model.last
     ]  # fmt: skip
     if not later:
         case.end(job, {DONE})
         return
     name = case.rng.choice(later) + case.rng.choice(("", ".tmp"))
     _replaced(case, job, name)
+
+
+def _step(name: str) -> int:
+    """The step in the name of a frame or checkpoint."""
+    return int(re.findall(r"\d{10}", name)[-1])
 
 
 def _replaced(case: Case, job: Job, name: str) -> None:

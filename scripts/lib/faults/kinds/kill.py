@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from functools import partial
 
-from faults import judge
 from faults.case import Case
 from faults.kinds import kind
+from faults.model import files
 from faults.runs import Job
 
 
@@ -41,7 +40,7 @@ def launcher(case: Case) -> None:
 
 def _being_written(case: Case, suffix: str) -> bool:
     try:
-        return any(entry.name.endswith(suffix + ".tmp") for entry in os.scandir(case.data))
+        return any(name.endswith(suffix + ".tmp") for name in files(case.data))
     except OSError:
         return False
 
@@ -77,7 +76,7 @@ def seen_frame(case: Case) -> None:
 def strike(case: Case, call: str, suffix: str, how: str) -> Job:
     """A run in which a random one of these calls is the last of rank 0, or fails, or stops the process."""
     calls = case.world.reference.calls.get(f"{call} {suffix}", 0)
-    left = 1.0 - min(judge.reached(case.data) / 8000.0, 0.9)
+    left = 1.0 - min(case.reached() / case.model.last, 0.9)
     nth = case.rng.randint(1, max(1, int(calls * left)))
     plan = {"call": call, "suffix": suffix, "nth": nth, "part": case.rng.random(), "how": how}
     return case.start({"strike": plan})
@@ -87,7 +86,7 @@ def _in_call(case: Case, call: str, suffix: str) -> None:
     job = strike(case, call, suffix, "SIGKILL")
     end = case.end(job, quiet=job.ranks > 1)
     if end.code != 0:
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
 
 
 @kind("kill in a write of a checkpoint", "rank 0 writes a part of the bytes of a call, then kill -9")

@@ -61,15 +61,15 @@ def _chain(case: Case, *words: str) -> None:
     number = _submit(case)
     target = case.rng.randint(300, 6000)
     deadline = time.monotonic() + 2 * runs.LONGEST
-    while judge.reached(case.data) < target and slurm.job(number).state in ("PENDING", "CONFIGURING", "RUNNING"):
+    while case.reached() < target and slurm.job(number).state in ("PENDING", "CONFIGURING", "RUNNING"):
         if time.monotonic() > deadline:
             break
         time.sleep(0.02)
-    case.moments.append(judge.reached(case.data))
+    case.moments.append(case.reached())
     before = judge.final_names(case.data)
     slurm._ask(words[0], *words[1:], str(number))
     _until_back(case, number)
-    case._row, case._expected = judge.reached(case.data), judge.newest(case.data)
+    case._row, case._expected = case.reached(), judge.newest(case.data)
     slurm.start_again(number)
     job = slurm.wait(number, 180.0)
     said = "".join(path.read_text() for path in case.folder.glob(f"*-{number}.out"))

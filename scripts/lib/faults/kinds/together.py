@@ -10,16 +10,17 @@ import signal
 from faults import judge, runs
 from faults.case import DONE, USAGE, Case
 from faults.kinds import kind
+from faults.model import files
 
 
 @kind("two runs in one folder", "a second run is started while the first one writes: it is refused, the first one goes "
       "on; or the first one is killed then, and leaves no lock behind", most=2)  # fmt: skip
 def two(case: Case) -> None:
     job = case.start(ranks=1)
-    case.until(lambda: judge.reached(case.data) > 0, job)
+    case.until(lambda: case.reached() > 0, job)
     if not job.ended():
         job.signal(job.process.pid, signal.SIGSTOP)  # so that it cannot come to its end before
-        case.moments.append(judge.reached(case.data))
+        case.moments.append(case.reached())
         words = [str(case.script), "--outdir", str(case.data)]
         second = runs.start(words, case.next_ranks(), case.folder, name="second")
         case.jobs.insert(0, second)
@@ -40,7 +41,7 @@ def old_folder(case: Case) -> None:
         raise AssertionError("must be the first fault of a case")
     shutil.copytree(case.world.other.data, case.data)
     mine = set(case.world.reference.names)
-    case.spoiled |= {path.name for path in case.data.iterdir()} - mine
+    case.spoiled |= set(files(case.data)) - mine
     strangers = {path.name: path.stat().st_mtime_ns for path in case.data.glob("*.sav")}
     job = runs.start([str(case.script)], case.next_ranks(), case.folder, name="log0")
     case.jobs.append(job)
@@ -61,7 +62,7 @@ def old_folder(case: Case) -> None:
             job.signal(pid, signal.SIGKILL)
     job.end()
     left = set(strangers) - set(own())
-    case.spoiled |= {path.name for path in case.data.iterdir() if path.name in left or path.suffix != ".sav"}
+    case.spoiled |= {name for name in files(case.data) if name in left or not name.endswith(".sav")}
     case.end(case.start(), {DONE})
     # Everything of this run was written anew by now, so it is looked at like that of any other.
     case.spoiled -= mine
@@ -75,7 +76,7 @@ def locks(case: Case) -> None:
     if case.moment(job, 500, begins=False):
         job.signal(job.process.pid, signal.SIGKILL)
     case.end(job)
-    found = sorted(case.data.glob("*.sav"))
+    found = judge.in_order(case.data)
     if not found:
         return
     handle = os.open(found[-1], os.O_RDWR)

@@ -1,0 +1,183 @@
+"""Values that no model could make right are refused when a line is read: what they go into is made, and dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from hpcdem.errors import CommandError
+from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.statement import Pending
+from hpcdem.lang.pcdc.table import Command
+from hpcdem.model.blocks import properties
+from hpcdem.model.blocks.tables import Drawn, Over, Table
+
+MODELS = {
+    "mechanical-iso-elastic": properties.MECH_ISO_ELASTIC,
+    "contact-mohr-coulomb": properties.CONTACT_MOHR_COULOMB,
+    "classic-intrinsic-cohesive-interface": properties.COHESIVE,
+}
+"""Models of the language by their names in full."""
+_OF_COMMAND = {
+    "element property": properties.MECH_ISO_ELASTIC,
+    "element-face property": properties.CONTACT_MOHR_COULOMB,
+    "face-joint property": properties.COHESIVE,
+}
+
+
+def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    """ValueError if values of a line make no sense in any model; expressions are left to the verbs, which refuse the
+    same."""
+    try:
+        for name, value in terms or ():
+            if name in ("id", "x", "y") and known(value):
+                _ascending(name, value)
+        if "model" in arguments:
+            _model(arguments["model"], arguments["properties"])
+        elif command.name in _OF_COMMAND:
+            _changes(_OF_COMMAND[command.name], _given(arguments))
+        elif command.name in _TRIALS and known(list(arguments.values())):
+            _TRIALS[command.name](arguments)
+    except CommandError as error:
+        raise ValueError(str(error)) from None
+
+
+def known(value: Any) -> bool:
+    """Nothing in a value waits for an expression."""
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, (list, tuple)):
+        return all(known(item) for item in value)
+    return not isinstance(value, Pending)
+
+
+def python(name: str) -> str:
+    """`poisson-ratio` as a name of Python."""
+    return name.replace("-", "_")
+
+
+def _given(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Those that are known and the same everywhere at all times, under the names of Python."""
+    return {
+        python(name): value
+        for name, value in arguments.items()
+        if known(value) and not isinstance(value, (TableName, Over, Drawn))
+    }
+
+
+def _ascending(name: str, bounds: tuple[Any, ...]) -> None:
+    if bounds[0] > bounds[-1]:
+        raise CommandError(f"{name} {bounds[0]:g} {bounds[-1]:g}: the first is above the second")
+
+
+def _model(name: str, arguments: Mapping[str, Any]) -> None:
+    given = _given(arguments)
+    if name in MODELS:
+        _changes(MODELS[name], given)
+    elif name == "mechanical-move-boundary-constraint" and "type" in given:
+        kind, *way = given["type"]
+        if kind == 2 and not (way and any(way[0])):
+            raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
+    elif name == "mechanical-velocity-boundary-condition":
+        for axis in "xy":
+            if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
+                raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
+
+
+def _changes(model: properties.Model, given: dict[str, Any]) -> None:
+    """Properties of a model, some of them perhaps left out or not known yet."""
+    given = {name: value for name, value in given.items() if name != "np"}
+    for name, value in given.items():
+        model.property(name).check(value)
+    moduli = {name: value for name, value in given.items() if name in properties.MODULI}
+    if len(moduli) > 1:
+        properties.MECH_ISO_ELASTIC.complete({"density": 1.0, **moduli})
+    if model is properties.COHESIVE:
+        for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
+            pair = {name: given.get(name, 0.0) for name in (strength, energy)}
+            if strength in given and energy in given:
+                others = {"tensile_strength": 0.0, "cohesion": 0.0, "gf1": 0.0, "gf2": 0.0, "penalty_normal": 1.0}
+                model.complete({**others, **pair})
+
+
+# ---- commands that make something of their values alone --------------------------------------------------------------
+
+
+def _shape(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in arguments.items() if name != "as-layer"}
+
+
+def _make_shape(verb: str) -> Callable[[Mapping[str, Any]], None]:
+    def make(arguments: Mapping[str, Any]) -> None:
+        from hpcdem.commands.blocks import geometry
+
+        geometry.shape(verb, *_shape(arguments).values())
+
+    return make
+
+
+def _rectangle(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import meshing
+
+    meshing.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
+
+
+def _equilateral(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import meshing
+
+    meshing.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
+
+
+def _table(arguments: Mapping[str, Any]) -> None:
+    Table.of(arguments["values"], arguments["name"])
+
+
+def _history(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import histories
+
+    histories.file_name(arguments["name"])
+
+
+def _export(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import charts
+
+    charts.figure_name(arguments["file"])
+
+
+def _frames(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import frames
+
+    frames.file_name(arguments["file"])
+
+
+def _fractures(arguments: Mapping[str, Any]) -> None:
+    from hpcdem.commands.blocks import meshing
+
+    meshing.fracture_set(**fracture_words(arguments)).check("fractures")
+
+
+def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The statistics of `geometry create fractures` as `meshing.fracture_set` takes them."""
+    densities = [name for name in ("p10", "p20", "p21") if name in arguments]
+    if len(densities) != 1:
+        raise CommandError("fractures need one density: p10, p20 or p21")
+    orientation, length = arguments["orientation"], arguments["length"]
+    return {
+        "orientation": (*orientation["value"], orientation.get("spread", 0.0)),
+        "length": (*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
+        "density": (densities[0], arguments[densities[0]]), "scanline": arguments.get("scan-line", 0.0),
+        "ends_at": arguments.get("ends-at", 0.0), "reached": arguments.get("reached", False),
+    }  # fmt: skip
+
+
+_TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
+    **{f"geometry create {name}": _make_shape(name) for name in
+       ("polyline", "polygon", "rectangle", "circle", "arc", "point")},
+    "geometry create fractures": _fractures,
+    "mesh structured": _rectangle,
+    "mesh equilateral": _equilateral,
+    "table create": _table,
+    "history create": _history,
+    "chart export": _export,
+    "output vtk": _frames,
+}  # fmt: skip

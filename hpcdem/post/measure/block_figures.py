@@ -1,0 +1,346 @@
+"""The figures of cracks, fragments and emission of blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hpcdem.io.vtkhdf_mesh import MeshState
+from hpcdem.post import blocks, plots
+from hpcdem.post.measure import emission
+from hpcdem.post.measure.blocks import Emission, Part
+from hpcdem.post.measure.emission import Events
+from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TOP, key, label, length_unit, page, scaled
+
+MODE_COLOURS = blocks.TENSION, blocks.MIXED, blocks.SHEAR
+GREY, PALE = "#808080", "#e4e1d8"
+MAP_HEIGHT = 9.5
+"""Of maps at most [cm]."""
+LOWER_GAP = 1.45
+"""Above panels that have another axis than those over them [cm]."""
+LEGEND = 0.6
+"""Room for a line of a legend over the maps [cm]."""
+SOME_FRAMES = 5
+"""Size distributions that are drawn at most."""
+FRAGMENT_COLOURS = (
+    "#7fa6c9", "#e8b27d", "#9cc49a", "#c9a0c4", "#d8cf7f", "#8fc4c0", "#dd9a96", "#b3b7d9", "#c4a98a", "#a8c97f",
+)  # fmt: skip
+
+
+def times(values: np.ndarray, timed: bool) -> tuple[np.ndarray, str]:
+    """Places on the axis of time and its name: s, ms or us; steps where time stands still."""
+    if not timed:
+        return values / 1000.0, "thousand steps"
+    largest = float(np.abs(values).max(initial=0.0))
+    size, unit = next((s, u) for s, u in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")) if largest >= s or s == 1e-6)
+    return values / size, f"time ({unit})"
+
+
+def when(parts: Sequence[Part]) -> tuple[np.ndarray, str]:
+    """The same for frames."""
+    time = np.array([one.time for one in parts])
+    timed = bool(np.ptp(time) > 0.0)
+    return times(time if timed else np.array([float(one.step) for one in parts]), timed)
+
+
+def _plain(axes: Any) -> None:
+    axes.grid(lw=0.3, color="#d0d0d0")
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0)
+    for spine in axes.spines.values():
+        spine.set_linewidth(0.6)
+
+
+def _marks(n: int) -> str:
+    return "o-" if n <= 40 else "-"
+
+
+def _letters(axes: Sequence[Any]) -> None:
+    for letter, ax in zip("abcdefgh", axes):
+        ax.text(0.0, 1.015, f"({letter})", transform=ax.transAxes, fontsize=plots.FONT - 1.0, va="bottom")
+
+
+class _Maps:
+    """Room for some maps of a model, side by side below the panels of a page, with a legend over them. above: heights
+    of the panels, gaps: below them [cm]. scale: cm on paper per metre."""
+
+    def __init__(
+        self, state: MeshState, above: Sequence[float], gaps: Sequence[float], number: int, bar: float = 1.7,
+        right: float = RIGHT,
+    ) -> None:  # fmt: skip
+        seen = blocks.view(state)
+        room = (plots.PAGE_WIDTH - LEFT - bar - RIGHT - (number - 1) * GAP) / number
+        self.width = min(room, MAP_HEIGHT * seen.width / seen.height)
+        self.height = self.width * seen.height / seen.width
+        self.scale, self.seen = self.width / seen.width, seen
+        self.figure, axes = page([*above, self.height], gaps, right)
+        self.panels, below = axes[:-1], axes[-1]
+        below.remove()
+        total = TOP + sum(above) + sum(gaps) + self.height + BOTTOM
+        self._page = plots.PAGE_WIDTH, total
+        used = number * self.width + (number - 1) * GAP + bar
+        left = LEFT + max(0.0, 0.5 * (plots.PAGE_WIDTH - LEFT - RIGHT - used))
+        self.maps = [self._axes(left + k * (self.width + GAP), self.width) for k in range(number)]
+        for k, ax in enumerate(self.maps):
+            blocks.frame(ax, seen, blocks.Looks(font=plots.FONT), first=k == 0, last=True)
+        self._right = left + number * self.width + (number - 1) * GAP
+
+    def _axes(self, x: float, width: float, part: float = 1.0) -> Any:
+        w, h = self._page
+        return self.figure.add_axes((x / w, BOTTOM / h, width / w, part * self.height / h))
+
+    def legend(self, handles: Sequence[Any]) -> None:
+        """A line over the maps, what it stands for being in the first."""
+        w, h = self._page
+        place = self.maps[0].get_position().x0, (BOTTOM + self.height + 0.45) / h
+        self.figure.legend(
+            handles=handles, loc="lower left", bbox_to_anchor=place, ncols=6, frameon=False,
+            fontsize=plots.FONT - 1.5, handlelength=1.2, columnspacing=1.0, handletextpad=0.4, borderaxespad=0.0,
+        )  # fmt: skip
+
+    def bar(self) -> Any:
+        """Axes for colours, right of the last map."""
+        return self._axes(self._right + 0.3, 0.3)
+
+
+def _elements(axes: Any, state: MeshState, colour: Any = PALE, edges: Any = "face") -> None:
+    """All elements, in one colour or (ne,) colours."""
+    from matplotlib.collections import PolyCollection
+
+    for n in (3, 4):
+        rows = np.flatnonzero((state.cells[:, 3] >= 0) == (n == 4))
+        if len(rows):
+            face = colour if isinstance(colour, str) else colour[rows]
+            axes.add_collection(
+                PolyCollection(state.points[state.cells[rows, :n]], facecolors=face, edgecolors=edges, linewidths=0.2),
+                autolim=False,
+            )
+
+
+# --- cracks ------------------------------------------------------------------------------------------------------
+
+
+def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> Any:
+    """Broken joints by mode (of the events, which are finer than the frames, if there are any) and damage over time;
+    below, where they are in the last frame, by mode and by time."""
+    timed = "break_time" in state.of_joints and bool((state.of_joints["state"] == blocks.BROKEN).any())
+    sheet = _Maps(state, [4.6, 3.6], [GAP, LOWER_GAP + LEGEND], 2 if timed else 1)
+    a, b = sheet.panels
+    at, axis = when(parts)
+    if events is None or not len(events):
+        ends, counts = at, np.array([one.cracks.broken for one in parts])
+    else:
+        stamps = np.array([one.time if "time" in axis else one.step for one in parts], float)
+        factor = float(at[-1] / stamps[-1]) if stamps[-1] else 1.0
+        moment = (events.time if "time" in axis else events.step) * factor
+        counts = np.cumsum(events.kinds()[:, None] == np.arange(len(emission.MODES)), axis=0)
+        ends = np.concatenate([[min(at[0], moment[0])], moment, [max(at[-1], moment[-1])]])
+        counts = np.concatenate([np.zeros((1, len(emission.MODES)), int), counts, counts[-1:]])
+    a.stackplot(ends, counts.T, colors=MODE_COLOURS, labels=emission.MODES, lw=0.0, alpha=0.85, step="post")
+    a.step(ends, counts.sum(axis=1), where="post", lw=1.0, color=INK, label="all")
+    label(a, None, "broken joints")
+    key(a, loc="upper left")
+    damage = np.array([one.cracks.damage for one in parts])
+    length = np.array([one.cracks.broken_length.sum() for one in parts])
+    total = np.array([one.cracks.length for one in parts])
+    b.plot(at, 100.0 * damage, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="damage index")
+    b.plot(at, 100.0 * length / np.where(total > 0.0, total, 1.0), "--", lw=1.0, color=INK, label="broken length")
+    label(b, axis, "of all joints (%)")
+    key(b, loc="upper left")
+    for ax in (a, b):
+        _plain(ax)
+        ax.set_xlim(*_ends(at))
+        ax.set_ylim(bottom=0.0)
+    sheet.legend(blocks.panel(sheet.maps[0], state, sheet.seen, sheet.width, blocks.Looks(font=plots.FONT)))
+    if timed:
+        _by_time(sheet, state)
+    _letters([a, b, *sheet.maps])
+    return sheet.figure
+
+
+def _ends(at: np.ndarray) -> tuple[float, float]:
+    low, high = float(at.min()), float(at.max())
+    return (low, high) if high > low else (low - 0.5, low + 0.5)
+
+
+def _by_time(sheet: _Maps, state: MeshState) -> None:
+    """Broken joints in the colours of the time at which they broke."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
+
+    axes = sheet.maps[1]
+    _elements(axes, state)
+    rows = np.flatnonzero(state.of_joints["state"] == blocks.BROKEN)
+    broke = state.of_joints["break_time"][rows]
+    order = np.argsort(broke, kind="stable")
+    at, name = times(broke[order], True)
+    scale = ScalarMappable(Normalize(*_ends(at)), "plasma")
+    width = blocks.line_width(state, sheet.scale)
+    axes.add_collection(
+        LineCollection(
+            list(state.points[state.joints[rows[order]]]), colors=scale.to_rgba(at), linewidths=width, capstyle="round",
+            zorder=3,
+        ),
+        autolim=False,
+    )  # fmt: skip
+    bar = sheet.figure.colorbar(scale, cax=sheet.bar())
+    bar.set_label(f"{name} of breaking".replace("time (", "time of breaking (").replace(") of breaking", ")"),
+                  fontsize=plots.FONT)  # fmt: skip
+    bar.ax.tick_params(labelsize=plots.FONT - 1.0, width=0.5, length=2.5)
+    bar.outline.set_linewidth(0.5)
+
+
+# --- fragments ---------------------------------------------------------------------------------------------------
+
+
+def fragments(parts: Sequence[Part], state: MeshState) -> Any:
+    """Number of fragments and share of the largest over time; distribution of sizes; the last frame."""
+    from matplotlib import colormaps
+
+    sheet = _Maps(state, [3.8, 4.6], [LOWER_GAP, LOWER_GAP], 1, 0.0, 1.6)
+    a, b = sheet.panels
+    at, axis = when(parts)
+    pieces = [one.pieces for one in parts if one.pieces is not None]
+    number = np.array([len(p.area) for p in pieces])
+    share = np.array([p.area[0] / p.area.sum() for p in pieces])
+    a.plot(at, number, _marks(len(at)), ms=2.5, lw=1.2, color=INK, label="fragments")
+    a.set_ylim(0.0, 1.1 * float(number.max()))
+    label(a, axis, "fragments")
+    other = a.twinx()
+    other.plot(at, 100.0 * share, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[1])
+    other.set_ylim(0.0, 105.0)
+    other.set_ylabel("area of the largest (%)", fontsize=plots.FONT, color=LINES[1])
+    _plain(a)
+    other.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0, colors=LINES[1])
+    a.set_xlim(*_ends(at))
+    # Of frames with as many fragments the first; of these some.
+    changed = [k for k in range(len(pieces)) if k == 0 or number[k] != number[k - 1]]
+    chosen = [changed[k] for k in np.unique(np.linspace(0, len(changed) - 1, SOME_FRAMES).round().astype(int))]
+    size, unit = length_unit(max(float(p.size[0]) for p in pieces))
+    for k in chosen:
+        sizes, passing = pieces[k].passing()
+        shade = INK if k == chosen[-1] else colormaps["viridis"](0.1 + 0.75 * k / max(len(pieces) - 1, 1))
+        moment = f"{at[k]:.3g} {axis[axis.find('(') + 1 : -1]}" if "(" in axis else f"step {parts[k].step}"
+        b.step(np.append(sizes[0], sizes) / size, 100.0 * np.append(0.0, passing), where="post", lw=1.2, color=shade,
+               label=moment)  # fmt: skip
+    b.set_xscale("log")
+    b.set_ylim(0.0, 105.0)
+    label(b, f"size of fragment: diameter of the circle of its area ({unit})", "area in smaller ones (%)")
+    key(b, loc="upper left")
+    _plain(b)
+    ax = sheet.maps[0]
+    last = pieces[-1]
+    shades = np.array([*FRAGMENT_COLOURS, "#f2f0ea"], object)
+    # Dust of single elements stays pale, and so does what was not asked for.
+    kind = np.where((last.of >= 0) & (last.elements[last.of] > 1), last.of % len(FRAGMENT_COLOURS), -1)
+    _elements(ax, state, shades[kind])
+    broken = np.isin(state.of_joints["state"], (blocks.BROKEN, blocks.FREE))
+    blocks.lines(ax, state.points[state.joints[broken]], INK, 0.5 * blocks.line_width(state, sheet.scale))
+    _letters([a, b, ax])
+    return sheet.figure
+
+
+# --- emission ----------------------------------------------------------------------------------------------------
+
+
+def emitted(found: Emission) -> Any:
+    """Load and events over time, rate by mode, magnitudes; magnitude-frequency plot and places of the events."""
+    low_height = 6.2
+    figure, (a, b, c, low) = page([4.4, 3.6, 3.6, low_height], [GAP, GAP, LOWER_GAP], right=1.6)
+    kinds = found.events.kinds()
+    edges, axis = times(np.append(found.rates[:, 0], found.rates[-1, 1]), found.timed)
+    factor = float(edges[-1] / found.rates[-1, 1]) if found.rates[-1, 1] else 1.0
+    at = found.at * factor
+    _load(a, found, factor)
+    count = a.twinx()
+    order = np.argsort(at, kind="stable")
+    steps = np.concatenate([[edges[0]], at[order], [edges[-1]]])
+    total = np.concatenate([[0], np.arange(1, len(at) + 1), [len(at)]])
+    count.step(steps, total, where="post", lw=1.2, color=LINES[1])
+    count.set_ylim(0.0, 1.08 * len(at))
+    count.set_ylabel("cumulative events", fontsize=plots.FONT, color=LINES[1])
+    count.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0, colors=LINES[1])
+    base = np.zeros(len(found.rates))
+    for k, (name, shade) in enumerate(zip(emission.MODES, MODE_COLOURS)):
+        b.bar(edges[:-1], found.rates[:, 2 + k], np.diff(edges), base, align="edge", color=shade, lw=0.0, label=name)
+        base += found.rates[:, 2 + k]
+    part = float(found.rates[0, 1] - found.rates[0, 0])
+    wide, unit = times(np.array([part]), True)
+    told = f"{wide[0]:.2g} {unit[unit.find('(') + 1 : -1]}" if found.timed else f"{part:.3g} steps"
+    label(b, None, f"events per {told}")
+    key(b, loc="upper left")
+    for k, shade in enumerate(MODE_COLOURS):
+        c.plot(at[kinds == k], found.magnitude[kinds == k], "o", ms=2.6, mfc="none", mec=shade, mew=0.6)
+    label(c, axis, "magnitude M")
+    for ax in (a, b, c):
+        _plain(ax)
+        ax.set_xlim(edges[0], edges[-1])
+    b.set_ylim(bottom=0.0)
+    place = low.get_position()
+    low.set_position((place.x0, place.y0, 0.46 * place.width, place.height))
+    _frequencies(low, found)
+    shown = figure.add_axes((place.x0 + 0.6 * place.width, place.y0, 0.4 * place.width, place.height))
+    _places(shown, found, kinds)
+    _letters([a, b, c, low, shown])
+    return figure
+
+
+def _load(axes: Any, found: Emission, factor: float) -> None:
+    """The history beside the events; compression upwards if there is more of it."""
+    curve = found.history
+    if curve is None or not len(curve.step):
+        axes.set_yticks([])
+        label(axes, None, "")
+        return
+    values = curve.values
+    known = values[np.isfinite(values)]
+    sign = -1.0 if len(known) and known[np.argmax(np.abs(known))] < 0.0 else 1.0
+    size, unit = scaled(float(np.abs(known).max(initial=0.0)), curve.unit)
+    axes.plot((curve.time if found.timed else curve.step) * factor, sign * values / size, lw=1.0, color=INK)
+    label(axes, None, f"{'−' if sign < 0 else ''}{curve.name} ({unit})")
+    bottom, top = axes.get_ylim()
+    if -0.1 * top < bottom < 0.0:
+        axes.set_ylim(bottom=0.0)
+    axes.set_zorder(1.0)
+    axes.patch.set_visible(False)
+
+
+def _frequencies(axes: Any, found: Emission) -> None:
+    """Number of events of each magnitude, and from each on; the line of the fit."""
+    edges, number, above = emission.frequencies(found.magnitude)
+    f = found.fit
+    if not len(edges):
+        axes.text(0.5, 0.5, "no event has energy", transform=axes.transAxes, ha="center", fontsize=plots.FONT)
+        return
+    some = number > 0
+    axes.semilogy(edges[some] + 0.5 * emission.BIN, number[some], "s", ms=3.0, mfc="none", mec=GREY, mew=0.7,
+                  label=f"in bins of {emission.BIN:g}")  # fmt: skip
+    axes.semilogy(edges, above, "o", ms=3.2, color=INK, label="of M and above")
+    if np.isfinite(f.b):
+        m = np.array([f.completeness, min(f.a / f.b, float(edges[-1]) + 2.0 * emission.BIN)])
+        axes.semilogy(m, 10.0 ** (f.a - f.b * m), "-", lw=1.2, color=LINES[1],
+                      label=f"b = {f.b:.2f} ± {f.error:.2f}")  # fmt: skip
+        axes.axvline(f.completeness, color=LINES[1], lw=0.7, ls=":")
+    axes.set_ylim(0.7, 30.0 * float(above.max()))  # room for the legend
+    label(axes, "magnitude M", "events")
+    key(axes, loc="upper right")
+    _plain(axes)
+
+
+def _places(axes: Any, found: Emission, kinds: np.ndarray) -> None:
+    """Where events were, the size of the circles by magnitude."""
+    e = found.events
+    m = np.nan_to_num(found.magnitude, nan=float(np.nanmin(found.magnitude, initial=0.0)))
+    part = (m - m.min()) / max(float(np.ptp(m)), 1e-12)
+    size, unit = length_unit(float(max(np.ptp(e.x), np.ptp(e.y))))
+    for k, shade in enumerate(MODE_COLOURS):
+        rows = kinds == k
+        axes.scatter(e.x[rows] / size, e.y[rows] / size, s=2.0 + 34.0 * part[rows] ** 2, facecolors="none",
+                     edgecolors=shade, linewidths=0.6)  # fmt: skip
+    axes.set_aspect("equal", adjustable="box")
+    axes.margins(0.06)
+    label(axes, f"x ({unit}); size: magnitude", f"y ({unit})")
+    _plain(axes)

@@ -1,0 +1,366 @@
+"""What frames of blocks tell of cracks and fragments, and the table of joints that broke: tables of `hpcdem measure`.
+
+Damage index: length of the joints times their damage (0 before the peak, 1 broken, between as softening has gone) over
+the length of all joints. P21: length of broken joints per area (Dershowitz & Herda 1992, Proc. 33rd US Symp. Rock
+Mech., 323-330). Both by the lengths and areas of the mesh.
+
+Fragments are connected components of elements: two hang together where they share an edge that is no joint, or a joint
+that holds. Size of a fragment: diameter of the circle of its area; passing: part of the area in fragments up to a size.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.io.frames import FrameFile, list_mesh_frames
+from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+from hpcdem.post.blocks import BROKEN, FREE, YIELDED
+from hpcdem.post.measure import emission
+from hpcdem.post.measure.emission import BIN, MODES, Curve, Events, Fit
+from hpcdem.post.measure.kinds import NAN, Sheet
+from hpcdem.post.measure.scene import Request
+
+INTACT = 1.0
+SHARES = 0.2, 0.5, 0.8
+"""Parts of the area for which the size is told that holds as much in smaller fragments."""
+HEAD = ("step", "time[s]")
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Fragments of a frame, the largest first: fragment of each element that is asked for (n,), -1: not asked for;
+    area [m2], elements in it, x, y: of its middle [m] (m,) each."""
+
+    of: np.ndarray
+    area: np.ndarray
+    elements: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """(m,) diameters of circles of these areas [m]."""
+        return np.sqrt(4.0 * self.area / math.pi)
+
+    def passing(self) -> tuple[np.ndarray, np.ndarray]:
+        """Sizes in ascending order [m], and the part of the area in fragments up to each."""
+        area = self.area[::-1]
+        return self.size[::-1], np.cumsum(area) / max(float(area.sum()), 1e-300)
+
+    def characteristic(self) -> list[float]:
+        """The sizes [m] at which SHARES of the area are in smaller fragments or in this one."""
+        size, passing = self.passing()
+        return [float(size[min(int(np.searchsorted(passing, share - 1e-12)), len(size) - 1)]) for share in SHARES]
+
+
+@dataclass(frozen=True)
+class Cracks:
+    """Joints of a frame: how many there are, behind their strength, broken by MODES (3,); lengths of all, of those, of
+    these [m]; damage index; area of the elements [m2]; kinetic energy of the broken ones when they broke [J/m]."""
+
+    joints: int
+    yielded: int
+    broken: np.ndarray
+    length: float
+    yielded_length: float
+    broken_length: np.ndarray
+    damage: float
+    area: float
+    energy: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """What is taken from a frame."""
+
+    step: int
+    time: float
+    cracks: Cracks
+    pieces: Pieces | None
+
+
+def frames(request: Request) -> list[FrameFile]:
+    """The frames of blocks that are asked for. Raises HpcdemError if the folder cannot be read."""
+    first, last = request.first or 0, request.last
+    return [f for f in list_mesh_frames(request.folder) if f.step >= first and (last is None or f.step <= last)]
+
+
+def read(file: FrameFile, request: Request) -> MeshState:
+    """A frame, moved as asked for."""
+    state = read_mesh_frame(file.path)
+    state.points = state.points + np.array([request.xmove, request.ymove])
+    return state
+
+
+def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
+    """Joints, and fragments if they are asked for, of a frame."""
+    wanted = chosen(state, request)
+    pieces = fragments(state, wanted) if "fragments" in what else None
+    return Part(state.step, state.time, cracks(state, wanted), pieces)
+
+
+def chosen(state: MeshState, request: Request) -> np.ndarray:
+    """(ne,) elements of the groups that are asked for. UsageError if no set has one of them."""
+    keep = np.zeros(len(state.cells), bool)
+    if not request.groups:
+        return ~keep
+    known: list[str] = []
+    for column, names in state.group_names.items():
+        known += names
+        rows = [k for k, name in enumerate(names) if name in request.groups]
+        keep |= np.isin(state.of_elements[column], rows)
+    if not set(request.groups) & set(known):
+        raise UsageError(f"no element is of group {', '.join(request.groups)}; there is {', '.join(known) or 'none'}")
+    return keep
+
+
+def cracks(state: MeshState, wanted: np.ndarray) -> Cracks:
+    """Joints between elements that are wanted (ne,)."""
+    j = state.of_joints
+    keep = np.ones(len(state.joints), bool)
+    if not wanted.all():
+        lower, upper = sides(state)
+        there = np.append(wanted, True)  # the last: what was taken out
+        keep = there[lower] & there[upper]
+    keep &= j["state"] != FREE
+    now, length, damage = j["state"][keep], j["length"][keep], np.nan_to_num(j["damage"][keep])
+    broken = now == BROKEN
+    kind = np.searchsorted(emission.LIMITS, j["mode"][keep][broken], side="right")
+    energy = np.nan_to_num(j.get("break_energy", np.zeros(len(keep)))[keep][broken])
+    total = float(length.sum())
+    return Cracks(
+        len(now), int((now == YIELDED).sum()), np.bincount(kind, minlength=len(MODES)), total,
+        float(length[now == YIELDED].sum()), np.bincount(kind, length[broken], len(MODES)),
+        float((length * damage).sum()) / total if total > 0.0 else 0.0, float(state.of_elements["area"][wanted].sum()),
+        math.fsum(energy),
+    )  # fmt: skip
+
+
+def _pairs(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inner edges: rows of the two elements (m,), that with the lower number first, and number of its face."""
+    if "node" not in state.of_points:
+        raise HpcdemError(
+            f"step {state.step}: this frame is of an earlier version and does not tell which elements are neighbours; "
+            "run the model again"
+        )
+    node, cells = state.of_points["node"], state.cells
+    count = np.where(cells[:, 3] >= 0, 4, 3)
+    element = np.repeat(np.arange(len(cells)), count)
+    edge = np.concatenate([np.arange(n) for n in (3, 4)])[np.where(count == 3, 0, 3).repeat(count) + _within(count)]
+    a, b = (node[cells[element, k]] for k in (edge, (edge + 1) % count[element]))
+    face = 4 * state.of_elements["number"][element].astype(np.int64) + edge
+    order = np.lexsort((face, np.maximum(a, b), np.minimum(a, b)))
+    low, high = np.minimum(a, b)[order], np.maximum(a, b)[order]
+    same = np.flatnonzero((low[1:] == low[:-1]) & (high[1:] == high[:-1]))
+    return element[order[same]], element[order[same + 1]], face[order[same]]
+
+
+def _within(count: np.ndarray) -> np.ndarray:
+    """0, 1, ... for each of the stretches of these lengths, one after the other."""
+    return np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count)
+
+
+def sides(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the elements on both sides of each joint (nj,), the lower first; -1: it was taken out."""
+    first, second, face = _pairs(state)
+    number = state.of_joints["number"].astype(np.int64)
+    lower = np.searchsorted(state.of_elements["number"], number // 4)
+    order = np.argsort(face)
+    at = np.minimum(np.searchsorted(face[order], number), max(len(face) - 1, 0))
+    found = face[order][at] == number if len(face) else np.zeros(len(number), bool)
+    return lower, np.where(found, second[order][at] if len(face) else -1, -1)
+
+
+def fragments(state: MeshState, wanted: np.ndarray) -> Pieces:
+    """The fragments of the elements that are wanted (ne,)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    first, second, face = _pairs(state)
+    holds = (state.of_joints["state"] == INTACT) | (state.of_joints["state"] == YIELDED)
+    gone = state.of_joints["number"][~holds].astype(np.int64)
+    tied = ~np.isin(face, gone) & wanted[first] & wanted[second]
+    n = len(state.cells)
+    graph = coo_matrix((np.ones(int(tied.sum())), (first[tied], second[tied])), (n, n))
+    _, label = connected_components(graph, directed=False)
+    rows = np.flatnonzero(wanted)
+    area = state.of_elements["area"]
+    _, of = np.unique(label[rows], return_inverse=True)
+    of = of.reshape(-1)
+    areas, count = np.bincount(of, area[rows]), np.bincount(of)
+    lowest = np.full(len(areas), n)
+    np.minimum.at(lowest, of, rows)
+    order = np.lexsort((lowest, -areas))  # equal ones by their lowest element
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    of = place[of]
+    middle = _middles(state)[rows]
+    x, y = (np.bincount(of, area[rows] * middle[:, c]) / areas[order] for c in range(2))
+    whole = np.full(n, -1)
+    whole[rows] = of
+    return Pieces(whole, areas[order], count[order], x, y)
+
+
+def _middles(state: MeshState) -> np.ndarray:
+    """(ne, 2) means of the corners."""
+    real = state.cells >= 0
+    corners = np.where(real[:, :, None], state.points[state.cells], 0.0)
+    return corners.sum(axis=1) / real.sum(axis=1)[:, None]
+
+
+# --- tables ------------------------------------------------------------------------------------------------------
+
+
+def cracks_sheets(parts: Sequence[Part]) -> list[Sheet]:
+    head = (
+        *HEAD, "joints", "yielded", *MODES, "broken", "length[m]", "yielded_length[m]",
+        *(f"{name}_length[m]" for name in MODES), "broken_length[m]", "damage", "p21[1/m]", "kinetic_energy[J/m]",
+    )  # fmt: skip
+
+    def rows() -> Iterable[Sequence[Any]]:
+        for one in parts:
+            c = one.cracks
+            broken = float(c.broken_length.sum())
+            yield (
+                one.step, one.time, c.joints, c.yielded, *c.broken.tolist(), int(c.broken.sum()), c.length,
+                c.yielded_length, *c.broken_length.tolist(), broken, c.damage, broken / c.area if c.area else NAN,
+                c.energy,
+            )  # fmt: skip
+
+    return [Sheet("cracks_joints", head, rows())]
+
+
+def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
+    head = (
+        *HEAD, "fragments", "single_elements", "area[m2]", "largest_share",
+        *(f"size_{100 * share:.0f}[m]" for share in SHARES),
+    )  # fmt: skip
+
+    def rows() -> Iterable[Sequence[Any]]:
+        for one in parts:
+            p = one.pieces
+            assert p is not None
+            total = float(p.area.sum())
+            yield (
+                one.step, one.time, len(p.area), int((p.elements == 1).sum()), total, float(p.area[0]) / total,
+                *p.characteristic(),
+            )  # fmt: skip
+
+    last = parts[-1].pieces
+    assert last is not None
+    passing = last.passing()[1][::-1]
+    columns = (last.elements, last.area, last.size, passing, last.x, last.y)
+    each = ((k, *row) for k, row in enumerate(zip(*(c.tolist() for c in columns), strict=True), 1))
+    names = ("fragment", "elements", "area[m2]", "size[m]", "passing", "x[m]", "y[m]")
+    return [Sheet("fragments", head, rows()), Sheet("fragments_last", names, each)]
+
+
+@dataclass(frozen=True)
+class Emission:
+    """Joints that broke, their energies [J] and magnitudes, the fit, rates (rows of `emission.rates`), whether these
+    are over time (else over steps), and the history that is drawn with them."""
+
+    events: Events
+    energy: np.ndarray
+    magnitude: np.ndarray
+    fit: Fit
+    rates: np.ndarray
+    timed: bool
+    history: Curve | None
+
+    @property
+    def at(self) -> np.ndarray:
+        """(n,) when they were: time [s], or step."""
+        return self.events.time if self.timed else self.events.step.astype(float)
+
+
+def events_of(request: Request, files: Sequence[FrameFile]) -> Events:
+    """All joints that broke: of the table that the run wrote; else those that are broken in the last frame."""
+    path = request.folder / emission.TABLE
+    if path.is_file():
+        found = emission.read_events(path)
+    else:
+        found = _in_frame(read_mesh_frame(files[-1].path))
+    keep = (found.step >= (request.first or 0)) & (request.last is None or found.step <= (request.last or 0))
+    if request.groups and not files:
+        raise UsageError(f"--groups: {request.folder} has no frames of blocks, which tell the groups of elements")
+    if request.groups:
+        state = read_mesh_frame(files[0].path)
+        keep &= np.isin(found.joint // 4, state.of_elements["number"][chosen(state, request)])
+    found = found.take(keep)
+    found.x[:] += request.xmove
+    found.y[:] += request.ymove
+    return found
+
+
+def _in_frame(state: MeshState) -> Events:
+    j = state.of_joints
+    if "break_time" not in j:
+        raise HpcdemError(
+            f"step {state.step}: this frame is of an earlier version and does not tell when joints broke; run the "
+            "model again"
+        )
+    rows = np.flatnonzero(j["state"] == BROKEN)
+    rows = rows[np.lexsort((j["number"][rows], j["break_time"][rows]))]
+    # Places in the mesh: those of the corners less what they have moved.
+    x, y = (state.points - state.of_points["displacement"])[state.joints[rows]].mean(axis=1).T
+    unknown = np.full(len(rows), np.nan)
+    return Events(
+        np.full(len(rows), state.step), j["break_time"][rows], j["number"][rows].astype(np.int64), x, y,
+        j["mode"][rows], j["length"][rows], j["break_energy"][rows], unknown,
+    )  # fmt: skip
+
+
+def emitted(request: Request, files: Sequence[FrameFile]) -> Emission:
+    """Statistics of the joints that broke. HpcdemError if there are none, or if the history asked for is missing."""
+    events = events_of(request, files)
+    if not len(events):
+        raise HpcdemError(f"emission: no joint broke in {request.folder}")
+    energy = request.joule * (events.released() if request.released else events.kinetic)
+    if request.released and np.isnan(energy).all():
+        raise HpcdemError(f"--energy released: {request.folder} has no {emission.TABLE}, and frames do not tell it")
+    magnitude = emission.magnitudes(energy)
+    timed = bool(np.ptp(events.time) > 0.0)
+    history = None if request.history == "none" else emission.load_history(request.folder, request.history)
+    at = events.time if timed else events.step.astype(float)
+    ends = [at.min(), at.max()]
+    if history is not None and len(history.step):
+        keep = (history.step >= (request.first or 0)) & (request.last is None or history.step <= (request.last or 0))
+        other = (history.time if timed else history.step)[keep]
+        ends += [other.min(), other.max()] if len(other) else []
+    low, high = float(min(ends)), float(max(ends))
+    span = (low, high) if high > low else (low - 0.5, low + 0.5)
+    table = emission.rates(at, events.kinds(), energy, span, request.bins)
+    return Emission(events, energy, magnitude, emission.fit(magnitude, request.completeness), table, timed, history)
+
+
+def emission_sheets(found: Emission) -> list[Sheet]:
+    e = found.events
+    columns = (
+        e.step, e.time, e.joint, e.x, e.y, e.mode, e.length, found.energy, found.magnitude,
+    )  # fmt: skip
+    each = zip(*(c.tolist() for c in columns), strict=True)
+    unit = "[s]" if found.timed else "[step]"
+    head = (f"from{unit}", f"to{unit}", *MODES, "events", "cumulative", "energy[J]", "cumulative_energy[J]")
+    counts = found.rates[:, 2:5].sum(axis=1)
+    rows = (
+        (*row[:2], *(int(n) for n in row[2:5]), int(n), int(total), *row[5:])
+        for row, n, total in zip(found.rates.tolist(), counts, np.cumsum(counts), strict=True)
+    )
+    names = ("step", "time[s]", "joint", "x[m]", "y[m]", "mode", "length[m]", "energy[J]", "magnitude")
+    edges, number, above = emission.frequencies(found.magnitude)
+    f = found.fit
+    return [
+        Sheet("emission", head, rows),
+        Sheet("emission_events", names, each),
+        Sheet("emission_magnitudes", ("from", "to", "events", "events_from"),
+              zip(edges.tolist(), (edges + BIN).tolist(), number.tolist(), above.tolist(), strict=True)),
+        Sheet("emission_b", ("b", "standard_error", "a", "completeness", "events"),
+              [(f.b, f.error, f.a, f.completeness, f.number)]),
+    ]  # fmt: skip

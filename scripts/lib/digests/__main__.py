@@ -1,0 +1,5 @@
+"""`python -m digests`: see cli.py."""
+
+from digests.cli import main
+
+main()

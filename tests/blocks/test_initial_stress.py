@@ -1,0 +1,129 @@
+"""An initial stress is carried as strain: it changes with the moduli, on any way to equilibrium."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+from hpcdem.blocks import Blocks
+from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
+
+COMPONENTS = ("xx", "yy", "xy", "zz")
+STRESS = {"xx": -7e6, "yy": -3e6, "xy": 1.5e6, "zz": -4e6}
+
+
+def held(kind: str) -> Blocks:
+    """A square of which no node moves."""
+    sim = model(shaken(rectangle(3, 3, 0.3, 0.3, kind=kind), 0.1))
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    return sim
+
+
+def stresses(sim: Blocks) -> np.ndarray:
+    """(4, ne)"""
+    return np.array([sim.values(f"stress_{c}") for c in COMPONENTS])
+
+
+@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
+def test_it_goes_down_with_the_modulus(kind):
+    """Held everywhere: f times the stress for f times E, with its gradient; bit for bit the old one for the old E."""
+    sim = held(kind)
+    sim.initial_stress(None, **STRESS, gradient={"yy": (2e6, 25e3), "xy": (0.0, -1e6)})
+    before = stresses(sim)
+    sim.element_property(None, {"young": 0.3 * ROCK["young"]})
+    assert stresses(sim) == pytest.approx(0.3 * before, rel=1e-12)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 0.02 * ROCK["young"], "density": 2000.0})
+    assert stresses(sim) == pytest.approx(0.02 * before, rel=1e-12)
+    sim.element_property(None, {"young": ROCK["young"], "density": 2650.0, "friction": 12.0})
+    assert np.array_equal(stresses(sim), before)
+
+
+def test_mean_follows_the_bulk_modulus_and_deviator_the_shear_modulus():
+    """nu from 0.25 to 0.4 at the same E: K from E / 1.5 to E / 0.6, G from E / 2.5 to E / 2.8."""
+    sim = held("mixed")
+    sim.initial_stress(None, **STRESS)
+    sim.element_property(None, {"poisson_ratio": 0.4})
+    mean = (STRESS["xx"] + STRESS["yy"] + STRESS["zz"]) / 3.0
+    k, g = 1.5 / 0.6, 2.5 / 2.8
+    for c in COMPONENTS:
+        normal = 0.0 if c == "xy" else mean
+        assert sim.values(f"stress_{c}") == pytest.approx(k * normal + g * (STRESS[c] - normal), abs=1e-3)
+
+
+def test_of_elements_without_a_model_it_belongs_to_the_first_one():
+    sim = Blocks()
+    sim.take_mesh(rectangle(2, 2, 0.2, 0.2))
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    sim.initial_stress(None, yy=-1e6)
+    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 3e9})
+    assert sim.values("stress_yy") == pytest.approx(-1e6, rel=1e-12)
+    sim.element_property(None, {"young": 1e9})
+    assert sim.values("stress_yy") == pytest.approx(-1e6 / 3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("way", ["relaxation", "at once", "motion", "joints"])
+@pytest.mark.parametrize("kind", ["cross", "quad"])
+def test_a_softened_layer_between_rigid_ends(way, kind):
+    """Layers a, b that cannot move aside, between rigid ends: with f M in a, La ea + Lb eb = 0 and
+    f (s0 + M ea) = s0 + M eb, so both have s0 f (1 + r) / (f + r), r = La / Lb. Joints, thin springs of stiffness P per
+    length h of their own, make M of a layer M / (1 + M / P) and are closed by it when the initial stress comes on."""
+    f, r, s0 = 0.15, 0.5, -6e6
+    mesh = rectangle(9, 2, 0.9, 0.2, kind=kind)
+    sim = model(mesh)
+    a = np.flatnonzero(mesh.centroids()[:, 0] < 0.3)
+    x = mesh.points[:, 0]
+    sim.velocity_condition(np.flatnonzero((x < 1e-9) | (x > 0.9 - 1e-9)), vx=0.0)
+    sim.velocity_condition(None, vy=0.0)
+    sim.initial_stress(None, xx=s0, yy=s0 / 3.0, zz=s0 / 3.0)
+    sim.option(dynamic=way in ("motion", "joints"), collision=False, large_strain=False)
+    sim.element_property(None, {"damp_factor": 1.0})
+    if way == "joints":
+        jointed(sim, penalty_normal=1e3 * ROCK["young"], tensile_strength=1e12, cohesion=1e12, gf1=1e9, gf2=1e9)
+    if way in ("motion", "joints"):
+        sim.solve(time=2e-3)
+    sim.element_property(a, {"young": f * ROCK["young"]})
+    if way == "relaxation":
+        assert sim.solve(ratio=1e-9, cycles=20000).reason == "ratio"
+    elif way == "at once":
+        sim.solve_elastic()
+    else:
+        sim.account_energy()
+        sim.solve(time=8e-3)
+        assert sim.energies()["relative"] < 1e-3
+    expected = s0 * f * (1.0 + r) / (f + r)
+    assert sim.values("stress_xx") == pytest.approx(expected, rel=1e-6 if way in ("relaxation", "at once") else 5e-3)
+
+
+def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
+    """Lowered, saved, and as before when the old moduli are back after loading."""
+    sim = held("mixed")
+    sim.initial_stress(None, **STRESS)
+    before = stresses(sim)
+    sim.element_property(np.arange(5), {"young": 0.5 * ROCK["young"]})
+    lowered = stresses(sim)
+    sim.save(tmp_path / "now.sav")
+    again = Blocks()
+    again.restore(tmp_path / "now.sav")
+    assert np.array_equal(stresses(again), lowered)
+    again.element_property(None, {"young": ROCK["young"]})
+    assert np.array_equal(stresses(again), before)
+
+
+def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
+    """The table of initial stresses as versions before wrote it: the stress stays, and follows what comes."""
+    from hpcdem.blocks import saving
+
+    usual = saving._whole
+    monkeypatch.setattr(saving, "_whole", lambda columns, root: usual(
+        {name: values for name, values in columns.items() if name != "row"}, root))  # fmt: skip
+    sim = held("cross")
+    sim.initial_stress(None, **STRESS)
+    sim.save(tmp_path / "old.sav")
+    with h5py.File(tmp_path / "old.sav") as file:
+        assert sorted(file["stress0"]) == ["s0", "s1", "s2", "s3"]
+    again = Blocks()
+    again.restore(tmp_path / "old.sav")
+    assert np.array_equal(stresses(again), stresses(sim))
+    again.element_property(None, {"young": 0.25 * ROCK["young"]})
+    assert stresses(again) == pytest.approx(0.25 * stresses(sim), rel=1e-12)

@@ -1,0 +1,122 @@
+"""Bodies that overlap before the first step are refused, with places and depths; what legitimate models need is not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.blocks import Blocks, overlaps
+from hpcdem.errors import CommandError
+from tests.blocks.support import joined, jointed, model, near, rectangle
+
+
+def two(depth: float, kind: str = "cross", x0: float = 0.213) -> Blocks:
+    """A block 0.4 m wide that is `depth` deep in a plate, elements of 0.1 m."""
+    sim = model(joined(rectangle(4, 2, 0.4, 0.2, x0=x0, y0=-depth, kind=kind), rectangle(10, 2, 1.0, 0.2, y0=-0.2)))
+    sim.element_property(None, {"damp_factor": 1.0})
+    return sim
+
+
+@pytest.mark.parametrize("kind", ["cross", "quad"])
+@pytest.mark.parametrize("dynamic", [True, False])
+def test_an_overlap_is_refused_and_the_model_stays(kind, dynamic):
+    sim = two(1.6e-3, kind)
+    sim.option(dynamic=dynamic)
+    before = sim.values("position_y")
+    with pytest.raises(CommandError, match=r"pairs of elements overlap .*elements \d+ and \d+ by 0\.0016 m at \("):
+        sim.step()
+    assert sim.clock.step == 0 and np.array_equal(sim.values("position_y"), before)
+    found = overlaps.deepest(sim)
+    assert found[0, 0] == pytest.approx(1.6e-3, rel=1e-6)
+    assert (np.abs(found[:, 2]) <= 1.7e-3).all() and found[:, 1].min() > 0.2 and found[:, 1].max() < 0.62
+    n = 16 if kind == "cross" else 8
+    assert (found[:, 3] < n).all() and (found[:, 4] >= n).all()
+
+
+def test_kept_it_starts_as_it_is():
+    """On request: the energy that was said to come of it comes."""
+    sim = two(1.6e-3)
+    sim.option(overlap="keep")
+    sim.advance(100)
+    assert sim.total("kinetic_energy") > 1e3
+
+
+def test_relaxed_a_static_stage_moves_them_apart():
+    """relax needs the static stage; what is left afterwards throws nothing: below 1e-6 of the energy there was."""
+    sim = two(1.6e-3)
+    sim.option(overlap="relax")
+    with pytest.raises(CommandError, match="model option dynamic off"):
+        sim.step()
+    sim.option(dynamic=False)
+    sim.solve(ratio=1e-6, cycles=5000)
+    assert not len(overlaps.deepest(sim))
+    sim.option(dynamic=True)
+    sim.advance(200)
+    assert sim.total("kinetic_energy") < 1e-2
+    with pytest.raises(CommandError, match="overlap is one of refuse, relax, keep"):
+        sim.option(overlap="maybe")
+
+
+@pytest.mark.parametrize("depth", [0.0, 5e-7, -1e-4])
+def test_bodies_that_touch_or_are_rounded_go(depth):
+    """Up to 1e-5 of an element is rounding of coordinates."""
+    two(depth).step()
+
+
+def test_faces_of_joints_and_cracks_that_touch_go():
+    sim = jointed(model(rectangle(4, 4, 0.4, 0.4)))
+    sim.crack(near(sim.mesh, 0, 0.2, inner=True)[::2])
+    sim.null([0])
+    sim.step()
+
+
+def test_a_body_deep_inside_another_is_found():
+    """No element that it overlaps touches the surface."""
+    mesh = joined(rectangle(1, 1, 0.05, 0.05, x0=0.477, y0=0.477), rectangle(10, 10, 1.0, 1.0))
+    sim = model(mesh)
+    with pytest.raises(CommandError, match="overlap before the first step"):
+        sim.step()
+    found = overlaps.deepest(sim)
+    assert (np.hypot(found[:, 1] - 0.5, found[:, 2] - 0.5) < 0.05).all()
+
+
+def test_a_run_that_is_under_way_is_not_asked(tmp_path):
+    """Contact that a run has made, also after a restart, after excavation, and with collision off at first."""
+    sim = two(-1e-6)
+    sim.gravity(0.0, -9.81e4)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] < -0.19), vx=0.0, vy=0.0)
+    while not len(overlaps.deepest(sim)):
+        sim.advance(50)
+    sim.save(tmp_path / "a.sav")
+    again = Blocks()
+    again.restore(tmp_path / "a.sav")
+    again.null([0])
+    again.step()
+    other = two(1.6e-3)
+    other.option(collision=False)
+    other.step()
+    assert math.isfinite(float(other.values("position_x").sum()))
+
+
+SCRIPT = """\
+pcdc model new
+pcdc mesh structured (0,0) (1,1) cells 4 4 group 'low' set 'body'
+pcdc mesh structured (0.3,0.9984) (0.8,1.5) cells 2 2 group 'high' set 'body'
+pcdc element c-model mech-iso-e property density 2600 young 1e9 poisson-r 0.25
+{option}
+pcdc model step 5
+print('went')
+"""
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_script_is_told_the_line(launch, tmp_path, ranks):
+    for option, code in (("", 2), ("pcdc model option overlap keep", 0)):
+        (tmp_path / "over.sc").write_text(SCRIPT.format(option=option))
+        done = launch(ranks, "over.sc", cwd=tmp_path)
+        assert done.returncode == code, done.stdout + done.stderr
+        assert ("over.sc:6: " in done.stderr and "by 0.0016 m at" in done.stderr) == (code == 2)
+        assert ("went" in done.stdout) == (code == 0)

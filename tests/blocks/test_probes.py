@@ -1,0 +1,129 @@
+"""Histories look at what they are asked for alone, and say what a look at the whole model says, bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcdem.blocks import QUANTITIES, Blocks
+from hpcdem.blocks.local import Local
+from hpcdem.blocks.looking import Looking
+from hpcdem.commands.blocks import assigning, histories, meshing, modelling, running
+from hpcdem.commands.blocks.project import Project
+from hpcdem.model.blocks.groups import ELEMENT, JOINT, NODE, OnLayer
+from tests.blocks.support import jointed, model, rectangle
+
+
+@pytest.fixture(scope="module")
+def broken() -> Blocks:
+    """Triangles and quads, some joints broken, an element taken out, displacements counted from there on."""
+    sim = jointed(model(rectangle(6, 3, 0.6, 0.3, kind="mixed")))
+    x = sim.the_mesh().points[:, 0]
+    sim.velocity_condition(np.flatnonzero(x == 0.0), vx=0.0, vy=0.0)
+    sim.set_velocity(np.flatnonzero(x > 0.25), 6.0, 0.5)
+    sim.advance(120)
+    sim.null([2])
+    sim.reset_displacement(np.flatnonzero(x < 0.3))
+    sim.advance(30)
+    assert sim.joint_counts()[2] > 3
+    return sim
+
+
+def whole(sim: Blocks, name: str) -> dict[int, float]:
+    """A quantity of all objects that are there, by the columns that frames are made of."""
+    columns = sim.owned_values(QUANTITIES[name].on, [name])
+    return dict(zip(columns["number"].tolist(), columns[name].tolist()))
+
+
+@pytest.mark.parametrize("name", list(QUANTITIES))
+def test_a_few_are_what_they_are_among_all(broken, name):
+    known = whole(broken, name)
+    numbers = np.array([*known])[np.random.default_rng(3).permutation(len(known))[:7]]
+    probe = broken.probe(name, numbers)
+    seen = probe.values()
+    assert seen.tobytes() == np.array([known[n] for n in probe.numbers.tolist()]).tobytes()
+    there = seen[~np.isnan(seen)]
+    if len(there):
+        assert probe.reduced("maximum") == there.max() and probe.reduced("minimum") == there.min()
+        assert probe.reduced("sum") == pytest.approx(there.sum(), rel=1e-12, abs=1e-300)
+        assert probe.reduced("mean") == pytest.approx(there.mean(), rel=1e-12, abs=1e-300)
+    one = probe.numbers[:1]
+    assert np.float64(broken.probe(name, one).reduced("")).tobytes() == seen[:1].tobytes()
+
+
+def test_what_is_not_there_is_no_number(broken):
+    assert np.isnan(broken.probe("stress_xx", [2]).reduced(""))
+    assert np.isnan(broken.probe("stress_xx", [2]).reduced("mean"))
+
+
+def supported(folder: Path, dynamic: bool = True) -> Project:
+    """A plate with joints, its left side held, its right side drawn away until it breaks."""
+    project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
+    meshing.rectangle(project, (0.0, 0.0), (0.4, 0.2), (8, 4))
+    rock = {"density": 2700.0, "young": 20e9, "poisson_ratio": 0.2}
+    assigning.element_model(project, "mech_iso_elastic", rock)
+    law = {"tensile_strength": 1e6, "cohesion": 2e6, "friction": 20.0, "gf1": 1.0, "gf2": 3.0, "penalty_normal": 1e11}
+    assigning.joint_model(project, "classic_intrinsic_cohesive_interface", law)
+    if not dynamic:
+        modelling.option(project, dynamic=False)
+    speed = 0.4 if dynamic else 2e-8
+    assigning.velocity(project, 0.0, 0.0, where=(OnLayer("left"),))
+    assigning.velocity(project, speed, 0.0, where=(OnLayer("right"),))
+    for name, value, side, how, every in (
+        ("a", "reaction_x", "left", "sum", 1), ("b", "reaction_y", "right", "maximum", 3),
+        ("c", "reaction_x", "right", "mean", 7), ("d", "displacement_x", "right", "mean", 1),
+    ):  # fmt: skip
+        histories.create(project, name, NODE, value, how=how, every=every, where=(OnLayer(side),))
+    histories.create(project, "e", NODE, "reaction_x", nearest=(0.0, 0.1), every=2)
+    histories.create(project, "f", "model", "ratio", every=5)
+    return project
+
+
+@pytest.mark.parametrize("dynamic", [True, False])
+def test_forces_of_supports_come_with_the_next_step(dynamic, tmp_path, monkeypatch):
+    """Records within a command are those of commands of one step each; a command evaluates forces for its last record
+    alone, and once for all that ask at the same step."""
+    steps = 140
+    one, other = (supported(tmp_path / name, dynamic) for name in "ab")
+    for _ in range(steps):
+        running.step(other, 1)
+    looks = []
+    evaluation = Local.evaluation
+
+    def counted(self, *args, **kwargs):
+        looks.append(self.sim.clock.step)
+        return evaluation(self, *args, **kwargs)
+
+    monkeypatch.setattr(Local, "evaluation", counted)
+    running.step(one, steps)
+    assert one.blocks.joint_counts()[2 if dynamic else 1] >= (3 if dynamic else 0)
+    for name, history in one.histories.items():
+        assert history.rows == other.histories[name].rows, name
+        assert [row[0] for row in history.rows] == list(range(history.every, steps + 1, history.every))
+        lines = (one.folder() / f"history_{name}.csv").read_text()
+        assert lines == (other.folder() / f"history_{name}.csv").read_text()
+    assert max(abs(row[2]) for row in one.histories["a"].rows) > 0.0
+    between = [step for step in looks if step % 5]
+    assert not between  # the ratio alone, every 5 steps, needs forces that no step has computed
+    assert len(looks) <= steps // 5 + 2  # the last: what the log says
+
+
+def test_a_history_of_one_node_looks_at_one_row(tmp_path, monkeypatch):
+    project = supported(tmp_path)
+    for name in [*project.histories]:
+        histories.delete(project, name)
+    histories.create(project, "node", NODE, "velocity_x", ident=20)
+    histories.create(project, "element", ELEMENT, "stress_xx", ident=11)
+    histories.create(project, "joint", JOINT, "opening", nearest=(0.2, 0.1))
+    asked = []
+    columns_of = Looking.columns_of
+
+    def counted(self, on, names, at=None):
+        asked.append(None if at is None else len(at))
+        return columns_of(self, on, names, at)
+
+    monkeypatch.setattr(Looking, "columns_of", counted)
+    running.step(project, 10)
+    assert asked == [1] * 30
