@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hpcdem.lang.zdem import table as t
-from hpcdem.lang.zdem.check import examine, summary
+from hpcdem.lang.zdem.check import examine, print_report, summary
 from hpcdem.lang.zdem.estimate import FAILURES, estimate, insertion
 from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.lang.zdem.plan import expected_steps, follow, frame_names
@@ -209,6 +209,15 @@ def test_outputs_after_restore_are_known_as_far_as_the_script_tells():
     assert report.outputs["print"].files == 2
     assert report.outputs["ps"].files is None
     assert any("no file 0000000090.sav" in note for note in report.notes)
+
+
+@pytest.mark.parametrize(("steps", "number"), [(20, "about 1"), (200, "3")])
+def test_a_number_of_frames_that_depends_on_an_unknown_step_is_told_as_such(capsys, steps, number):
+    report = examined("RES settled.sav", "SET print 100", f"CYC {steps}")
+    assert report.runs[0].start is None and report.outputs["print"].rough == number.startswith("about")
+    print_report(report)
+    row = next(row for row in capsys.readouterr().out.splitlines() if "all_<step>.dat" in row)
+    assert number in [cell.strip() for cell in row.split("  ")]
 
 
 def test_names_of_frames(manual_scripts):

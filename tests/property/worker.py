@@ -95,14 +95,14 @@ def watched(job: dict[str, Any]) -> Any:
     class Watched(Session):
         def simulation(self, *values: Any, **options: Any) -> Any:
             sim = super().simulation(*values, **options)
-            self.made = sim
+            self.watched = sim
             if job.get("accident"):
                 prepare_accident(sim, job["accident"])
             return sim
 
         def seen(self) -> dict[str, Any]:
             """What this rank knows of the end, without asking the others."""
-            sim = getattr(self, "made", None)
+            sim = getattr(self, "watched", None)
             if sim is None:
                 return {}
             breaks = sim.breaks + (sim.uncollected_breaks() if sim.closed else 0)

@@ -37,10 +37,12 @@ PATTERNS = {
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files of one kind: how many (pairs of files count once), and how many bytes together; None where unknown."""
+    """Files of one kind: how many (pairs of files count once), and how many bytes together; None where unknown. rough: there
+    may be a few more, as it is unknown at which step a CYC starts."""
 
     files: int | None
     size: int | None
+    rough: bool
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def _restored(script: Script) -> dict[str, Any] | None:
 def _outputs(kind: str, runs: Sequence[Run], populations: Mapping[int, int | None]) -> Outputs:
     files = [run.files(kind) for run in runs]
     sizes = [_product(n, populations[run.index]) for n, run in zip(files, runs)]
-    return Outputs(_sum(files), _product(_sum(sizes), BYTES_PER_PARTICLE[kind]))
+    return Outputs(_sum(files), _product(_sum(sizes), BYTES_PER_PARTICLE[kind]), any(run.rough(kind) for run in runs))
 
 
 def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | None) -> list[tuple[str, str]]:
@@ -223,10 +225,11 @@ def print_report(report: Report, console=None) -> None:
     console.print(totals)
     files = Table("files", "number", "size", box=SIMPLE)
     for kind, outputs in report.outputs.items():
-        if outputs.files != 0:
+        if outputs.files != 0 or outputs.rough:
+            about = "about " if outputs.rough and outputs.files is not None else ""
             size = f"about {_size(outputs.size)}" if outputs.size else ""
             for name in PATTERNS[kind]:
-                files.add_row(escape(f"{report.folder}/{name}"), _count(outputs.files), size)
+                files.add_row(escape(f"{report.folder}/{name}"), f"{about}{_count(outputs.files)}", size)
                 size = "(both)" if size else ""
     for name, what in report.named:
         files.add_row(escape(name), "1", escape(what))

@@ -37,7 +37,7 @@ class Run:
     def files(self, kind: str) -> int | None:
         """Files of one kind that the command writes; frames with the one at its start. None if unknown.
 
-        CYC counts from step 0; where the start is unknown, after RESTORE, this is right to one file.
+        CYC counts from step 0; where the start is unknown, after RESTORE or some IMPLE, this is `rough`.
         """
         every, steps = self.every[kind], self.steps
         frame = kind == "print"
@@ -49,6 +49,11 @@ class Run:
             return frame + steps // every + (frame and steps % every > 0)
         start = self.start or 0
         return frame + (start + steps) // every - start // every
+
+    def rough(self, kind: str) -> bool:
+        """Whether `files` may be one too few, as the step at the start is unknown."""
+        every, steps = self.every[kind], self.steps
+        return bool(every and steps and steps % every) and self.start is None and not self.imple
 
     def frames(self) -> Iterator[tuple[int, bool]] | None:
         """(step, initial) of every frame in the order in which they are written; None if unknown."""
