@@ -23,7 +23,7 @@ from hpcdem.clock import Clock
 from hpcdem.clumps import Clumps
 from hpcdem.decomp import strips
 from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.fields import CLUMP, FX, RADIUS, TORQUE, WIDTH, X, Y
+from hpcdem.fields import CLUMP, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
@@ -339,10 +339,13 @@ class Simulation:
             return
         origin = np.empty((len(p.hot), 2))
         origin[p.owned] = self.origin
+        chain = None
         if self.rows:
             self.halo.fill(origin)
+            chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, self.rows, self.lattice.side)
+            self.halo.fill(chain)
         ways = np.where(mine[:, None], walls.travel, np.nan)
-        kinds = slips.found(self.lists, p.hot, origin, self.rows, np.hstack([walls.p1, walls.p2]), ways)
+        kinds = slips.found(self.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), ways)
         if not self.comm.any(bool(kinds.any())):
             return
         for kind, what in ((slips.ROW, "a row of GLINE"), (slips.WALL, "a wall")):

@@ -12,43 +12,49 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hpcdem.fields import GID, X, Y
+from hpcdem.fields import X, Y
 
 NOT, ROW, WALL = range(3)
 
 
+def neighbours_in_rows(gid: np.ndarray, xy: np.ndarray, origin: np.ndarray, rows: list, reach: float) -> np.ndarray:
+    """Places now and at the last search of the neighbours in its row: (n, 8) [m], of the one before and the one after.
+
+    gid (n,), xy and origin (n, 2) [m]: storage; rows: (first id, id after the last) of each row. Not-a-number for
+    particles of no row, inf where there is no neighbour within reach [m] at the last search. The owner of a particle
+    has all within a reach of one column in its storage; ghosts are filled in from there.
+    """
+    out = np.full((len(gid), 2, 2, 2), np.nan)
+    for first, end in rows:
+        here = np.flatnonzero((gid >= first) & (gid < end))
+        place = np.full(end - first + 2, -1)  # nobody stands before the first and after the last
+        place[gid[here] - first + 1] = here
+        for side, step in enumerate((-1, 1)):
+            there = place[gid[here] - first + 1 + step]
+            near = (there >= 0) & (np.hypot(*(origin[here] - origin[there]).T) <= reach)
+            out[here, side] = np.inf
+            out[here[near], side] = np.stack([xy[there[near]], origin[there[near]]], axis=1)
+    return out.reshape(-1, 8)
+
+
 def found(
-    lists: Any, hot: np.ndarray, origin: np.ndarray, rows: list, ends: np.ndarray, ways: np.ndarray
+    lists: Any, hot: np.ndarray, origin: np.ndarray, chain: np.ndarray | None, ends: np.ndarray, ways: np.ndarray
 ) -> np.ndarray:
     """NOT, ROW or WALL for each owned particle (n_own,) i8.
 
     lists: neighbours.ContactLists; hot (n, 8): storage; origin (n, 2) [m]: where its particles were when the lists
-    were built; rows: (first id, id after the last) of each row; ends (w, 4) [m]: walls now; ways (w, 2) [m]: how far
+    were built; chain (n, 8): neighbours_in_rows, ghosts filled in; ends (w, 4) [m]: walls now; ways (w, 2) [m]: how far
     they have gone since then, not-a-number for walls that do not count.
     """
     out = np.zeros(lists.n_own, np.int8)
-    if rows:
-        node, place = _nodes(hot.view(np.int64)[:, GID], rows)
+    if chain is not None:
         b = lists.blocks
         for t in range(lists.n_blocks):
             first, end = lists.ptr[b.poff[t]], lists.ptr[b.poff[t] + max(b.cut[t + 1] - b.lo[t], 0)]
-            _through_rows(first, end, lists.row, lists.partner, hot, origin, node, place, lists.n_left, out)
+            _through_rows(first, end, lists.row, lists.partner, hot, origin, chain, lists.n_left, out)
     if len(lists.slot_row):
         _through_walls(lists.slot_row, lists.slot_wall, hot, origin, ends, ways, lists.n_left, out)
     return out
-
-
-def _nodes(gid: np.ndarray, rows: list) -> tuple[np.ndarray, np.ndarray]:
-    """Node (n,) of each storage row in the chains, -1 for none, and the storage row of each node, -1 for those that are
-    not here. Chains are separated by a node that nobody has."""
-    node = np.full(len(gid), -1)
-    starts = np.cumsum([1] + [end - first + 1 for first, end in rows])
-    place = np.full(starts[-1], -1)
-    for (first, end), start in zip(rows, starts, strict=False):
-        here = np.flatnonzero((gid >= first) & (gid < end))
-        node[here] = start + gid[here] - first
-        place[node[here]] = here
-    return node, place
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -72,19 +78,19 @@ def _gone(hot, origin, i):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _through_rows(first, end, row, partner, hot, origin, node, place, n_left, out):
+def _through_rows(first, end, row, partner, hot, origin, chain, n_left, out):
     for k in range(first, end):
         i, j = row[k], partner[k]
-        if (node[i] < 0) == (node[j] < 0):
+        if np.isnan(chain[i, 0]) == np.isnan(chain[j, 0]):
             continue
-        at, d = (node[i], j) if node[i] >= 0 else (node[j], i)
+        p, d = (i, j) if not np.isnan(chain[i, 0]) else (j, i)
         if not 0 <= d - n_left < len(out):
             continue
-        for begin in range(at - 1, at + 1):
-            p, q = place[begin], place[begin + 1]
-            if p >= 0 and q >= 0 and _crosses(
-                hot[p, X], hot[p, Y], hot[q, X], hot[q, Y], hot[d, X], hot[d, Y],
-                _gone(hot, origin, p), _gone(hot, origin, q), _gone(hot, origin, d),
+        for side in (0, 4):
+            q = chain[p, side : side + 4]
+            if np.isfinite(q[0]) and _crosses(
+                hot[p, X], hot[p, Y], q[0], q[1], hot[d, X], hot[d, Y],
+                _gone(hot, origin, p), (q[0] - q[2], q[1] - q[3]), _gone(hot, origin, d),
             ):  # fmt: skip
                 out[d - n_left] = ROW
 
