@@ -20,7 +20,7 @@ from typing import Any
 _NAMES = {
     "Simulation": "hpcdem.api",
     "couple": "hpcdem.api",
-    "HpcdemError": "hpcdem.errors",
+    "HpcdemError": "hpcdem.core.errors",
     "version": "hpcdem.runtime.launch",
 }
 __all__ = list(_NAMES)

@@ -16,13 +16,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hpcdem import session
-from hpcdem.errors import CommandError, ScriptError, UsageError
-from hpcdem.fields import FIELDS, FIX_BITS
+from hpcdem.core.errors import CommandError, ScriptError, UsageError
+from hpcdem.core.fields import FIELDS, FIX_BITS
+from hpcdem.core.selection import Selection
 from hpcdem.lang.zdem.execute import Interpreter, Verbs, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
-from hpcdem.model.materials import MATERIAL
-from hpcdem.selection import Selection
+from hpcdem.physics.dem.materials import MATERIAL
 
 PACKAGE = str(Path(__file__).resolve().parent)
 SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
@@ -119,8 +119,8 @@ class Simulation:
     methods, begin at `directory`: where the program lies, or the present folder in a conversation.
 
     where: the particles that a method acts on, as the text of a RANGE (``"y 0 1000 and group rock"``,
-    ``"y {top}-500 {top}"``) or an object of `hpcdem.selection`; left out, all of them. color: a name or number of the
-    manual's table (lg green yellow red white black mg blue gb violet). Units are SI.
+    ``"y {top}-500 {top}"``) or an object of `hpcdem.core.selection`; left out, all of them. color: a name or number of
+    the manual's table (lg green yellow red white black mg blue gb violet). Units are SI.
     """
 
     def __init__(self, outdir: str | Path | None = None, threads: int | None = None, log: bool = True) -> None:
@@ -363,7 +363,7 @@ class Simulation:
         It may look at everything and use all methods but those that step. If it returns True (on any rank), the
         running cycle ends with this step. A function that only looks changes nothing in the run.
         """
-        from hpcdem.simulation import Watcher
+        from hpcdem.physics.dem.simulation import Watcher
 
         if int(steps) != steps or steps < 1:
             raise ScriptError(*_place(), f"every: expected a number of steps of 1 or more, got {steps}")
@@ -392,7 +392,7 @@ class Simulation:
     def resume(self) -> bool:
         """Take up the newest whole checkpoint of `outdir` and finish the cycle in which it was written; False if there
         is none. Functions of `every` must have been given before."""
-        from hpcdem import saving
+        from hpcdem.physics.dem import saving
 
         self._refuse_coupled("resume")
         found = saving.restore_newest(self.engine, [self.engine.outdir])
@@ -441,7 +441,7 @@ class Simulation:
     @_look
     def write_frame(self) -> None:
         """Write ``all_<step>.vtkhdf`` and ``.dat`` now."""
-        from hpcdem import output
+        from hpcdem.engine import output
 
         self._ready()
         output.Snapshot(self.engine).write_print()
@@ -455,9 +455,9 @@ class Simulation:
     def __getitem__(self, name: str) -> np.ndarray:
         """A field of this rank's own particles (n,), read-only; valid until the next method that changes or steps.
 
-        The names are those of `hpcdem.fields` (x y vx vy spin radius gid angle fx fy torque fix color group birth),
-        of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump, which
-        is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
+        The names are those of `hpcdem.core.fields` (x y vx vy spin radius gid angle fx fy torque fix color group
+        birth), of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump,
+        which is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
         """
         return self._of_this_rank(f"['{name}']", lambda: self._field(name))
 
@@ -592,7 +592,7 @@ class Simulation:
     @_look
     def wall_force(self, id: int) -> Point:
         """Force on a wall (x, y) [N], exactly summed."""
-        from hpcdem import observe
+        from hpcdem.physics.dem import observe
 
         row = self.engine.walls.row(id)
         self._ready()
@@ -601,7 +601,7 @@ class Simulation:
     @_look
     def wall_forces(self) -> dict[int, Point]:
         """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
-        from hpcdem import observe
+        from hpcdem.physics.dem import observe
 
         self._ready()
         force = observe.wall_forces(self.engine)
@@ -610,7 +610,7 @@ class Simulation:
     @_look
     def kinetic_energy(self) -> float:
         """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
-        from hpcdem import observe
+        from hpcdem.physics.dem import observe
 
         self._ready()
         return observe.kinetic_energy(self.engine)
@@ -627,7 +627,7 @@ class Simulation:
     @_look
     def unbalanced(self) -> float:
         """Largest unbalanced force of a free particle over the mean contact force: small at rest."""
-        from hpcdem import output
+        from hpcdem.engine import output
 
         self._ready()
         return output.unbalanced(self.engine)
@@ -649,7 +649,7 @@ class Simulation:
     def clumps(self) -> dict[str, np.ndarray]:
         """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
         spin, angle, area, mass, inertia, members (how many)."""
-        from hpcdem import observe
+        from hpcdem.physics.dem import observe
 
         self._ready()
         return observe.clumps(self.engine)
@@ -732,7 +732,7 @@ class Simulation:
             raise CommandError(f"{what} would replace particles that touch blocks: part them first, Coupling.end()")
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
-        from hpcdem import observe
+        from hpcdem.physics.dem import observe
 
         def table() -> dict[str, np.ndarray]:
             self._ready()
@@ -785,7 +785,7 @@ class Coupling:
 
     def end(self) -> None:
         """Part them: each may go on alone."""
-        from hpcdem.commands.blocks import coupling
+        from hpcdem.commands.fdem import coupling
 
         if self._project.continues is not None:
             raise _parted("end")
@@ -817,7 +817,7 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
     and that of the particle counts. dt [s]: the time step; left out, that of `set(dt=...)` or `pcdc model time-step`,
     else the smaller of the stable ones.
     """
-    from hpcdem.commands.blocks import coupling
+    from hpcdem.commands.fdem import coupling
 
     place = _place()
     try:

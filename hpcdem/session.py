@@ -16,16 +16,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hpcdem.errors import StoppedWithCheckpoint, UsageError
+from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import doctor, ending, launch, run_folder, speed
 
 if TYPE_CHECKING:
-    from hpcdem.commands.blocks import Project
+    from hpcdem.commands.fdem import Project
     from hpcdem.halo.comm import SerialComm
+    from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducing import Reproduction
     from hpcdem.runtime.stopping import StopRequests
-    from hpcdem.simulation import Simulation
 
 
 @dataclass
@@ -66,7 +66,7 @@ class Session:
                 prepare(self.comm, self.log, "", self.threads)
             self.kernels_ready = True
             self.stop.install(self.comm.rank)
-        from hpcdem.simulation import Simulation  # brings the kernels with it
+        from hpcdem.physics.dem.simulation import Simulation  # brings the kernels with it
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
@@ -84,8 +84,8 @@ class Session:
             prepare(self.comm, self.log, "blocks", self.threads)
             self.blocks_ready = True
             self.stop.install(self.comm.rank)
-        from hpcdem.blocks import Blocks
-        from hpcdem.commands.blocks import Project
+        from hpcdem.commands.fdem import Project
+        from hpcdem.physics.fdem.model import Blocks
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         run_folder.claim(outdir, self.comm, self.job)
@@ -114,11 +114,11 @@ class Session:
         if sim in self.unfinished:
             self.unfinished.remove(sim)
         if sim.plots and self.job.language != "zdem":  # a script of that says STOP
-            from hpcdem import output
+            from hpcdem.engine import output
 
             output.finish(sim)
         if self.ends_with_frame and sim.timers.steps and (sim.last_frame or (-1,))[0] != sim.clock.step:
-            from hpcdem import output
+            from hpcdem.engine import output
 
             sim.close()
             output.Snapshot(sim).write_print()
@@ -164,7 +164,7 @@ class Session:
         """A model of blocks at the end of the program. Collective, unless it is the end by a failure."""
         stopped = isinstance(failure, StoppedWithCheckpoint)  # on all ranks at the same step
         if failure is None or stopped:
-            from hpcdem.commands.blocks import closing
+            from hpcdem.commands.fdem import closing
 
             closing.close(project, self.figure and not stopped)
         if project.folder_made:
@@ -192,21 +192,21 @@ def rehearse(kind: str, *threads: int) -> None:
     besides, "shared" by all. Imports them: the cache must be settled before."""
     call: Callable[[int], None]
     if kind == "shared":
-        from hpcdem.rehearsal import rehearse as call
+        from hpcdem.runtime.rehearsal import rehearse as call
     elif kind == "blocks":
-        from hpcdem.commands.blocks.rehearsal import rehearse as call
+        from hpcdem.commands.fdem.rehearsal import rehearse as call
     elif kind == "coupled":
-        from hpcdem.coupled.rehearsal import rehearse as call
+        from hpcdem.physics.coupling.rehearsal import rehearse as call
     else:
-        from hpcdem.commands.rehearsal import rehearse as call
+        from hpcdem.commands.dem.rehearsal import rehearse as call
     for n in threads:
         call(n)
 
 
 def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
     """Let the log tell of the states of this simulation. It only looks."""
-    from hpcdem import observe
-    from hpcdem.simulation import Watcher
+    from hpcdem.physics.dem import observe
+    from hpcdem.physics.dem.simulation import Watcher
 
     model = reproduction.new_model()
 
@@ -219,7 +219,7 @@ def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
 def report_end(sim: Simulation) -> None:
     """Collective: what became of the energy, and of particles that got lost; the last line of histories, as a program
     need not say STOP."""
-    from hpcdem import output
+    from hpcdem.engine import output
 
     output.close_histories(sim)
     output.tell_energy(sim)
@@ -237,7 +237,8 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
         return
     path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
     if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
-        from hpcdem import observe, output
+        from hpcdem.engine import output
+        from hpcdem.physics.dem import observe
 
         sim.close()
         output.folder(sim)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 
 TIMEOUT = 120.0

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hpcdem import observe
-from hpcdem.commands import properties, running, settings
-from hpcdem.selection import Ids
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import properties, running, settings
+from hpcdem.core.selection import Ids
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.simulation import Simulation
 
 
 def model(folder: Path, dt: float = 1e-3, **options: Any) -> Simulation:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationError
 from pydantic.fields import FieldInfo
 
-from hpcdem.errors import CommandError, ScriptError
+from hpcdem.core.errors import CommandError, ScriptError
 
 PACKAGE = str(Path(__file__).resolve().parent.parent)
 DIVIDER = "# ---- {} "

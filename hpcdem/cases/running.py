@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem import session
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.execute import Interpreter
 
 

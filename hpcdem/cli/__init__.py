@@ -17,7 +17,7 @@ import click
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
-from hpcdem.errors import EXIT_OK
+from hpcdem.core.errors import EXIT_OK
 from hpcdem.runtime import ending, launch
 from hpcdem.session import Session, greet, prepare
 

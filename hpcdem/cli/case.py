@@ -82,7 +82,7 @@ def command(kind: type[Case]) -> click.Command:
 
 def work(kind: type[Case], comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: write the script, on rank 0. UsageError on all ranks."""
-    from hpcdem.errors import ScriptError, UsageError
+    from hpcdem.core.errors import ScriptError, UsageError
     from hpcdem.io.agreed import atomic_path, on_first
 
     given = {name: value for name, value in options.items() if name not in OWN and value is not None}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import ending, launch
 
 if TYPE_CHECKING:

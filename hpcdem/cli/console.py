@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
-from hpcdem.errors import UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.runtime import ending, launch
 from hpcdem.session import Session, enter
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
-from hpcdem.errors import EXIT_ERROR, EXIT_OK, HpcdemError
+from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError
 from hpcdem.runtime import ending, launch
 
 if TYPE_CHECKING:

@@ -97,7 +97,7 @@ def request(options: dict[str, Any], curve: Grading) -> Request:
 
 def make(options: dict[str, Any]) -> None:
     """Read the grading, make the specimen, write its files, say what came of it."""
-    from hpcdem.errors import UsageError
+    from hpcdem.core.errors import UsageError
     from hpcdem.pre.specimen import make_specimen, read_grading
     from hpcdem.specimens import Outputs, Style
 
@@ -125,7 +125,7 @@ def _layout(options: dict[str, Any]) -> str:
 
 
 def _factor(options: dict[str, Any]) -> float:
-    from hpcdem.errors import UsageError
+    from hpcdem.core.errors import UsageError
 
     factor = options["angle_factor"]
     if not (math.isfinite(factor) and 1e-6 <= factor <= 1e6):
@@ -194,7 +194,7 @@ def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
 
 def look(options: dict[str, Any]) -> None:
     """Read a PPDEM file, sort its grains into classes, print and draw them."""
-    from hpcdem.errors import UsageError
+    from hpcdem.core.errors import UsageError
     from hpcdem.io.ppdem import read_ppdem
     from hpcdem.pre.specimen import read_grading
     from hpcdem.pre.specimen.reading import classified

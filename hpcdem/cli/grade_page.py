@@ -9,7 +9,7 @@ import click
 
 from hpcdem.cli import grade as on_paper
 from hpcdem.cli.common import HELP, messages_only, read_command_line, run_program
-from hpcdem.errors import EXIT_OK, UsageError
+from hpcdem.core.errors import EXIT_OK, UsageError
 from hpcdem.runtime import launch
 
 NUMBER = 2000

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import run_folder
 
 if TYPE_CHECKING:

@@ -137,7 +137,7 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
 
 def request(options: dict[str, Any]) -> Any:
     """What the options ask for. Raises UsageError."""
-    from hpcdem.errors import UsageError
+    from hpcdem.core.errors import UsageError
     from hpcdem.lang.zdem.table import COLORS
     from hpcdem.post.measure.scene import Request
 

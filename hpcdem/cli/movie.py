@@ -96,7 +96,7 @@ def write(kind: str, pictures: list[Path], path: Path, options: dict[str, Any]) 
 
 def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
     """Kind and path of each film to be made. Raises HpcdemError."""
-    from hpcdem.errors import HpcdemError, UsageError
+    from hpcdem.core.errors import HpcdemError, UsageError
     from hpcdem.post import movie as films
 
     kind, output = options["kind"], options["output"] or options["folder"] / "movie"
@@ -121,7 +121,7 @@ def targets(options: dict[str, Any]) -> list[tuple[str, Path]]:
 
 def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> list[Path]:
     """Collective: the pictures of all frames, at one view."""
-    from hpcdem.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError
     from hpcdem.io.agreed import on_first
     from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
     from hpcdem.post.series import Job, draw_all

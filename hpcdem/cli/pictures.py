@@ -128,7 +128,7 @@ def processes(options: dict[str, Any]) -> int:
 
 def style_of(options: dict[str, Any], folder: Path, page: float, dpi: float) -> Style:
     """The style that the options ask for. Raises HpcdemError for a colour file that is not there or not right."""
-    from hpcdem.errors import UsageError
+    from hpcdem.core.errors import UsageError
     from hpcdem.io import colours
     from hpcdem.post.layers import Look
     from hpcdem.post.plots import SIDES, Style

@@ -9,7 +9,7 @@ import click
 
 from hpcdem.cli.common import HELP, PATH
 from hpcdem.cli.run import Options, time_limit
-from hpcdem.errors import EXIT_OK, HpcdemError, UsageError
+from hpcdem.core.errors import EXIT_OK, HpcdemError, UsageError
 from hpcdem.runtime import run_folder
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
+from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
 from hpcdem.runtime.run_folder import Job, claim
 from hpcdem.runtime.stopping import AUTOSAVE
@@ -22,9 +22,9 @@ from hpcdem.session import enter as enter_session
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.lang.zdem.parser import Script
+    from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducing import Reproduction
-    from hpcdem.simulation import Simulation
 
 
 @dataclass(frozen=True)
@@ -182,8 +182,8 @@ def own_traceback(error: BaseException, file: str) -> str:
 
 def go_on(sim: Simulation, script: Script, log: Log) -> bool:
     """Collective: finish a script from its newest checkpoint that is whole; False if there is none."""
-    from hpcdem import saving
     from hpcdem.lang.zdem import execute
+    from hpcdem.physics.dem import saving
 
     named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
     found = saving.restore_newest(sim, [sim.outdir, *named.values()])

@@ -39,7 +39,7 @@ def zdem2jpg(**options: Any) -> None:
 
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
     """Collective: draw all frames of the folder. Raises HpcdemError on all ranks."""
-    from hpcdem.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError
     from hpcdem.io.agreed import on_first
     from hpcdem.io.frames import left_out, list_frames
     from hpcdem.post.series import Job, draw_all

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from hpcdem.cells import COLUMN, FARTHEST, column, columns, keys, row
+from hpcdem.core.cells import COLUMN, FARTHEST, column, columns, keys, row
 
 __all__ = ["FARTHEST", "cells", "cut", "global_order", "owner_of", "separate", "strays"]
 

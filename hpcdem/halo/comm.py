@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 
 
 class SerialComm:

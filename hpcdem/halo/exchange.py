@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.cells import COLUMN
-from hpcdem.memory import aligned, take_rows
+from hpcdem.core.cells import COLUMN
+from hpcdem.core.memory import aligned, take_rows
 
 TO_LEFT, TO_RIGHT = 11, 12
 BACK = 2

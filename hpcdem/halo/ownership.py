@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.core.errors import UsageError
 from hpcdem.decomp import balance, strips
-from hpcdem.errors import UsageError
 
 MOST_COLUMNS = 1 << 24
 

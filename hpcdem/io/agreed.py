@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
+from hpcdem.core.errors import EXIT_USAGE, HpcdemError, UsageError
 from hpcdem.io.disk import explain, publish, remove
 
 _T = TypeVar("_T")

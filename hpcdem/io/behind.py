@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 
 ROOM = 256 << 20
 """Most bytes that wait to be written; who has more waits."""

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io import seal
 from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to

@@ -20,7 +20,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.disk import explain
 

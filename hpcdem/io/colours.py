@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 
 RGB = np.array(
     [

@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain
 from hpcdem.io.files import write_sections

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.rootfile import root_file
 from hpcdem.io.transport import Places, Section, size_of, text_in_blocks, to_root, used

@@ -19,7 +19,7 @@ os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
 import h5py
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain

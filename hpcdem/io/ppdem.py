@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.disk import explain
 

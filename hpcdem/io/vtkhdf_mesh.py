@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io import h5
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.frame import Table

@@ -6,7 +6,7 @@ import ast
 import re
 import warnings
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.zdem.lexer import COMMENT, LINE_END, SEPARATORS
 from hpcdem.lang.zdem.table import ZDEM
 

@@ -19,7 +19,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import HpcdemError, ScriptError, UsageError
 from hpcdem.page.limits import LIMITS, MOST_ROWS
 from hpcdem.page.worker import BROKEN, FRAME, MADE, READY, REFUSED
 

@@ -17,7 +17,7 @@ import time
 from pathlib import Path
 from typing import IO, Any
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 
 OVERTAKEN_AFTER = 0.5
 """Seconds after which work that nobody wants any more is ended; shorter work is awaited, which is cheaper."""

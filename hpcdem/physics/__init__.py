@@ -1,0 +1,1 @@
+"""Physics, a folder each: its arithmetic in kernels/, its state and step beside it."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import UsageError
+from hpcdem.core.errors import UsageError
 
 RGB, HSV, CMYK = "RGB", "HSV", "CMYK"
 RANGES = {RGB: (255.0,) * 3, HSV: (360.0, 1.0, 1.0), CMYK: (100.0,) * 4}

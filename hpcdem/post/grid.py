@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 
 MOST_NODES = 20_000_000
 """More nodes than this are a particle gone astray or a spacing in the wrong unit."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.frames import read_frame
 from hpcdem.io.vtkhdf_mesh import is_mesh_frame, read_mesh_frame

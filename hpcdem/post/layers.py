@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.fields import sides_of_box
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io import colours
 from hpcdem.io.frame import Frame
 

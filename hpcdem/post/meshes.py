@@ -9,8 +9,8 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hpcdem.model.blocks.connectivity import corner_counts
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.connectivity import corner_counts
+from hpcdem.physics.fdem.mesh import Mesh
 
 GROUP_COLOURS = ("#dfe6e9", "#f6d7a7", "#c7ddb5", "#b8d4e8", "#e3c6dc", "#d9cfc1", "#f2e3a0", "#c9c9e3")
 EDGE_COLOUR = "#5f6b73"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 
 FASTEST_GIF = 50.0

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import Alone, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames, read_frame

@@ -14,9 +14,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frame import Frame
-from hpcdem.physics.dem import mass
+from hpcdem.physics.dem.kernels import mass
 
 
 def moments(frame: Frame) -> tuple[np.ndarray, np.ndarray]:

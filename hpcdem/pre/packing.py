@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from hpcdem.physics.rng import uniform
+from hpcdem.numerics.rng import uniform
 
 
 @njit(cache=True)

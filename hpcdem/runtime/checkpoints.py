@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.runtime import run_folder
 

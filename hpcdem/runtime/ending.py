@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from hpcdem.errors import EXIT_ERROR, EXIT_OK, HpcdemError
+from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError
 
 EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
 """Ended by a second Ctrl-C or SIGTERM: 128 and the number of the signal, as shells have it."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm

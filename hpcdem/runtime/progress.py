@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, TextIO
 
-from hpcdem.timers import Summary, Timers
+from hpcdem.core.timers import Summary, Timers
 
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 
 LINE = re.compile(r"state (\d+)(?: of model (\d+))?: ((?:\w+=[0-9a-f]{32} ?)+)\s*$")
 

@@ -17,7 +17,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of

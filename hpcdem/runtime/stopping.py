@@ -33,7 +33,7 @@ from datetime import datetime
 from types import FrameType
 from typing import Any, Literal
 
-from hpcdem.errors import UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.runtime.insisting import SAME_SIGNAL, LastResort
 
 NONE, AUTO, SAVE, STOP = 0, 1, 2, 3

@@ -16,8 +16,8 @@ from matplotlib.tri import Triangulation
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from hpcdem.blocks import Blocks  # noqa: E402
-from hpcdem.model.blocks.mesh import Mesh  # noqa: E402
+from hpcdem.physics.fdem.mesh import Mesh  # noqa: E402
+from hpcdem.physics.fdem.model import Blocks  # noqa: E402
 from tests.cases.kirsch import exact  # noqa: E402
 
 EDGES = 96

@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hpcdem.model.blocks.mesh import Mesh, check
+from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.post.meshes import draw
 from hpcdem.pre.mesh import geometry, structured
 from hpcdem.pre.mesh.cracks import follow

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hpcdem.blocks import Blocks
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 
 ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import ROCK, jointed, model, rectangle
 
 FILL = {"density": 1900.0, "young": 7e9, "poisson_ratio": 0.0}
@@ -108,7 +108,7 @@ def test_cracks_of_the_mesh_stay_cracks():
     mesh = rectangle(4, 4, 4.0, 4.0)
     ends = mesh.points[mesh.edges().points]
     on = mesh.edges().inner & (np.abs(ends[:, :, 0] - 2.0) < 1e-9).all(axis=1)
-    from hpcdem.model.blocks.mesh import Mesh
+    from hpcdem.physics.fdem.mesh import Mesh
 
     sim = model(Mesh.of(mesh.points, mesh.cells, cracks=mesh.edges().points[on]))
     cracks = mesh.edges().faces[on, 0]

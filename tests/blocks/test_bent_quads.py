@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh import structured
 from tests.blocks.support import ROCK, model
 from tests.conftest import ROOT

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.physics.fdem import contact
+from hpcdem.physics.fdem.kernels import contact
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, joined, near, rectangle, shaken
 
 SOFT = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 1.0}

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem import contact
+from hpcdem.physics.fdem.kernels import contact
 
 UPPER = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, math.sqrt(3.0) / 2.0]])
 LOWER = np.array([[0.0, 0.0], [0.5, -math.sqrt(3.0) / 2.0], [1.0, 0.0]])

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.physics.fdem import detect
+from hpcdem.physics.fdem.kernels import detect
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import joined, jointed, model, rectangle
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import joined, model, rectangle
 
 RHO, P = 2700.0, 2e7

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from hpcdem.blocks import Blocks
-from hpcdem.physics.fdem.laws import SOFTENING_AREA, softening
+from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks import worker
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
 

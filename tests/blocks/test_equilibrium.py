@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks, equilibrium, linear
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import equilibrium, linear
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
 from tests.blocks.test_patch import LAMBDA, MU, STRAIN, boundary
 from tests.blocks.test_static import leaning

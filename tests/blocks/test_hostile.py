@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.model.blocks.mesh import Mesh
-from hpcdem.model.blocks.properties import CONTACT_MOHR_COULOMB, MECH_ISO_ELASTIC
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, MECH_ISO_ELASTIC
 from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle
 
 

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
 
 COMPONENTS = ("xx", "yy", "xy", "zz")
@@ -112,7 +112,7 @@ def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
 
 def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
     """The table of initial stresses as versions before wrote it: the stress stays, and follows what comes."""
-    from hpcdem.blocks import saving
+    from hpcdem.physics.fdem import saving
 
     usual = saving._whole
     monkeypatch.setattr(saving, "_whole", lambda columns, root: usual(

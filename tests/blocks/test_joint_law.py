@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from hpcdem.blocks.local import joint_tables
-from hpcdem.model.blocks.properties import COHESIVE, Rows
-from hpcdem.physics.fdem import joints, laws
+from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.local import joint_tables
+from hpcdem.physics.fdem.properties import COHESIVE, Rows
 
 H = 2e-3
 VALUES = {

@@ -9,10 +9,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.mesh import Mesh
-from hpcdem.physics.fdem import laws
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
 
 E, NU, RHO = ROCK["young"], ROCK["poisson_ratio"], ROCK["density"]

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks, overlaps
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import overlaps
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import joined, jointed, model, near, rectangle
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.blocks import QUANTITIES, Blocks
-from hpcdem.blocks.local import Local
-from hpcdem.blocks.looking import Looking
-from hpcdem.commands.blocks import assigning, histories, meshing, modelling, running
-from hpcdem.commands.blocks.project import Project
-from hpcdem.model.blocks.groups import ELEMENT, JOINT, NODE, OnLayer
+from hpcdem.commands.fdem import assigning, histories, meshing, modelling, running
+from hpcdem.commands.fdem.project import Project
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, OnLayer
+from hpcdem.physics.fdem.local import Local
+from hpcdem.physics.fdem.looking import Looking
+from hpcdem.physics.fdem.model import QUANTITIES, Blocks
 from tests.blocks.support import jointed, model, rectangle
 
 

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.tables import Drawn, Over
-from hpcdem.physics import rng
-from hpcdem.physics.random_field import GAUSSIAN, LOGNORMAL, NORMAL, WEIBULL, RandomField
+from hpcdem.core.errors import CommandError
+from hpcdem.numerics import rng
+from hpcdem.numerics.random_field import GAUSSIAN, LOGNORMAL, NORMAL, WEIBULL, RandomField
+from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.tables import Drawn, Over
 from tests.blocks.support import JOINT, ROCK, model, rectangle
 
 COHESIVE, CONTACT, ELASTIC = "classic_intrinsic_cohesive_interface", "contact_mohr_coulomb", "mech_iso_elastic"

@@ -10,11 +10,12 @@ from tests.conftest import ROOT, run
 
 PROGRAM = """
 import numpy as np
-from hpcdem.blocks import Blocks, build, memories, pairs
-from hpcdem.blocks.rehearsal import rehearse
-from hpcdem.model.blocks import connectivity
-from hpcdem.model.blocks.mesh import Mesh
-from hpcdem.physics.fdem import contact, detect, elements, energy, limits, nodes, stiffness
+from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import build, memories, pairs
+from hpcdem.physics.fdem.rehearsal import rehearse
+from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, stiffness
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():

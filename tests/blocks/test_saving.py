@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.properties import CONTACT_MOHR_COULOMB, Rows
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, Rows
 from tests.blocks import worker
 from tests.blocks.support import jointed, model, rectangle
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
 
 RHO = ROCK["density"]

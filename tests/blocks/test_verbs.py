@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.blocks import QUANTITIES, Blocks
+from hpcdem.physics.fdem.model import QUANTITIES, Blocks
 from tests.blocks.support import ROCK, joined, jointed, model, rectangle, shaken
 from tests.pcdc.fake import Noted
 

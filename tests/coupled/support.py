@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem import observe
-from hpcdem.blocks import Blocks
-from hpcdem.commands import particles, properties, running, settings
-from hpcdem.coupled import Coupled
-from hpcdem.model.blocks.mesh import Mesh
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import particles, properties, running, settings
+from hpcdem.physics.coupling.model import Coupled
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 
 ROCK = {"density": 2500.0, "young": 1e9, "poisson_ratio": 0.25}
 STIFF = {"density": 2500.0, "young": 50e9, "poisson_ratio": 0.25}

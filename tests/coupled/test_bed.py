@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import particles, walls
+from hpcdem.commands.dem import particles, walls
+from hpcdem.physics.dem import observe
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
 
@@ -28,7 +28,7 @@ def test_balance_of_momentum(tmp_path, steps):
     sim = discs([], tmp_path, dt=DT, gravity=(0.0, -G), seed=5)
     walls.box(sim, 0.0, WIDTH, 0.0, 2.0, kn=1e6, ks=5e5, fric=0.3)
     particles.gen_grid(sim, [RADIUS], (0.0, WIDTH), (0.0, 0.7))
-    from hpcdem.commands import properties
+    from hpcdem.commands.dem import properties
 
     properties.prop(sim, density=2500.0, kn=2e6, ks=1e6, fric=0.4)
     count = len(sim.particles)

@@ -12,10 +12,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.budget import Budget
-from hpcdem.commands import clumps, properties
-from hpcdem.errors import CommandError
+from hpcdem.commands.dem import clumps, properties
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import Budget
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
 

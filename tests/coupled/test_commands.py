@@ -8,20 +8,20 @@ import itertools
 import numpy as np
 import pytest
 
-from hpcdem import output
-from hpcdem.blocks import Blocks
 from hpcdem.cli import info
-from hpcdem.commands import properties, running, settings, walls
-from hpcdem.commands.blocks import assigning, closing, coupling, meshing, modelling, saving
-from hpcdem.commands.blocks import running as stepping
-from hpcdem.commands.blocks.project import Project
-from hpcdem.errors import CommandError
+from hpcdem.commands.dem import properties, running, settings, walls
+from hpcdem.commands.fdem import assigning, closing, coupling, meshing, modelling, saving
+from hpcdem.commands.fdem import running as stepping
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.core.timers import Timers
+from hpcdem.engine import output
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
+from hpcdem.physics.fdem.model import Blocks
 from hpcdem.post import inventory
 from hpcdem.runtime.progress import BETWEEN, Log
-from hpcdem.timers import Timers
 from tests.coupled.support import ROCK, discs
 
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import properties
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.commands.dem import properties
+from hpcdem.physics.fdem.mesh import Mesh
 from tests.blocks.support import JOINT, joined, rectangle, shaken
 from tests.coupled.support import ROCK, STIFF, body, discs, momentum, of_disc, together
 
@@ -226,7 +226,7 @@ def test_energy_across_the_contact(tmp_path):
     sim = discs([(0.55, 0.6 + R, R)], tmp_path, dt=2e-6)
     properties.prop(sim, yv=-2.0, fric=0.0)
     both = together(sim, blocks)
-    from hpcdem.budget import Budget
+    from hpcdem.physics.dem.budget import Budget
 
     sim.energy = Budget()
     sim.energy.begin(sim)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.commands import properties, settings
-from hpcdem.coupled import Coupled
-from hpcdem.errors import CommandError, PhysicsError
+from hpcdem.commands.dem import properties, settings
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.coupling.model import Coupled
 from tests.blocks.support import rectangle
 from tests.coupled.support import body, discs, together
 
@@ -96,7 +96,7 @@ def test_numbers_and_owners(tmp_path):
 
 def test_files_of_another_kind(tmp_path):
     """The three kinds of checkpoints are told apart, and a failed restore leaves both models as they were."""
-    from hpcdem import saving
+    from hpcdem.physics.dem import saving
 
     both = both_of(tmp_path)
     both.advance(5)
@@ -117,7 +117,7 @@ def test_files_of_another_kind(tmp_path):
 
 def test_blocks_that_are_replaced(tmp_path):
     """A new mesh, and discs that come and go, between two runs."""
-    from hpcdem.commands import particles
+    from hpcdem.commands.dem import particles
     from tests.coupled.support import ROCK
 
     both = both_of(tmp_path, y=0.699)

@@ -12,13 +12,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hpcdem import observe
-from hpcdem.blocks import Blocks
-from hpcdem.budget import Budget
-from hpcdem.commands import clumps, particles, properties, running, settings, walls
-from hpcdem.coupled import Coupled
+from hpcdem.commands.dem import clumps, particles, properties, running, settings, walls
 from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.simulation import Simulation
+from hpcdem.physics.coupling.model import Coupled
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import Budget
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 from tests.blocks.worker import communicator
 from tests.clumped import write_lattice

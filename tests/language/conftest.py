@@ -9,8 +9,8 @@ import pytest
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
+from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.runtime.progress import Log
-from hpcdem.simulation import Simulation
 
 
 @pytest.fixture

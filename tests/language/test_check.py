@@ -55,7 +55,7 @@ def test_steps_after_restore():
 
 
 def test_a_replaced_wall_stands_still():
-    from hpcdem.errors import ScriptError
+    from hpcdem.core.errors import ScriptError
 
     with pytest.raises(ScriptError, match="wall 1 does not move"):
         parse_text("START\nSET DT 1\n" + WALL + "WALL id 1 nodes (0 0) (1 1)\nIMPLE wall id 1 xmove 1")
@@ -174,7 +174,7 @@ def test_particles_of_files(tmp_path):
 
 def test_a_restart_file_is_looked_into(tmp_path):
     from hpcdem.lang.zdem.execute import Interpreter
-    from hpcdem.simulation import Simulation
+    from hpcdem.physics.dem.simulation import Simulation
 
     lines = "START\nSET dt 0.05\nWALL id 1 nodes 0 0 0 9 xv 2\nGEN grid rad discrete 1 x 0 8 y 0 8\nSAV a.sav"
     Interpreter(parse_text(lines, str(tmp_path / "a.py"))).run(Simulation(outdir=tmp_path / "data"))
@@ -233,7 +233,7 @@ def test_names_of_frames(manual_scripts):
 
 def test_names_are_those_that_a_run_writes(tmp_path):
     from hpcdem.lang.zdem.execute import Interpreter
-    from hpcdem.simulation import Simulation
+    from hpcdem.physics.dem.simulation import Simulation
 
     text = "\n".join(
         [

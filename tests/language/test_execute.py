@@ -8,12 +8,12 @@ import inspect
 
 import pytest
 
-from hpcdem.errors import CommandError, PhysicsError, ScriptError, UsageError
+from hpcdem.core.errors import CommandError, PhysicsError, ScriptError, UsageError
+from hpcdem.core.selection import Group, Interval
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.execute import Interpreter, Verbs, refuse_unexecuted
 from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.lang.zdem.plan import expected_steps
-from hpcdem.selection import Group, Interval
 
 EXTENTS = {"left": 0.0, "right": 500.0, "bottom": 0.0, "top": 4000.0}
 
@@ -293,7 +293,7 @@ def test_manual_scripts_reach_their_verbs(manual_scripts, tmp_path, name):
 
 
 def test_the_real_verbs_are_found_by_name():
-    assert Verbs().particles is importlib.import_module("hpcdem.commands.particles")
+    assert Verbs().particles is importlib.import_module("hpcdem.commands.dem.particles")
 
 
 def test_reading_and_running_agree_on_the_steps(tmp_path):

@@ -7,13 +7,13 @@ import json
 
 import pytest
 
-from hpcdem.errors import EXIT_USAGE, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import EXIT_USAGE, HpcdemError, ScriptError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang import detect
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text, read_script
+from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.runtime.progress import Log
-from hpcdem.simulation import Simulation
 from tests.language.hostile import BEFORE, BEGIN, BOX, COORDINATES, LINES, RUNS, SCRIPTS, spoiled
 
 

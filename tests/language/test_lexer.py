@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.zdem.lexer import Token, expression, number, read_lines, whole
 
 EXTENTS = {"left": 1.0, "right": 100.0, "bottom": 10.0, "top": 4000.0}

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
+from hpcdem.core.selection import Chain, Ellipse, Group, Interval, Polygon
 from hpcdem.lang import detect
 from hpcdem.lang.zdem import check
 from hpcdem.lang.zdem.execute import refuse_unexecuted
 from hpcdem.lang.zdem.parser import read_script
 from hpcdem.lang.zdem.plan import expected_steps
-from hpcdem.selection import Chain, Ellipse, Group, Interval, Polygon
 
 # Statements and steps, as published; steps None where they depend on a restart file or on SET frac.
 PUBLISHED = {

@@ -7,10 +7,10 @@ import pickle
 
 import pytest
 
-from hpcdem.errors import ScriptError, UsageError
+from hpcdem.core.errors import ScriptError, UsageError
+from hpcdem.core.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.parser import parse_text, read_script
-from hpcdem.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon
 
 BEFORE = """START
 SET DT 5e-2

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, ScriptError
-from hpcdem.fields import BOX_IDS
+from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.fields import BOX_IDS
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat
 from hpcdem.lang.zdem import check
 from hpcdem.lang.zdem.execute import Interpreter
 from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.model.walls import Walls
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.dem.walls import Walls
 from hpcdem.runtime.progress import Log
-from hpcdem.simulation import Simulation
 from tests.support import value, velocity
 
 KN, U = 4.0e4, 0.02
@@ -483,7 +483,7 @@ def test_the_log_of_a_run_that_goes_on_counts_from_the_beginning_of_the_command(
     first = Simulation(SerialComm(), 1, tmp_path / "data", Log(0, io.StringIO()))
     Interpreter(script).run(first)
 
-    from hpcdem import saving
+    from hpcdem.physics.dem import saving
 
     out = io.StringIO()
     again = Simulation(SerialComm(), 1, tmp_path / "data", Log(0, out))

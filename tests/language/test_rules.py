@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem import output
-from hpcdem.commands.bonds import _slots
-from hpcdem.errors import ScriptError
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem.bonds import _slots
+from hpcdem.core.errors import ScriptError
+from hpcdem.engine import output
+from hpcdem.physics.dem.simulation import Simulation
 from tests.support import at_wall, body, force, pair, position, value, velocity
 
 

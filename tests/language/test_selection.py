@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
+from hpcdem.core.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon, chain, has_expressions
 from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.selection import Chain, Ellipse, Expression, Group, Ids, Interval, Polygon, chain, has_expressions
 
 EXTENTS = {"left": 0.0, "right": 100.0, "bottom": 10.0, "top": 4000.0}
 TOP_KILOMETRE = Expression("{top}-1000.0", ("top", 1000.0, "-"))

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.physics.dem import laws
-from hpcdem.physics.dem.laws import BREAKS_IN_SHEAR, BREAKS_IN_TENSION, CONTACT_BOND, ELASTIC_BOND, HOLDS
+from hpcdem.physics.dem.kernels import laws
+from hpcdem.physics.dem.kernels.laws import BREAKS_IN_SHEAR, BREAKS_IN_TENSION, CONTACT_BOND, ELASTIC_BOND, HOLDS
 
 quick = settings(max_examples=80, deadline=None, derandomize=True)
 positive = st.floats(1e-3, 1e12)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem import cells
-from hpcdem.memory import LINE, aligned, take_rows
+from hpcdem.core import cells
+from hpcdem.core.memory import LINE, aligned, take_rows
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)
 index = st.integers(-cells.FARTHEST, cells.FARTHEST)

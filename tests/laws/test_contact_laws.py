@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.physics.dem import laws
+from hpcdem.physics.dem.kernels import laws
 
 quick = settings(max_examples=80, deadline=None, derandomize=True)
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.exact_sum import exact_sum, partial_bins, rounded, rounded_sums
+from hpcdem.numerics.exact_sum import exact_sum, partial_bins, rounded, rounded_sums
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 quick = settings(max_examples=150, deadline=None, derandomize=True)

@@ -7,9 +7,9 @@ import io
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import particles, properties, running, settings, walls
-from hpcdem.errors import PhysicsError
+from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.core.errors import PhysicsError
+from hpcdem.physics.dem import observe
 from hpcdem.runtime.progress import Log
 from hpcdem.session import report_end
 from tests.support import model, only

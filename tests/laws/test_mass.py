@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, running, settings
-from hpcdem.physics.dem import mass
+from hpcdem.commands.dem import particles, properties, running, settings
+from hpcdem.physics.dem.kernels import mass
 from tests.support import body, model
 
 R = np.array([1e-3, 0.5, 1.0, 60.0, 80.0])

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem import cells
+from hpcdem.core import cells
+from hpcdem.core.fields import GID, RADIUS, WIDTH, X, Y
 from hpcdem.decomp import strips
-from hpcdem.fields import GID, RADIUS, WIDTH, X, Y
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Migration
-from hpcdem.physics.dem import neighbours, walls
-from hpcdem.physics.dem.fast import Fast
-from hpcdem.physics.dem.histories import Histories
+from hpcdem.physics.dem.kernels import neighbours, walls
+from hpcdem.physics.dem.kernels.fast import Fast
+from hpcdem.physics.dem.kernels.histories import Histories
 
 SKIN = 0.15
 WALLS = np.zeros((5, 8))

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hpcdem.commands import bonds, particles, properties, running
-from hpcdem.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
-from hpcdem.physics import lanes
-from hpcdem.physics.dem import laws
-from hpcdem.physics.lanes import U
-from hpcdem.selection import Interval
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import bonds, particles, properties, running
+from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.core.selection import Interval
+from hpcdem.numerics import lanes
+from hpcdem.numerics.lanes import U
+from hpcdem.physics.dem.kernels import laws
+from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
 BONDS = {"none": (), "elastic": ("left",), "contact": ("right",), "both": ("left", "right")}
@@ -136,7 +136,7 @@ def test_blocks_change_no_bit(tmp_path: Path, bonded: str) -> None:
 
 def sim_forces(sim: Simulation, t: int) -> None:
     """Forces of one block on this thread (tests need no second core)."""
-    from hpcdem.physics.dem import pair_forces
+    from hpcdem.physics.dem.kernels import pair_forces
 
     pair_forces._block(t, *sim._pair_args)
 

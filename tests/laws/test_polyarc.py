@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.numerics.rng import uniform
 from hpcdem.physics.polyarc.gap import fans, farthest, gap
 from hpcdem.physics.polyarc.moments import moments, segment
 from hpcdem.physics.polyarc.outlines import Outlines, arc_circles, boxes, sampled, uniform_outlines
-from hpcdem.physics.rng import uniform
 from hpcdem.pre.specimen.shapes import bodies, oval, polygons
 
 

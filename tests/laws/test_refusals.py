@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import bonds, particles, properties, running, settings
-from hpcdem.errors import CommandError, PhysicsError
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import bonds, particles, properties, running, settings
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.dem.simulation import Simulation
 from tests.support import force, model, only, steps, value
 
 HERTZ = {"shear": 1e9, "poiss": 0.2, "hertz": True}

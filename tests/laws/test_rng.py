@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.physics.rng import uniform
+from hpcdem.numerics.rng import uniform
 
 MASK = (1 << 64) - 1
 number = st.integers(0, (1 << 62))

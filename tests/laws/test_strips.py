@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from hpcdem import cells
-from hpcdem.cells import COLUMN
+from hpcdem.core import cells
+from hpcdem.core.cells import COLUMN
 from hpcdem.decomp import strips
 
 quick = settings(max_examples=150, deadline=None, derandomize=True)

@@ -12,8 +12,8 @@ import math
 
 import pytest
 
-from hpcdem.commands import particles, properties, running, settings, walls
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.physics.dem.simulation import Simulation
 from tests.support import model, only, steps
 
 

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem import observe
-from hpcdem.commands import particles, properties, walls
-from hpcdem.errors import CommandError
-from hpcdem.physics.dem import walls as kernels
+from hpcdem.commands.dem import particles, properties, walls
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.kernels import walls as kernels
 from hpcdem.runtime.progress import Log
 from tests.support import at_wall, carry, force, model, only, position, steps, value, velocity
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.pre.mesh import optional
 from tests.conftest import absent
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
-from hpcdem.model.blocks import connectivity as cn
-from hpcdem.model.blocks.mesh import Mesh, check, crack_rows, edge_rows
+from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import connectivity as cn
+from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows, edge_rows
 from hpcdem.pre.mesh import structured
 from hpcdem.pre.mesh.cracks import edges_on, with_cracks
 from hpcdem.pre.mesh.geometry import polyline

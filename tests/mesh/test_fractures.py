@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.fractures import (
     Fractures,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.geometry import Layers, distance, enclosed_area, sampled, transformed

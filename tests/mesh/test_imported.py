@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.model.blocks.mesh import check
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem.mesh import check
 from hpcdem.pre.mesh.imported import import_mesh
 
 HEAD = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.pre.mesh import geometry, optional
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.imported import import_mesh

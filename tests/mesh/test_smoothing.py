@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.mesh import Mesh, check
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import quality

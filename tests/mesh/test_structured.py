@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.mesh import check
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.mesh import check
 from hpcdem.pre.mesh import geometry, structured
 from hpcdem.pre.mesh.cracks import edges_on, follow, with_layer
 from hpcdem.pre.mesh.fractures import Fractures, of_curves

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.model.blocks import connectivity as cn
-from hpcdem.model.blocks.mesh import Mesh, check, crack_rows, edge_rows
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem import connectivity as cn
+from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows, edge_rows
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.fractures import Fractures
 from hpcdem.pre.mesh.geometry import Layers

@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.page import maker
 from hpcdem.page.limits import LIMITS, MOST_ROWS
 from hpcdem.post.specimen import class_colours

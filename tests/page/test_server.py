@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.page import server as module
 from hpcdem.page.server import Answer, PageServer, as_json
 

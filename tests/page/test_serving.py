@@ -14,7 +14,7 @@ import urllib.request
 
 import pytest
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.page import serving
 from hpcdem.page.limits import LIMITS
 from hpcdem.page.maker import request_of, values_of

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.page import worker as module
 from hpcdem.page.worker import SupersededError, Worker
 

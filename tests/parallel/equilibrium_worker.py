@@ -12,8 +12,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hpcdem.blocks import Blocks
 from hpcdem.halo.comm import MpiComm, SerialComm
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import JOINT, ROCK, rectangle, shaken
 
 NAMES = (

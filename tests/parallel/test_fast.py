@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands import bonds, particles, properties, running, walls
-from hpcdem.errors import PhysicsError
-from hpcdem.fields import RADIUS, X, Y
-from hpcdem.physics.dem import fast
-from hpcdem.physics.dem.fast import Fast
-from hpcdem.physics.dem.walls import closest
-from hpcdem.selection import Ids
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import bonds, particles, properties, running, walls
+from hpcdem.core.errors import PhysicsError
+from hpcdem.core.fields import RADIUS, X, Y
+from hpcdem.core.selection import Ids
+from hpcdem.physics.dem.kernels import fast
+from hpcdem.physics.dem.kernels.fast import Fast
+from hpcdem.physics.dem.kernels.walls import closest
+from hpcdem.physics.dem.simulation import Simulation
 from tests.conftest import Launcher
 from tests.short_push import assert_same_files, contents
 from tests.support import model, only, value
@@ -217,8 +217,8 @@ def test_steps_are_the_same_as_with_lists_for_all(tmp_path: Path, monkeypatch: p
     """The same motion as when lists are built for the fast ones too, but for rounding in another order of sums."""
     ends = []
     for few in (16, 0):
-        monkeypatch.setattr("hpcdem.physics.dem.fast.FEWEST", few)
-        monkeypatch.setattr("hpcdem.physics.dem.fast.SHARE", 100 if few else 10**9)
+        monkeypatch.setattr("hpcdem.physics.dem.kernels.fast.FEWEST", few)
+        monkeypatch.setattr("hpcdem.physics.dem.kernels.fast.SHARE", 100 if few else 10**9)
         sim = bed(tmp_path, *THROWN)
         running.cycle(sim, 150)
         order = np.argsort(sim.particles["gid"])

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles
+from hpcdem.commands.dem import particles
 from hpcdem.io.frames import list_frames, read_frame
-from hpcdem.simulation import Simulation
+from hpcdem.physics.dem.simulation import Simulation
 from tests.conftest import Launcher
 from tests.short_push import assert_same_files, contents
 from tests.support import model

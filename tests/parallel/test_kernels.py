@@ -181,4 +181,4 @@ def test_what_was_forgotten_is_told_and_not_stored(launch: Launcher, tmp_path: P
     done = launch.python(1, "model.py", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     said = done.stdout.splitlines()[-2:]
-    assert said[0].startswith("hpcdem.physics.rng.uniform(bool, ") and said[1] == "1"
+    assert said[0].startswith("hpcdem.numerics.rng.uniform(bool, ") and said[1] == "1"

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, running, settings
+from hpcdem.commands.dem import particles, properties, running, settings
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Migration
-from hpcdem.simulation import Simulation
+from hpcdem.physics.dem.simulation import Simulation
 from tests.pretended import Pretended, Ranks
 
 PER_RANK, ROWS, STEPS = 8, 6, 120

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.pre.mesh import optional
 from tests.conftest import Launcher, absent
 
@@ -14,7 +14,7 @@ PROGRAM = """\
 import hashlib, math, sys
 import numpy as np
 from mpi4py import MPI
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.pre.mesh import geometry, once
 from hpcdem.pre.mesh.fractures import FractureSet, Length, Orientation, network

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.blocks import Balanced, Watch
-from hpcdem.clock import Clock
-from hpcdem.commands.blocks import Project
-from hpcdem.errors import CommandError
+from hpcdem.commands.fdem import Project
+from hpcdem.core.clock import Clock
+from hpcdem.core.errors import CommandError
+from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
-from hpcdem.model.blocks.connectivity import centroids
-from hpcdem.model.blocks.mesh import Mesh
-from hpcdem.model.blocks.properties import MODELS, Rows
-from hpcdem.model.blocks.tables import Table
-from hpcdem.timers import Timers
+from hpcdem.physics.fdem.connectivity import centroids
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Balanced, Watch
+from hpcdem.physics.fdem.properties import MODELS, Rows
+from hpcdem.physics.fdem.tables import Table
 
 
 class Noted:
@@ -40,8 +40,9 @@ class Noted:
 
 
 class FakeBlocks:
-    """The interface of `hpcdem.blocks.Blocks`, as far as the verbs use it. calls: (method, arguments) in order; the
-    time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2 time), reactions are 1 and 2 per node."""
+    """The interface of `hpcdem.physics.fdem.model.Blocks`, as far as the verbs use it. calls: (method, arguments) in
+    order; the time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2 time), reactions are 1 and 2 per
+    node."""
 
     def __init__(self, comm: Any = None, outdir: Path | str = "data") -> None:
         self.comm = comm or SerialComm()
@@ -182,7 +183,7 @@ class FakeBlocks:
 
 
 class FakeProbe:
-    """`hpcdem.blocks.probes.Probe` of a fake simulation."""
+    """`hpcdem.physics.fdem.probes.Probe` of a fake simulation."""
 
     def __init__(self, sim: FakeBlocks, name: str, numbers: np.ndarray) -> None:
         self.sim, self.name, self.numbers, self.local = sim, name, numbers, sim.local

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.blocks.cracks import COLUMNS
+from hpcdem.commands.fdem.cracks import COLUMNS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from tests.conftest import Launcher
 from tests.pcdc.test_whole import SCRIPTS, tables

@@ -7,8 +7,8 @@ from dataclasses import asdict
 
 import pytest
 
-from hpcdem.blocks import Blocks, Watch
-from hpcdem.errors import CommandError, EquilibriumError, HpcdemError
+from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError
+from hpcdem.physics.fdem.model import Blocks, Watch
 from tests.blocks.support import joined, model, rectangle
 from tests.pcdc.test_time import Rock, resumed
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.commands.blocks import Project
-from hpcdem.errors import HpcdemError
+from hpcdem.commands.fdem import Project
+from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc.execute import Interpreter
+from hpcdem.physics.fdem.model import Blocks
 from tests.pcdc.fake import Noted
 
 BOX = """

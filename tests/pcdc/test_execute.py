@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc.bindings import VERBS
 from hpcdem.lang.pcdc.table import PCDC
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import kinds, trial
 from hpcdem.lang.pcdc.bindings import VERBS
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
-from hpcdem.model.blocks.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import Drawn, Over
 
 SAMPLES: dict[str, tuple[str, object]] = {
     "<f>": ("0.25", 0.25), "<f>|table <s>": ("0.25", 0.25),

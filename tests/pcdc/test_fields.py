@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from tests.pcdc.test_excavation import Desk
 from tests.pcdc.test_whole import tables
 

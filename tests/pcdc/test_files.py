@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang import detect
 from hpcdem.lang.zdem import execute, parser
 

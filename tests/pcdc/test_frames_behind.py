@@ -6,11 +6,11 @@ import threading
 
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.commands.blocks import assigning, frames, meshing, running, saving
-from hpcdem.commands.blocks.project import Project
-from hpcdem.errors import HpcdemError
+from hpcdem.commands.fdem import assigning, frames, meshing, running, saving
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import under_way
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import ROCK
 
 EVERY, STEPS = 7, 63

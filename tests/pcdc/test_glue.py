@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
-from hpcdem.model.blocks import groups as g
-from hpcdem.model.blocks.mesh import check
+from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.mesh import check
 from hpcdem.pre.mesh.glue import glued
 from tests.blocks.support import joined, rectangle
 from tests.pcdc.test_excavation import Desk
@@ -67,7 +67,7 @@ def test_what_is_said(desk):
 def test_only_those_between_two_groups(desk):
     desk(TWO + "pcdc mesh structured (0,1) (2,2) cells 4 2 diagonal right group 'c' set 'bodies'\n"
          "pcdc mesh glue between 'a' 'c' set 'bodies'\n")  # fmt: skip
-    from hpcdem.commands.blocks.choosing import chosen
+    from hpcdem.commands.fdem.choosing import chosen
 
     assert len(chosen(desk.project, g.JOINT, (g.Between("a", "c", "bodies"),))) == 4
     with pytest.raises(HpcdemError, match="chooses no face-joint"):

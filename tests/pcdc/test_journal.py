@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import journal
 from hpcdem.lang.pcdc.journal import COMMAND, ERROR, LOOK, NAMES, Journal, decoded, encoded
 

@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.blocks.choosing import chosen
-from hpcdem.errors import HpcdemError
-from hpcdem.model.blocks import groups as g
+from hpcdem.commands.fdem.choosing import chosen
+from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import groups as g
 from tests.conftest import absent
 
 

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc.vector import Vector
 from tests.pcdc.fake import Bench
 

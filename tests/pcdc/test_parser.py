@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.statement import Statement

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.blocks.choosing import chosen
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks import groups as g
-from hpcdem.model.blocks.groups import Groups
+from hpcdem.commands.fdem.choosing import chosen
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.groups import Groups
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right group 'rock' set 'domain'\n"
 

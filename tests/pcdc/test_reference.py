@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpcdem.commands.blocks.histories import UNITS
+from hpcdem.commands.fdem.histories import UNITS
 from hpcdem.lang.pcdc import table as t
 from hpcdem.lang.pcdc.reference import page
 from hpcdem.lang.pcdc.trial import MODELS, python
-from hpcdem.model.blocks import groups as g
+from hpcdem.physics.fdem import groups as g
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pcdc_reference.md"
 

@@ -6,7 +6,7 @@ import csv
 
 import pytest
 
-from hpcdem.errors import HpcdemError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.core.errors import HpcdemError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.runtime.stopping import STOP
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right\n"
@@ -110,7 +110,7 @@ def test_histories(bench):
 
 
 def test_files_of_histories_grow_while_the_model_runs(bench, monkeypatch):
-    from hpcdem.commands.blocks import histories
+    from hpcdem.commands.fdem import histories
 
     monkeypatch.setattr(histories, "FLUSH", 3)
     seen = []

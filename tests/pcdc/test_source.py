@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc.source import decode, read
 
 

@@ -8,9 +8,9 @@ import random
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.commands.blocks import saving
-from hpcdem.errors import HpcdemError, StoppedWithCheckpoint
+from hpcdem.commands.fdem import saving
+from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
+from hpcdem.physics.fdem.model import Blocks
 from hpcdem.runtime.stopping import STOP
 from tests.pcdc.fake import Bench, Noted
 from tests.pcdc.test_running import Asked

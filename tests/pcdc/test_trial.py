@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc import check
 
 ROCK = "element c-model mech-iso-e property density 2500 "

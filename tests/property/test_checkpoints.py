@@ -15,13 +15,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hpcdem import saving
-from hpcdem.commands import bonds, particles, properties, running, walls
-from hpcdem.errors import HpcdemError
+from hpcdem.commands.dem import bonds, particles, properties, running, walls
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from hpcdem.simulation import Simulation
+from hpcdem.physics.dem import saving
+from hpcdem.physics.dem.simulation import Simulation
 from tests.property.workers import Worker
 from tests.short_push import contents
 from tests.support import model

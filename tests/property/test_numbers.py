@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem import output
-from hpcdem.commands import particles, running, walls
+from hpcdem.commands.dem import particles, running, walls
+from hpcdem.engine import output
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.textnum import format_floats

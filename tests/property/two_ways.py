@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem import session
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.runtime.progress import Log

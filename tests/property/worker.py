@@ -62,7 +62,7 @@ def get_ready(comm: Any) -> None:
 def carry_out(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
     """Run job["script"] in job["folder"]; then, if job["again"] names a checkpoint, restore it and save it again."""
     from hpcdem.cli.run import Options, run
-    from hpcdem.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.stopping import StopRequests
 
@@ -117,8 +117,8 @@ def watched(job: dict[str, Any]) -> Any:
 
 def save_again(comm: Any, name: str) -> None:
     """A checkpoint brought in and written once more, as again.sav: it must say the same."""
-    from hpcdem import saving
-    from hpcdem.simulation import Simulation
+    from hpcdem.physics.dem import saving
+    from hpcdem.physics.dem.simulation import Simulation
 
     sim = Simulation(comm)
     try:
@@ -131,8 +131,8 @@ def save_again(comm: Any, name: str) -> None:
 
 def prepare_accident(sim: Any, kind: str) -> None:
     """At step 7, on the last rank of several: what the tests must notice."""
-    from hpcdem.errors import CommandError
-    from hpcdem.simulation import Watcher
+    from hpcdem.core.errors import CommandError
+    from hpcdem.physics.dem.simulation import Watcher
 
     def happen() -> None:
         if sim.clock.step != 7 or sim.comm.rank + 1 != sim.comm.size or sim.comm.size == 1:
@@ -165,7 +165,7 @@ def read_damaged(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[s
 
     Answers with one word each: "same", "refused", "changed", or what was raised.
     """
-    from hpcdem.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError
     from hpcdem.io import checkpoint
 
     whole = Path(job["file"]).read_bytes()

@@ -214,7 +214,9 @@ def assert_as_planned(model: Model, place: Path, step: int) -> None:
         if None not in numbers:
             written = len({path.name for path in place.rglob(pattern)})
             few, more = sum(n for n in numbers if n), sum(run.rough(kind) for run in runs)
-            assert few <= written <= few + more, f"{numbers} files of {kind} foretold, {more} more at most, {written} there"
+            assert few <= written <= few + more, (
+                f"{numbers} files of {kind} foretold, {more} more at most, {written} there"
+            )
 
 
 def plain(text: str) -> str:

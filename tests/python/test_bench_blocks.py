@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
+from hpcdem.physics.fdem.model import Blocks
 from tests.conftest import ROOT, run
 
 sys.path.insert(0, str(ROOT / "scripts" / "lib"))

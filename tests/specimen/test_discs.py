@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.pre.specimen import Request, make_specimen, sampled
 from hpcdem.pre.specimen.discs import GAP, inscribed, union_area

@@ -15,7 +15,7 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.grade import grade, work
-from hpcdem.errors import EXIT_USAGE, HpcdemError, UsageError
+from hpcdem.core.errors import EXIT_USAGE, HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.clumps import read_clumps
 from hpcdem.io.ppdem import read_ppdem

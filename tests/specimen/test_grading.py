@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.specimen import counts as number_of
 from hpcdem.pre.specimen.grading import grading, parse_grading, read_grading
 from tests.specimen.shapes import EXAMPLE, WINDOW

@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.outlines import boxes
 from hpcdem.pre.specimen import Request, Specimen, make_specimen
 from hpcdem.pre.specimen.dense import closest

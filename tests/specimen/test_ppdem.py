@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.clumps import read_clumps, write_clumps
 from hpcdem.io.ppdem import PpdemGrains, circles, read_ppdem, write_ppdem
 from hpcdem.pre.specimen import Request, make_specimen

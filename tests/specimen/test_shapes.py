@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.physics.polyarc.outlines import arc_circles, boxes, sampled
 from hpcdem.pre.specimen.shapes import SIDES, bodies, oval, polygons

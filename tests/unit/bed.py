@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem import observe
-from hpcdem.commands import bonds, particles, properties, walls
+from hpcdem.commands.dem import bonds, particles, properties, walls
+from hpcdem.core.selection import Interval
 from hpcdem.io.frame import Frame
-from hpcdem.selection import Interval
-from hpcdem.simulation import Simulation
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
 G, WIDTH = 9.8, 6000.0

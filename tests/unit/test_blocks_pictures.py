@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.io.frame import Table

@@ -13,7 +13,7 @@ import pytest
 from hpcdem.cases import CASES, find
 from hpcdem.cases.base import Case, chooses, number
 from hpcdem.cli.case import OWN, command
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import check
 from tests.conftest import Launcher, absent
 from tests.pcdc.fake import Bench

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, parse_cpt, read_cpt, stress_table
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.dat import write_dat

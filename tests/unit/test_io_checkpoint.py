@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint, seal
 from hpcdem.io.frame import Table

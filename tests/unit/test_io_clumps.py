@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.clumps import read_clumps, write_clumps
 from tests.clumped import write_lattice
 from tests.conftest import Launcher

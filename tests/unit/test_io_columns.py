@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.columns import append_rows
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.agreed import atomic_path, make_folder
 from hpcdem.io.disk import explain
@@ -91,7 +91,7 @@ import resource, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import hpcdem.io.dat, hpcdem.io.ps, hpcdem.io.vtk, hpcdem.io.vtkhdf
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import MpiComm, SerialComm
 from tests.unit.io_synthetic import make_frame
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import write_dat
 from hpcdem.io.frames import frame_name, list_frames, read_frame

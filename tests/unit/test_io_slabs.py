@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.slabs import find_rows, order_of, to_slabs
 
@@ -83,7 +83,7 @@ PROGRAM = """
 import sys
 import numpy as np
 from mpi4py import MPI
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import MpiComm
 from hpcdem.io.slabs import find_rows, to_slabs
 

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.vtkhdf import BOND, CONTACT, PARTICLE, read_vtkhdf, write_vtkhdf
 from tests.unit.io_synthetic import assert_same, make_frame

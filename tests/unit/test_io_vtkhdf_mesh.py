@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Table
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame

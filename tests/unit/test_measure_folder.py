@@ -12,7 +12,7 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.measure import measure, request, work
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import write_dat
 from hpcdem.io.frames import read_frame

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.lock import FolderLock, Taken, holder_of
 from hpcdem.runtime import run_folder

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from hpcdem.errors import CommandError, StoppedWithCheckpoint
+from hpcdem.core.errors import CommandError, StoppedWithCheckpoint
 from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import ending
 
@@ -45,7 +45,7 @@ def test_an_error_of_ours_shows_its_traceback(capsys):
 PROGRAM = """
 import sys, time
 import numpy as np
-from hpcdem.errors import *
+from hpcdem.core.errors import *
 from hpcdem.runtime import ending, launch
 
 comm = launch.start_mpi()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from hpcdem.cli.run import speaks_zdem
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import doctor
 from hpcdem.runtime import launch as launching
@@ -73,7 +73,7 @@ def test_no_mpi_library_under_a_launcher_is_an_error_of_its_own(monkeypatch):
 
 COPIES = """
 import sys
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import launch
 with launch.one_voice():
     try:

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
+from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime.progress import Log, StepStatus, duration, rate
-from hpcdem.timers import Timers
 
 
 class Clock:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.physics.fingerprint import as_text, of_rows
+from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.numerics.fingerprint import as_text, of_rows
 from hpcdem.runtime import reproducing
 from hpcdem.runtime.progress import Log
 

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hpcdem.errors import UsageError
+from hpcdem.core.errors import UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime.stopping import NONE, SAVE, STOP, StopRequests, parse_limit, slurm_end_time
 

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from hpcdem.clock import Clock
+from hpcdem.core.clock import Clock
+from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
-from hpcdem.timers import Timers
 
 
 class Ranks(SerialComm):

@@ -238,8 +238,8 @@ def test_the_key_knows_every_module_with_kernels_and_its_callers():
         "fields.py",
         "simulation.py",
         "observe.py",
-        "commands/bonds.py",
-        "commands/particles.py",
+        "commands/dem/bonds.py",
+        "commands/dem/particles.py",
         "io/textnum.py",
     } <= found
-    assert not {"api.py", "commands/walls.py"} & found
+    assert not {"api.py", "commands/dem/walls.py"} & found

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hpcdem.errors import CommandError, ScriptError
+from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.zdem.lexer import Token, expression, number
 from hpcdem.lang.zdem.parser import parse_text
 from tests.conftest import ROOT

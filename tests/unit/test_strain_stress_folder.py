@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from hpcdem.cli.strain_stress import strain_stress as command
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
 from hpcdem.io.frame import Frame
@@ -335,7 +335,7 @@ sys.path.insert(0, sys.argv[1])
 from mpi4py import MPI
 from hpcdem.cli.strain_stress import strain_stress, work
 from hpcdem.halo.comm import MpiComm
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime.progress import Log
 
 comm = MpiComm(MPI.COMM_WORLD)

@@ -16,7 +16,7 @@ import pytest
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.pictures import as_usual, style_of
 from hpcdem.cli.zdem2jpg import work, zdem2jpg
-from hpcdem.errors import HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import HpcdemError, ScriptError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import colours
 from hpcdem.io.dat import write_dat

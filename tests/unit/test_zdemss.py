@@ -14,7 +14,7 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.zdemss import work, zdemss
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.axes import View
 from hpcdem.post.cpt import INVAR2, VOLUME, parse_cpt, stress_table

@@ -9,7 +9,7 @@ from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.lang.pcdc.trial import python
-from hpcdem.model.blocks import groups as g
+from hpcdem.physics.fdem import groups as g
 
 if TYPE_CHECKING:
     from hpcdem.lang.pcdc.execute import Interpreter

@@ -5,12 +5,12 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.statement import Pending
-from hpcdem.model.blocks.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import Drawn, Over
 
 
 def read(text: str, file: str) -> Source:

@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.complete import candidates
 from hpcdem.lang.pcdc.execute import Interpreter

@@ -1,4 +1,4 @@
-"""Carries out a script: runs its Python, and binds every command to the verb of `hpcdem.commands.blocks` that does it.
+"""Carries out a script: runs its Python, and binds every command to the verb of `hpcdem.commands.fdem` that does it.
 
 The Python of a script runs on every rank; its commands are collective. Before one is carried out the ranks compare
 what they were told, so that a rank that took another way is found at once.
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import names, source
 from hpcdem.lang.pcdc.bindings import PASSED_OVER, VERBS, Call
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
@@ -35,16 +35,16 @@ SEED = 0
 
 
 class Verbs:
-    """The modules of `hpcdem.commands.blocks` by name, each imported when it is first needed."""
+    """The modules of `hpcdem.commands.fdem` by name, each imported when it is first needed."""
 
     def __getattr__(self, name: str) -> Any:
-        return importlib.import_module(f"hpcdem.commands.blocks.{name}")
+        return importlib.import_module(f"hpcdem.commands.fdem.{name}")
 
 
 class Interpreter:
-    """Runs scripts and single lines in one namespace, on a project (hpcdem.commands.blocks).
+    """Runs scripts and single lines in one namespace, on a project (hpcdem.commands.fdem).
 
-    namespace: the global names of the script. `verbs` replaces the modules of hpcdem.commands.blocks in tests. journal:
+    namespace: the global names of the script. `verbs` replaces the modules of hpcdem.commands.fdem in tests. journal:
     of a script that runs, None in a conversation.
     """
 

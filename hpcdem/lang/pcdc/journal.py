@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, EquilibriumError, HpcdemError, PhysicsError, ScriptError, UsageError
+from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, PhysicsError, ScriptError, UsageError
 
 MOST = 64 << 20
 """Bytes of answers that are kept; of a script that looked at more no run can go on from a checkpoint."""

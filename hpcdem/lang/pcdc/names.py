@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from types import FunctionType
 from typing import Any
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.source import Source
 from hpcdem.lang.pcdc.vector import Vector
 

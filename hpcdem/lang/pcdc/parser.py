@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import kinds, lexer, rules, trial
 from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
 from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Pending, Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.model.blocks.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import Drawn, Over
 
 
 def parse(words: str, file: str, line: int, text: str, table: Table, last_line: int = 0) -> Statement:

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import lexer, parser
 from hpcdem.lang.pcdc.statement import Statement, shown
 from hpcdem.lang.pcdc.table import PCDC, Table

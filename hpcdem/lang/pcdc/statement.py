@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
 
 if TYPE_CHECKING:
     from hpcdem.lang.pcdc.table import Command

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.statement import Pending
 from hpcdem.lang.pcdc.table import Command
-from hpcdem.model.blocks import properties
-from hpcdem.model.blocks.tables import Drawn, Over, Table
+from hpcdem.physics.fdem import properties
+from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     "mechanical-iso-elastic": properties.MECH_ISO_ELASTIC,
@@ -109,7 +109,7 @@ def _shape(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 def _make_shape(verb: str) -> Callable[[Mapping[str, Any]], None]:
     def make(arguments: Mapping[str, Any]) -> None:
-        from hpcdem.commands.blocks import geometry
+        from hpcdem.commands.fdem import geometry
 
         geometry.shape(verb, *_shape(arguments).values())
 
@@ -117,13 +117,13 @@ def _make_shape(verb: str) -> Callable[[Mapping[str, Any]], None]:
 
 
 def _rectangle(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import meshing
+    from hpcdem.commands.fdem import meshing
 
     meshing.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
 
 
 def _equilateral(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import meshing
+    from hpcdem.commands.fdem import meshing
 
     meshing.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
 
@@ -133,25 +133,25 @@ def _table(arguments: Mapping[str, Any]) -> None:
 
 
 def _history(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import histories
+    from hpcdem.commands.fdem import histories
 
     histories.file_name(arguments["name"])
 
 
 def _export(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import charts
+    from hpcdem.commands.fdem import charts
 
     charts.figure_name(arguments["file"])
 
 
 def _frames(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import frames
+    from hpcdem.commands.fdem import frames
 
     frames.file_name(arguments["file"])
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.blocks import meshing
+    from hpcdem.commands.fdem import meshing
 
     meshing.fracture_set(**fracture_words(arguments)).check("fractures")
 

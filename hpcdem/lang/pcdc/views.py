@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.vector import Vector
-from hpcdem.model.blocks import groups as g
+from hpcdem.physics.fdem import groups as g
 
 KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE}
 _VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError, ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.zdem import plan
 from hpcdem.lang.zdem.estimate import estimate, kind_of
 from hpcdem.lang.zdem.execute import refuse_lost_files
@@ -37,8 +37,8 @@ PATTERNS = {
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files of one kind: how many (pairs of files count once), and how many bytes together; None where unknown. rough: there
-    may be a few more, as it is unknown at which step a CYC starts."""
+    """Files of one kind: how many (pairs of files count once), and how many bytes together; None where unknown. rough:
+    there may be a few more, as it is unknown at which step a CYC starts."""
 
     files: int | None
     size: int | None

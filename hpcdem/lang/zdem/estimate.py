@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem import selection as sel
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core import selection as sel
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.io.dat import is_frame, read_dat
 from hpcdem.lang.zdem.statement import Statement, find
 

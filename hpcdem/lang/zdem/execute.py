@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
+from hpcdem.core.selection import Selection, has_expressions, number
 from hpcdem.lang.zdem.parser import Script, parse_text
 from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, recorded
 from hpcdem.lang.zdem.statement import Statement, find
-from hpcdem.selection import Selection, has_expressions, number
 
 
 class Verbs:

@@ -11,9 +11,9 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hpcdem.errors import ScriptError
+from hpcdem.core.errors import ScriptError
+from hpcdem.core.selection import VARIABLES, Expression
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.selection import VARIABLES, Expression
 
 SEPARATORS = "()=,"
 COMMENT = re.compile(rb"[#!;]")

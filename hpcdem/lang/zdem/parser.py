@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-from hpcdem import selection as sel
-from hpcdem.errors import ScriptError, UsageError
+from hpcdem.core import selection as sel
+from hpcdem.core.errors import ScriptError, UsageError
 from hpcdem.lang.zdem import lexer, plan, rules
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.lexer import Line, Token

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
-from hpcdem.fields import BOX_IDS
+from hpcdem.core.fields import BOX_IDS
 from hpcdem.io.dat import is_frame
 from hpcdem.lang.zdem.lexer import LARGEST_WHOLE
 from hpcdem.lang.zdem.statement import Statement, find

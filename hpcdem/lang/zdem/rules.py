@@ -6,11 +6,11 @@ import os.path
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from hpcdem import limits
-from hpcdem.errors import CommandError, ScriptError
+from hpcdem.core import limits
+from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.core.selection import has_expressions
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.statement import Statement
-from hpcdem.selection import has_expressions
 
 BEGINNINGS = "START, RESTORE or LOAD"
 BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")

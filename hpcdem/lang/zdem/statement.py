@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import ScriptError
-from hpcdem.selection import Selection
+from hpcdem.core.errors import ScriptError
+from hpcdem.core.selection import Selection
 
 
 @dataclass(frozen=True)

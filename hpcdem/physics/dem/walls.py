@@ -1,225 +1,136 @@
-"""Particle-wall contacts.
-
-A wall is a segment P1-P2. Inside the segment the normal is the wall's; beyond an end the end point is a point
-obstacle. Two-sided walls push a particle to the side on which its centre was when the contact began (kept per
-contact, so that the overlap may exceed the radius); one-sided walls, and the BOX, push to the left of P1 -> P2.
-Rt = R, overlap U = R - distance and the particle's own moduli: the law found in published states of ZDEM (Hertz
-force of the floor equals the weight above it).
-"""
+"""The walls, known to every rank: segments with a velocity, and the four sides of the BOX."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-from numba import njit, prange
 
-from hpcdem.fields import GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
-from hpcdem.physics.dem import laws
-from hpcdem.physics.dem.contacts import MODEL, MU, A, B
+from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import BOX_IDS
 
-# Columns of the wall table used by the kernels.
-P1X, P1Y, P2X, P2Y, WVX, WVY, ONE_SIDED = range(7)
+OLD_SIDES = ("left", "right", "bottom", "top")
+"""The walls with ids -1 to -4 in checkpoints that know no column `side`."""
 
-NONE, FACE, END1, END2 = 0, 1, 2, 3
+_SIDES = f"{min(BOX_IDS.values())} to {max(BOX_IDS.values())}"
 
 
-@njit(cache=True, error_model="numpy")
-def closest(wall, x, y):
-    """Where a point meets a wall: (FACE, END1 or END2; signed distance to the line, left positive; nearest point)."""
-    ex, ey = wall[P2X] - wall[P1X], wall[P2Y] - wall[P1Y]
-    length = math.sqrt(ex * ex + ey * ey)
-    ex /= length
-    ey /= length
-    rx, ry = x - wall[P1X], y - wall[P1Y]
-    along = rx * ex + ry * ey
-    h = ex * ry - ey * rx
-    if along <= 0.0:
-        return END1, h, wall[P1X], wall[P1Y]
-    if along >= length:
-        return END2, h, wall[P2X], wall[P2Y]
-    return FACE, h, wall[P1X] + along * ex, wall[P1Y] + along * ey
+class Walls:
+    """Columns by name: id (n,) i8; p1, p2, v (n, 2) f8; kn, ks, fric (n,) f8; color (n,) i8; one_sided (n,) bool;
+    side (n,) i8: 0, or 1 to 4 for the walls of BOX in the order of BOX_IDS.
 
-
-@njit(cache=True, error_model="numpy")
-def geometry(wall, x, y, r, side):
-    """Contact of a disc with a wall: (where, side, n_x, n_y, overlap, nearest point). where is NONE without contact.
-
-    n points from the particle to the wall. `side` is the stored side (+1 left, -1 right, 0 none yet).
+    A wall keeps its place in the table for good (contact histories refer to it).
     """
-    where, h, qx, qy = closest(wall, x, y)
-    if where == FACE:
-        if wall[ONE_SIDED] != 0.0:
-            if h <= -r or h >= r:
-                return NONE, 0.0, 0.0, 0.0, 0.0, qx, qy
-            side = 1.0
-        elif side == 0.0:
-            if abs(h) >= r:
-                return NONE, 0.0, 0.0, 0.0, 0.0, qx, qy
-            side = 1.0 if h >= 0.0 else -1.0
-        u = r - side * h
-        if u < 0.0:
-            return NONE, 0.0, 0.0, 0.0, 0.0, qx, qy
-        ex, ey = wall[P2X] - wall[P1X], wall[P2Y] - wall[P1Y]
-        length = math.sqrt(ex * ex + ey * ey)
-        return FACE, side, side * ey / length, -side * ex / length, u, qx, qy
-    dx, dy = qx - x, qy - y
-    d = math.sqrt(dx * dx + dy * dy)
-    if d >= r or d == 0.0:
-        return NONE, 0.0, 0.0, 0.0, 0.0, qx, qy
-    return where, 0.0, dx / d, dy / d, r - d, qx, qy  # round the end it may come to the other side
 
+    def __init__(self) -> None:
+        self.id = np.empty(0, np.int64)
+        self.p1, self.p2, self.v = np.empty((0, 2)), np.empty((0, 2)), np.empty((0, 2))
+        self.kn, self.ks, self.fric = np.empty(0), np.empty(0), np.empty(0)
+        self.color = np.empty(0, np.int64)
+        self.one_sided = np.empty(0, bool)
+        self.side = np.empty(0, np.int64)
+        self.travel = np.empty((0, 2))
+        """Way of each wall since the contact lists were built [m]."""
 
-@njit(cache=True, error_model="numpy")
-def _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, px, py):
-    """True if the particle meets the end point (px, py) of slot k by another wall as well: by the face of one that
-    passes through this point, or by an end there that comes earlier."""
-    for q in range(first, last):
-        if q == k:
-            continue
-        where, _, _, _, _, qx, qy = geometry(walls[slot_wall[q]], x, y, r, slot_side[q])
-        if where == FACE:
-            _, _, qx, qy = closest(walls[slot_wall[q]], px, py)
-        if where != NONE and abs(qx - px) <= 1e-9 * r and abs(qy - py) <= 1e-9 * r and (where == FACE or q < k):
-            return True
-    return False
+    COLUMNS = ("id", "p1", "p2", "v", "kn", "ks", "fric", "color", "one_sided", "side", "travel")
 
+    def __len__(self) -> int:
+        return len(self.id)
 
-@njit(cache=True, error_model="numpy")
-def meeting(k, first, last, x, y, r, walls, slot_wall, slot_side):
-    """Geometry of wall slot k, of a particle with the slots first : last and this place and radius: (where, side, n_x,
-    n_y, U)."""
-    where, side, nx, ny, u, qx, qy = geometry(walls[slot_wall[k]], x, y, r, slot_side[k])
-    if where > FACE and _end_is_covered(k, first, last, walls, slot_wall, slot_side, x, y, r, qx, qy):
-        where = NONE
-        side = 0.0
-    return where, side, nx, ny, u
+    def find(self, wall_id: int) -> int | None:
+        """Row of the wall with this id, or None."""
+        at = np.flatnonzero(self.id == wall_id)
+        return int(at[0]) if len(at) else None
 
+    def row(self, wall_id: int) -> int:
+        """Row of the wall with this id; CommandError if there is none."""
+        at = self.find(wall_id)
+        if at is None:
+            known = ", ".join(map(str, self.id[self.side == 0])) or "none"
+            raise CommandError(f"there is no wall with id {wall_id} (walls so far: {known})")
+        return at
 
-@njit(cache=True, error_model="numpy")
-def contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
-    """Geometry and law of wall slot k: (where, side, n_x, n_y, U, Fn, ks, friction)."""
-    i = slot_row[k]
-    r = hot[i, RADIUS]
-    where, side, nx, ny, u = meeting(k, first, last, hot[i, X], hot[i, Y], r, walls, slot_wall, slot_side)
-    if where == NONE:
-        return where, side, nx, ny, u, 0.0, 0.0, 0.0
-    law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-    fn, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
-    return where, side, nx, ny, u, fn, ks, law[MU]
+    def put(self, wall_id: int, p1: tuple[float, float], p2: tuple[float, float], one_sided: bool = False) -> int:
+        """Make a wall, or give an existing id new end points and default properties; returns its row."""
+        if tuple(p1) == tuple(p2):
+            raise CommandError(f"wall {wall_id} has zero length: both nodes are ({p1[0]:g}, {p1[1]:g})")
+        at = self.find(wall_id)
+        if at is None:
+            at = len(self)
+            for name in self.COLUMNS:
+                column = getattr(self, name)
+                setattr(self, name, np.concatenate([column, np.zeros((1, *column.shape[1:]), column.dtype)]))
+        for name in self.COLUMNS:
+            getattr(self, name)[at] = 0
+        self.id[at], self.p1[at], self.p2[at], self.one_sided[at] = wall_id, p1, p2, one_sided
+        return at
 
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _block(
-    t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side, laws_table, n_mat, dt
-):  # fmt: skip
-    """Add the wall forces on the owned particles of block t; shear histories move on by dt.
-
-    Slots wptr[t] : wptr[t+1] are sorted by row, then wall. Sides are renewed after all slots of a particle were seen.
-    """
-    shift = foff[t] - lo[t]
-    k = wptr[t]
-    while k < wptr[t + 1]:
-        i = slot_row[k]
-        first = k
-        last = k + 1
-        while last < wptr[t + 1] and slot_row[last] == i:
-            last += 1
-        vx, vy, w, r = hot[i, VX], hot[i, VY], hot[i, SPIN], hot[i, RADIUS]
-        for k in range(first, last):
-            where, side, nx, ny, u, fn, ks, mu = contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
+    def put_side(self, side: str, p1: tuple[float, float], p2: tuple[float, float]) -> int:
+        """Make a wall of BOX, or give it new end points and default properties; returns its row. CommandError where its
+        id is taken."""
+        at, wanted = self.of_side(side), BOX_IDS[side]
+        if at is None and self.find(wanted) is not None:
+            raise CommandError(
+                f"BOX makes the walls {_SIDES}, and there is a wall {wanted} already; give it another id"
             )
-            new_side[k] = side
-            if where == NONE:
-                slot_fs[k] = 0.0
-                continue
-            wall = walls[slot_wall[k]]
-            la = r - 0.5 * u
-            vs = ny * (vx - wall[WVX]) + nx * (wall[WVY] - vy) - w * la
-            s = laws.coulomb(slot_fs[k] + ks * vs * dt, mu * fn)
-            slot_fs[k] = s
-            force[shift + i, 0] += s * -ny - fn * nx
-            force[shift + i, 1] += s * nx - fn * ny
-            force[shift + i, 2] += s * la
-        for k in range(first, last):
-            slot_side[k] = new_side[k]
-        k = last
+        at = self.put(wanted if at is None else int(self.id[at]), p1, p2, one_sided=True)
+        self.side[at] = 1 + list(BOX_IDS).index(side)
+        return at
 
+    def side_of(self, row: int) -> str:
+        """The side of BOX that a wall is, "" for others."""
+        return ["", *BOX_IDS][int(self.side[row])]
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def forces(n_blocks, *args):
-    """All blocks, one after the other."""
-    for t in range(n_blocks):
-        _block(t, *args)
+    def of_side(self, side: str) -> int | None:
+        """Row of a wall of BOX, or None."""
+        at = np.flatnonzero(self.side == 1 + list(BOX_IDS).index(side))
+        return int(at[0]) if len(at) else None
 
+    def ids_of_earlier_versions(self) -> np.ndarray:
+        """The ids (n,), those of BOX as they were: fingerprints of states stay comparable."""
+        ids = self.id.copy()
+        for number, side in enumerate(OLD_SIDES, 1):
+            ids[self.side == 1 + list(BOX_IDS).index(side)] = -number
+        return ids
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(
-    n_blocks, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
-    laws_table, n_mat, dt,
-):  # fmt: skip
-    """All blocks, one thread each."""
-    for t in prange(n_blocks):
-        _block(
-            t, hot, ihot, lo, foff, force, wptr, walls, slot_row, slot_wall, slot_fs, slot_side, new_side,
-            laws_table, n_mat, dt,
-        )  # fmt: skip
+    def take_columns(self, columns: dict[str, list]) -> None:
+        """All walls from lists by name. In those of earlier versions BOX has the ids -1 to -4: it gets its present ones
+        unless another wall has them."""
+        n = len(columns["id"])
+        for name in self.COLUMNS:
+            like = getattr(self, name)
+            values = columns.get(name, np.zeros((n, *like.shape[1:])))
+            setattr(self, name, np.array(values, dtype=like.dtype).reshape(n, *like.shape[1:]))
+        if "side" not in columns:
+            free = not np.isin(self.id, list(BOX_IDS.values())).any()
+            for number, side in enumerate(OLD_SIDES, 1):
+                at = self.id == -number
+                self.side[at] = 1 + list(BOX_IDS).index(side)
+                self.id[at] = BOX_IDS[side] if free else -number
 
+    def table(self) -> np.ndarray:
+        """(n, 8) f8 for the kernels, see physics.dem.walls."""
+        out = np.zeros((len(self), 8))
+        out[:, 0:2], out[:, 2:4], out[:, 4:6], out[:, 6] = self.p1, self.p2, self.v, self.one_sided
+        return out
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table, n_mat, out, iout):
-    """Wall contacts as rows: out (m, 8) f8: Fn, Fs, Fx, Fy (on the particle), x, y, overlap, tangent stiffness;
-    iout (m, 2) i8: gid, wall row. Returns the number of rows; nothing of the state changes."""
-    n = 0
-    k = 0
-    while k < len(slot_row):
-        first = k
-        last = k + 1
-        while last < len(slot_row) and slot_row[last] == slot_row[first]:
-            last += 1
-        for k in range(first, last):
-            where, _, nx, ny, u, fn, _, _ = contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
-            )
-            if where == NONE:
-                continue
-            i = slot_row[k]
-            law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-            s = slot_fs[k]
-            la = hot[i, RADIUS] - 0.5 * u
-            out[n, 0] = fn
-            out[n, 1] = s
-            out[n, 2] = s * -ny - fn * nx
-            out[n, 3] = s * nx - fn * ny
-            out[n, 4] = hot[i, X] + la * nx
-            out[n, 5] = hot[i, Y] + la * ny
-            out[n, 6] = u
-            out[n, 7] = laws.tangent_normal_stiffness(law[MODEL], law[A], 2.0 * hot[i, RADIUS], u)
-            iout[n, 0] = ihot[i, GID]
-            iout[n, 1] = slot_wall[k]
-            n += 1
-        k = last
-    return n
+    def move(self, dt: float) -> None:
+        """P += v dt."""
+        step = self.v * dt
+        self.p1 += step
+        self.p2 += step
+        self.travel += step
 
+    def longest_travel(self) -> float:
+        """Largest way of any wall since the lists were built [m]."""
+        return float(np.hypot(self.travel[:, 0], self.travel[:, 1]).max()) if len(self) else 0.0
 
-def wall_table(materials: np.ndarray, kn: np.ndarray, ks: np.ndarray, fric: np.ndarray) -> np.ndarray:
-    """Wall laws: (n_walls * n_materials, 4) f8 [MODEL, A, B, MU].
+    def box(self) -> tuple[float, float, float, float] | None:
+        """(left, right, bottom, top) of the BOX, or None."""
+        left, right, bottom, top = (self.of_side(side) for side in OLD_SIDES)
+        if left is None or right is None or bottom is None or top is None:
+            return None
+        return self.p1[left, 0], self.p1[right, 0], self.p1[bottom, 1], self.p1[top, 1]
 
-    Hertz particles: their own G and nu, the wall's kn, ks unused; linear ones: springs in series with the wall's.
-    """
-    table = np.empty((len(kn), len(materials), 4))
-    for w in range(len(kn)):
-        for m, mat in enumerate(materials):
-            mu = min(mat["fric"], fric[w])
-            if mat["hertz"]:
-                a = laws.hertz_normal_factor(mat["shear"], mat["poiss"])
-                table[w, m] = laws.HERTZ, a, laws.mindlin_shear_factor(mat["shear"], mat["poiss"]), mu
-            else:
-                table[w, m] = (
-                    laws.LINEAR,
-                    laws.series_stiffness(mat["kn"], kn[w]),
-                    laws.series_stiffness(mat["ks"], ks[w]),
-                    mu,
-                )
-    return table.reshape(len(kn) * len(materials), 4)
+    def in_output_order(self) -> np.ndarray:
+        """Rows with the BOX first (in the order of BOX_IDS), then by making."""
+        sides = np.flatnonzero(self.side)
+        return np.concatenate([sides[np.argsort(self.side[sides])], np.flatnonzero(self.side == 0)])

@@ -1,1 +1,3 @@
-"""Arithmetic of blocks that deform, crack and collide: laws, loops over elements, joints and contacts."""
+"""Blocks that deform, crack and collide: the combined finite-discrete element method. The method can be read in
+simulation.py: state, step, rebuild. What a model is made of is in scene.py, the tables of kernels are made in
+local.py."""

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post.blocks import BROKEN, FREE, YIELDED

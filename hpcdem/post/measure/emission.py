@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io.disk import explain
 
 TABLE = "cracks.csv"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
-from hpcdem.fields import sides_of_box
+from hpcdem.core.errors import HpcdemError
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import FrameFile, list_frames, read_frame
 

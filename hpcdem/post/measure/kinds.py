@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.post.measure import cracks, faults, layers, wedge
 from hpcdem.post.measure.grains import Grains, Walls, middle
 from hpcdem.post.measure.scene import Plan, Scene, Stamp

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from hpcdem.errors import HpcdemError, UsageError
-from hpcdem.fields import sides_of_box
+from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile
 from hpcdem.post import layers as drawing
 from hpcdem.post.measure import tracks

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
-from hpcdem.fields import sides_of_box
+from hpcdem.core.errors import HpcdemError
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io.disk import explain
 
 HEADER = "step,time,wall,x1,y1,x2,y2,fx,fy"

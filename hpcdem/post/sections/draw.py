@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from hpcdem.errors import HpcdemError, UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, make_folder
 from hpcdem.io.axes import View
 from hpcdem.io.disk import explain

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from hpcdem.errors import HpcdemError
-from hpcdem.fields import sides_of_box
+from hpcdem.core.errors import HpcdemError
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io import colours
 from hpcdem.io.frame import Frame, Table
 from hpcdem.post import layers, raster

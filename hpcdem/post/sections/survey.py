@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.errors import UsageError
-from hpcdem.fields import sides_of_box
+from hpcdem.core.errors import UsageError
+from hpcdem.core.fields import sides_of_box
 from hpcdem.io.axes import View
 from hpcdem.post.section import Section
 

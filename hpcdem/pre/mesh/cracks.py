@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.model.blocks.connectivity import Edges, find_edges
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem.connectivity import Edges, find_edges
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh.fractures import Fractures
 from hpcdem.pre.mesh.geometry import Curve, arc_of, distance_to_segment
 

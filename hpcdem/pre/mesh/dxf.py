@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import geometry, optional
 from hpcdem.pre.mesh.geometry import Curve
 

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from scipy import special
 
-from hpcdem.errors import CommandError
-from hpcdem.physics.rng import uniform
+from hpcdem.core.errors import CommandError
+from hpcdem.numerics.rng import uniform
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.geometry import Curve, sampled
 

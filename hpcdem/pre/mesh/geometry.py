@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 
 Vector = Sequence[float]
 

@@ -9,9 +9,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.connectivity import bodies, face_partners, face_points
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.connectivity import bodies, face_partners, face_points
+from hpcdem.physics.fdem.mesh import Mesh
 
 TOLERANCE = 1e-3
 """Points of two bodies are one if they are nearer than this part of the shortest edge on a surface."""

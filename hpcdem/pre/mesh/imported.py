@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.model.blocks.connectivity import areas, corner_counts, find_edges
-from hpcdem.model.blocks.mesh import Mesh, check
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem.connectivity import areas, corner_counts, find_edges
+from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.pre.mesh import optional
 
 CORNERS = {"triangle": 3, "quad": 4}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from hpcdem.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError, HpcdemError
 
 T = TypeVar("T")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from types import ModuleType
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 
 EXTRA = "pip install 'hpcdem[mesh]'"
 GMSH_LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"

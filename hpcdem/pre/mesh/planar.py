@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.pre.mesh.sizes import SizeField
 
 RATIO = 0.3

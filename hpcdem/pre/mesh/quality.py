@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.model.blocks.connectivity import corner_counts
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.connectivity import corner_counts
+from hpcdem.physics.fdem.mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.geometry import Curve, Layers, along, least_steps
 from hpcdem.pre.mesh.sizes import SizeField

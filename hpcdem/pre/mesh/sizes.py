@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.geometry import Curve, sampled
 

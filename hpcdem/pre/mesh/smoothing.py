@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
-from hpcdem.model.blocks.connectivity import edges_of
+from hpcdem.physics.fdem.connectivity import edges_of
 
 SMALLEST = 20.0
 """Angles [degrees] do not become smaller than this, or than they were."""

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hpcdem.errors import CommandError
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh.sizes import not_too_many
 
 DIAGONALS = {

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.errors import CommandError, HpcdemError
-from hpcdem.model.blocks.mesh import Mesh, check
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.fractures import Fractures, clipped, joined
 from hpcdem.pre.mesh.geometry import Layers, sampled
@@ -578,7 +578,7 @@ def _compact(
 
 def _only_existing(mesh: Mesh, edges: Any) -> Mesh:
     """Cracks that were moved onto the rim are no cracks; a line inside that gmsh has not kept is its failure."""
-    from hpcdem.model.blocks.mesh import crack_rows, find_edges
+    from hpcdem.physics.fdem.mesh import crack_rows, find_edges
 
     for name, pairs in mesh.layers.items():
         if (find_edges(edges, pairs, len(mesh.points)) < 0).any():

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.physics.polyarc.outlines import Outlines, sampled
 from hpcdem.pre.specimen import counts as number_of

@@ -15,10 +15,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hpcdem.numerics.rng import uniform
 from hpcdem.physics.polyarc.gap import fans, farthest, gap
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.physics.polyarc.outlines import Outlines
-from hpcdem.physics.rng import uniform
 
 PLACES = 31
 """Stream of random numbers."""

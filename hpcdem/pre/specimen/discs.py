@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.physics.polyarc.outlines import STRAIGHT, Outlines, arc_circles
 

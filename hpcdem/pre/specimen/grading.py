@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.errors import CommandError, HpcdemError, ScriptError
+from hpcdem.core.errors import CommandError, HpcdemError, ScriptError
 
 MOST_SIZES = 1000
 """Most rows of a grading; a laboratory has a few dozen sieves."""

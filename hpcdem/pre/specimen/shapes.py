@@ -13,10 +13,10 @@ import math
 import numpy as np
 from numba import njit
 
-from hpcdem.errors import CommandError
+from hpcdem.core.errors import CommandError
+from hpcdem.numerics.rng import uniform
 from hpcdem.physics.polyarc.moments import moments
 from hpcdem.physics.polyarc.outlines import Outlines, uniform_outlines
-from hpcdem.physics.rng import uniform
 
 SIDES = {"triangle": 3, "quadrilateral": 4, "pentagon": 5}
 SHAPES = ("circle", "ellipse", *SIDES)
@@ -27,7 +27,7 @@ NARROWEST = 5.0
 LONGEST = 20.0
 """Largest L/D of an ellipse."""
 DEVIATION, ANGLE = 11, 12
-"""Streams of random numbers; see physics/rng.py."""
+"""Streams of random numbers; see numerics/rng.py."""
 
 
 def largest_deviation(sides: int) -> float:

@@ -97,8 +97,8 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, step it by the clock; collective."""
     from bench.worker import versions
     from hpcdem import session
-    from hpcdem.blocks import Blocks
-    from hpcdem.blocks.rehearsal import rehearse
+    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.rehearsal import rehearse
 
     shared = session.current()
     rehearse(job["threads"])
@@ -149,7 +149,7 @@ JOINT = {
 
 def square(side: int, gap: float = 0.0, quads: bool = False) -> Any:
     """side x side squares of 1 cm, two triangles each, diagonals in turn; with a gap they are bodies of their own."""
-    from hpcdem.model.blocks.mesh import Mesh
+    from hpcdem.physics.fdem.mesh import Mesh
 
     h = 0.01
     i, j = np.divmod(np.arange(side * side), side)

@@ -58,9 +58,9 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, step it by the clock; collective. stages: mean seconds of a rank."""
     from bench.worker import versions
     from hpcdem import session
-    from hpcdem.coupled.rehearsal import rehearse
+    from hpcdem.core.timers import Timers
+    from hpcdem.physics.coupling.rehearsal import rehearse
     from hpcdem.runtime.progress import BETWEEN
-    from hpcdem.timers import Timers
 
     shared = session.current()
     shared.prepare_coupling()
@@ -92,11 +92,11 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
 
 def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     """Both models, coupled."""
-    from hpcdem.blocks import Blocks
-    from hpcdem.commands import particles, properties, running, settings, walls
-    from hpcdem.coupled import Coupled
+    from hpcdem.commands.dem import particles, properties, running, settings, walls
+    from hpcdem.physics.coupling.model import Coupled
+    from hpcdem.physics.dem.simulation import Simulation
+    from hpcdem.physics.fdem.model import Blocks
     from hpcdem.pre.mesh import structured
-    from hpcdem.simulation import Simulation
 
     width = 2.0 * RADIUS * across
     sim = Simulation(comm, threads)

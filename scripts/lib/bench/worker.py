@@ -125,7 +125,7 @@ def measured(sim: hpcdem.Simulation, warm: int, steps: int) -> dict[str, Any]:
 
 def contacts(sim: hpcdem.Simulation) -> int:
     """Touching pairs of the whole model."""
-    from hpcdem import output
+    from hpcdem.engine import output
 
     return int(output.HISTORIES["contacts"][1](sim.engine))
 

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from faults.model import PARTICLES, Model, Reference, files
-from hpcdem.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError
 from hpcdem.io import checkpoint
 
 FRAMES = (".vtkhdf", ".dat", ".vtk", ".ps")

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 import hpcdem
-from hpcdem import observe, session, simulation
+from hpcdem import session
+from hpcdem.physics.dem import observe, simulation
 from soak import model
 
 PERIOD, WINDOW = 2500, 200

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.blocks import Blocks
-from hpcdem.model.blocks.mesh import Mesh
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
 from tests.blocks.support import model, rectangle
 from tests.cases.benches import plain_fe
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import clumps, particles, properties, running, walls
+from hpcdem.commands.dem import clumps, particles, properties, running, walls
 from hpcdem.io.clumps import Clumps, write_clumps
-from hpcdem.physics.exact_sum import exact_sum
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.dem import observe
 from tests.clumped import bodies, of_discs
 from tests.support import model, only, steps
 

@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.budget import NAMES
-from hpcdem.commands import bonds, clumps, particles, properties, running, settings, walls
-from hpcdem.errors import CommandError
+from hpcdem.commands.dem import bonds, clumps, particles, properties, running, settings, walls
+from hpcdem.core.errors import CommandError
+from hpcdem.core.selection import Group, Ids, Interval
 from hpcdem.io.clumps import write_clumps
 from hpcdem.io.frame import Table
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import NAMES
 from hpcdem.post import stress
-from hpcdem.selection import Group, Ids, Interval
 from tests.clumped import bodies, kinds, write_lattice
 from tests.support import model, only, steps
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import clumps, properties, running, walls
+from hpcdem.commands.dem import clumps, properties, running, walls
 from hpcdem.io.clumps import write_clumps
+from hpcdem.physics.dem import observe
 from tests.cases.clump_rolling import exact
 from tests.clumped import bodies
 from tests.support import model, steps

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import particles, properties, running, walls
+from hpcdem.commands.dem import particles, properties, running, walls
+from hpcdem.physics.dem import observe
 from tests.cases.columns import exact
 from tests.support import at_wall, model, pair, value
 

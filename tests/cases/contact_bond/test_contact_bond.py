@@ -16,7 +16,7 @@ import math
 
 import pytest
 
-from hpcdem.commands import bonds, particles, properties
+from hpcdem.commands.dem import bonds, particles, properties
 from tests.support import carry, force, model, only, pair, steps
 
 R, KN, KS, N, S, MU = 1.0, 4e6, 2e6, 3e4, 2e4, 0.5

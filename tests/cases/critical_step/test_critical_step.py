@@ -15,10 +15,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import bonds, particles, properties, running, walls
+from hpcdem.commands.dem import bonds, particles, properties, running, walls
+from hpcdem.core.selection import Ids
+from hpcdem.physics.dem import observe
 from hpcdem.runtime.progress import Log
-from hpcdem.selection import Ids
 from tests.support import body, model, only, steps, value
 
 R, KN = 1.0, 2e6

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import bonds, particles, properties
+from hpcdem.commands.dem import bonds, particles, properties
 from tests.cases.elastic_bond import exact
 from tests.support import carry, force, model, only, pair, steps, value, watch
 

@@ -8,11 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.budget import Energy, stored_energy
-from hpcdem.commands import bonds, particles, properties, running, settings, walls
-from hpcdem.selection import Ids
-from hpcdem.simulation import Watcher
+from hpcdem.commands.dem import bonds, particles, properties, running, settings, walls
+from hpcdem.core.selection import Ids
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import Energy, stored_energy
+from hpcdem.physics.dem.simulation import Watcher
 from tests.cases.elastic_bond import exact as bond
 from tests.cases.energy_budget import exact
 from tests.support import at_wall, body, held_for_a_step, model, only, pair, value

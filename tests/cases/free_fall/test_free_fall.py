@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.commands import particles, properties, running
+from hpcdem.commands.dem import particles, properties, running
 from tests.cases.free_fall import exact
 from tests.support import model, only, value, velocity, watch
 

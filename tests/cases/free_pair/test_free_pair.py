@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties
+from hpcdem.commands.dem import particles, properties
 from tests.support import body, model, only, pair, value, watch
 
 LINEAR = {"kn": 4e7, "ks": 3e7}

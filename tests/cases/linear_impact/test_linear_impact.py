@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties
+from hpcdem.commands.dem import particles, properties
 from tests.cases.linear_impact import exact
 from tests.support import body, crossing, model, only, value, watch
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, walls
+from hpcdem.commands.dem import particles, properties, walls
 from tests.cases.mindlin_shear import exact
 from tests.support import at_wall, force, model, only, pair, steps, watch
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, running, walls
+from hpcdem.commands.dem import particles, properties, running, walls
 from tests.cases.oblique_impact import exact
 from tests.support import body, model, steps, value, velocity
 

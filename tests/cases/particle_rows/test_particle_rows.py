@@ -13,8 +13,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import bonds, particles, properties
+from hpcdem.commands.dem import bonds, particles, properties
+from hpcdem.physics.dem import observe
 from tests.support import force, model, steps
 
 

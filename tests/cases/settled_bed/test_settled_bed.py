@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem import observe
-from hpcdem.commands import particles, properties, running, settings, walls
-from hpcdem.selection import Interval
-from hpcdem.simulation import Simulation
+from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.core.selection import Interval
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.simulation import Simulation
 
 G = 9.8
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, walls
+from hpcdem.commands.dem import particles, properties, walls
 from tests.cases.sliding_on_wall import exact
 from tests.support import at_wall, crossing, model, value, watch
 

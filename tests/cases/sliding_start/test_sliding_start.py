@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, running, walls
+from hpcdem.commands.dem import particles, properties, running, walls
 from tests.cases.sliding_start import exact
 from tests.support import at_wall, body, held_for_a_step, model, value, watch
 

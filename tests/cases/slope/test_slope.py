@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties, running, walls
+from hpcdem.commands.dem import particles, properties, running, walls
 from tests.cases.slope import exact
 from tests.support import at_wall, body, held_for_a_step, model, position, value, velocity, watch
 

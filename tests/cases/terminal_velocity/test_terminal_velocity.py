@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties
+from hpcdem.commands.dem import particles, properties
 from tests.support import body, model, value, velocity, watch
 
 G, ETA, DT = 9.8, 4e3, 1e-2

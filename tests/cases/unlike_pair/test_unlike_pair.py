@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands import particles, properties
+from hpcdem.commands.dem import particles, properties
 from tests.support import force, model, only, pair, steps
 
 MATERIALS = [((2.9e9, 0.2), (2.9e9, 0.2)), ((2.9e9, 0.2), (1.1e9, 0.35))]

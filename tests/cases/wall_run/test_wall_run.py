@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.commands import particles, properties, running, settings, walls
-from hpcdem.errors import CommandError
+from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.core.errors import CommandError
 from hpcdem.io.frames import list_frames, read_frame
 from tests.support import model, position, value
 

@@ -135,7 +135,7 @@ def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
     """One bed: its line."""
     from bench import bed as beds
     from bench.worker import no_first_frame, solver_arrays
-    from hpcdem.simulation import NARROW
+    from hpcdem.physics.dem.simulation import NARROW
 
     bed = Bed(**case["bed"])
     if case["settled"]:
@@ -175,7 +175,7 @@ def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
 
 def columns(engine: Any) -> int:
     """Columns between the outermost particles of the whole model."""
-    from hpcdem import cells
+    from hpcdem.core import cells
 
     p = engine.particles
     cx = cells.columns(cells.keys(p.hot[p.owned], engine.lattice.side))
@@ -294,7 +294,7 @@ def lay_tall(sim: hpcdem.Simulation, bed: Bed, unit: str) -> None:
 
 def alone(comm: Any) -> list[Row]:
     """Exchange, reduction, migration, packing: without particles. On two ranks; collective."""
-    from hpcdem.memory import take_rows
+    from hpcdem.core.memory import take_rows
 
     lines = []
     for rows in ROWS:
@@ -317,8 +317,8 @@ def alone(comm: Any) -> list[Row]:
 
 def exchange(comm: Any, rows: int) -> Any:
     """The halo of the program with so many rows for the neighbour, as one function."""
+    from hpcdem.core.memory import aligned
     from hpcdem.halo.exchange import Halo
-    from hpcdem.memory import aligned
 
     first, last = (rows if comm.rank > 0 else 0), (rows if comm.rank + 1 < comm.size else 0)
     halo = Halo(comm, 2 * rows, first, last)

@@ -47,7 +47,7 @@ def _goes_on(case: Case, damaged: list[Path]) -> None:
 
 
 def _whole(path: Path) -> bool:
-    from hpcdem.errors import HpcdemError
+    from hpcdem.core.errors import HpcdemError
     from hpcdem.io import checkpoint
 
     try:

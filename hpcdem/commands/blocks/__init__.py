@@ -1,9 +1,0 @@
-"""The verbs of a model of blocks: one function per command, called by the language PCDC and by Python programs.
-
-The first argument is the `Project`: the simulation and what a script has prepared for it. All verbs are collective and
-raise CommandError for what makes no sense, equal on all ranks.
-"""
-
-from hpcdem.commands.blocks.project import Project
-
-__all__ = ["Project"]

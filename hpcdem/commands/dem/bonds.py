@@ -1,0 +1,162 @@
+"""PROP with bond keys, and BOND break."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.commands.dem.properties import chosen, prop
+from hpcdem.core.errors import CommandError
+from hpcdem.core.selection import Selection
+from hpcdem.physics.dem.kernels import contacts, laws, mass
+from hpcdem.physics.dem.simulation import Simulation
+
+ELASTIC = ("ebmod", "gbmod", "tstrength", "sstrength")
+KEPT = (*ELASTIC, "rubber")
+TOLERATE = 1e-6
+FARTHEST = 10.0
+"""Widest gap that can be bonded, in radii of the largest particle. More is a slip of units, and would bond all with
+all."""
+
+
+def bond(
+    sim: Simulation,
+    where: Selection | None = None,
+    *,
+    ebmod: float | None = None,
+    gbmod: float | None = None,
+    tstrength: float | None = None,
+    sstrength: float | None = None,
+    n_bond: float | None = None,
+    s_bond: float | None = None,
+    tolerate: float | None = None,
+    rext: float | None = None,
+    fric: float | None = None,
+    rubber: bool = False,
+) -> int:
+    """Bond the pairs with both particles in `where` and d - (Ra + Rb) rext <= tolerate; returns the bonds made.
+
+    Either ebmod, gbmod [Pa], tstrength, sstrength [Pa] (elastic bond) or n_bond, s_bond [N] (contact bond). Pairs in
+    `where` that are bonded already get the new values; keys left out keep theirs, or are 0 in a new bond. tolerate [m]
+    defaults to 1e-6, rext to 1 (it scales radii for this search only). fric is set on the particles as by PROP. rubber
+    marks the bonds as those of a membrane, without any effect on the motion.
+    """
+    values = dict(zip(ELASTIC, (ebmod, gbmod, tstrength, sstrength), strict=True))
+    elastic = any(v is not None for v in values.values())
+    if elastic and (n_bond is not None or s_bond is not None):
+        raise CommandError("a bond is either ebmod, gbmod, tstrength, sstrength or n_bond, s_bond, not both")
+    kind = laws.ELASTIC_BOND if elastic else laws.CONTACT_BOND
+    if not elastic:
+        values = {"tstrength": n_bond, "sstrength": s_bond}
+    given = {name: v for name, v in values.items() if v is not None}
+    if not given:
+        raise CommandError("no bond property given: expected ebmod, gbmod, tstrength, sstrength or n_bond, s_bond")
+    for name, value in given.items():
+        if value < 0.0:
+            raise CommandError(f"{name} must not be negative, got {value:g}")
+    if rubber:
+        given["rubber"] = 1.0
+        if sim.log is not None:
+            sim.log.warn_once("rubber", "rubber: the mark is kept and written, it has no effect on the motion")
+    gap = TOLERATE if tolerate is None else tolerate
+    scale = 1.0 if rext is None else rext
+    if scale <= 0.0:
+        raise CommandError(f"rext must be positive, got {scale:g}")
+    largest = float(sim.comm.max_into(np.array([sim.particles["radius"].max() if len(sim.particles) else 0.0]))[0])
+    reach = max(gap, 2.0 * largest * (scale - 1.0) + gap, 0.0)
+    if reach > FARTHEST * largest > 0.0:
+        raise CommandError(
+            f"tolerate {gap:g} and rext {scale:g} would bond particles {reach:g} m apart; at most {FARTHEST:g} radii "
+            f"of the largest particle, {FARTHEST * largest:g} m"
+        )
+    if fric is not None:
+        prop(sim, where, fric=fric)
+    if largest == 0.0:
+        return 0
+
+    # Lists that are sure to hold every pair within the search distance, made at the present positions.
+    sim.open()
+    sim.close(least_skin=reach)
+    lists, p = sim.lists, sim.particles
+    which = _flags_with_ghosts(sim, where)
+    renewed = _renewed(sim, kind, given).astype(np.int32)
+    fresh = sim.bond_types.row(kind=kind, **given)
+    made, longest2 = 0, 0.0
+    for t in range(lists.n_blocks):
+        n, d2 = contacts.make_bonds(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            len(sim.materials), which, renewed, fresh, gap, scale,
+        )  # fmt: skip
+        made += n
+        longest2 = max(longest2, d2)
+    lists.tally[:, contacts.LONGEST2] = longest2
+    sim.tables_changed()
+    total = sim.count(made)
+    sim.bonds += total
+    _warn_of_overstretched(sim, which)
+    return total
+
+
+def _warn_of_overstretched(sim: Simulation, which: np.ndarray) -> None:
+    """A warning if bonds with both ends in which (n,) bool, per storage row, will break at once: their tension counts
+    from where the particles just touch, wherever they are bonded. Collective."""
+    lists, p = sim.lists, sim.particles
+    number, widest = 0, np.zeros(1)
+    for t in range(lists.n_blocks):
+        n, gap = contacts.overstretched(
+            t, p.hot, p.ihot, lists.blocks, lists.ptr, lists.partner, lists.bond, lists.u_made, sim.pair_laws,
+            sim.bond_types.as_floats(), len(sim.materials), mass.SPHERES[sim.settings.disk], which,
+        )  # fmt: skip
+        number += n
+        widest[0] = max(widest[0], gap)
+    number = sim.count(number)
+    sim.comm.max_into(widest)
+    if number and sim.log is not None:
+        sim.log.warn(
+            f"{number} of these bonds are past their tensile limit where they are and will break in the next step: a "
+            f"gap counts as strain, tolerate or not; the widest gap at which one of them would hold is {widest[0]:g} m"
+        )
+
+
+def break_bonds(sim: Simulation, where: Selection | None = None) -> int:
+    """Remove the bonds with both ends in `where`; returns how many. Shear forces stay, limited by friction from then
+    on."""
+    sim.close()
+    lists = sim.lists
+    which = _flags_with_ghosts(sim, where)
+    gone = sum(
+        contacts.break_bonds(t, lists.blocks, lists.ptr, lists.partner, lists.bond, which)
+        for t in range(lists.n_blocks)
+    )
+    total = sim.count(gone)
+    sim.bonds -= total
+    return total
+
+
+def _flags_with_ghosts(sim: Simulation, where: Selection | None) -> np.ndarray:
+    """Selection flags per storage row; the owners decide for the ghosts."""
+    p = sim.particles
+    flags = np.zeros(len(p.hot), bool)
+    flags[p.owned] = chosen(sim, where)
+    sim.halo.fill(flags)
+    return flags
+
+
+def _renewed(sim: Simulation, kind: int, given: dict[str, float]) -> np.ndarray:
+    """New type of every existing bond type: its own values overwritten, or a new kind altogether."""
+    lists, table = sim.lists, sim.bond_types
+    used = sim.used(lists.bond[_slots(lists)], table)
+    used[0] = False
+    mapping = np.arange(len(table))
+    for m in np.flatnonzero(used):
+        values = {name: float(table.rows[name][m]) for name in KEPT} if table.rows["kind"][m] == kind else {}
+        mapping[m] = table.row(kind=kind, **{**values, **given})
+    return mapping
+
+
+def _slots(lists) -> np.ndarray:
+    """Indices of the pair slots in use."""
+    pieces = []
+    cut, lo, _, poff, _ = lists.blocks
+    for t in range(lists.n_blocks):
+        pieces.append(np.arange(lists.ptr[poff[t]], lists.ptr[poff[t] + max(cut[t + 1] - lo[t], 0)]))
+    return np.concatenate(pieces)

@@ -1,0 +1,56 @@
+"""HIST, PLOT, DRAW: what to follow over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hpcdem.core.errors import CommandError
+from hpcdem.engine.output import HISTORIES
+from hpcdem.physics.dem.platens import OF_PARTS
+from hpcdem.physics.dem.simulation import Simulation
+
+DRAW_INTERVAL = 1000
+"""Steps between pictures where DRAW does not say."""
+
+
+def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
+    """HIST: write `what` to hist_id_<id>.dat and hist_<id>.csv every `interval` steps. Collective.
+
+    what: one of output.HISTORIES, or of platens.OF_PARTS with the parts meant: ``gstress group a``, ``gstrain group
+    a|b``, ``ystress wall 3``, ``ystrain wall 0|3``; strains begin at 0 here.
+    """
+    if interval <= 0:
+        raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
+    sim.history_origins.pop(id, None)
+    name = what.split()[0] if what.split() else ""
+    if name in OF_PARTS:
+        origin = OF_PARTS[name].begin(sim, what)
+        if origin is not None:
+            sim.history_origins[id] = origin
+    elif what not in HISTORIES:
+        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join((*HISTORIES, *OF_PARTS))}")
+    sim.history_wishes[id] = (interval, what)
+
+
+def plot_hist(sim: Simulation, y: int, x: int) -> None:
+    """PLOT: at STOP write history y against history x."""
+    sim.plots.append((y, x))
+
+
+def draw(sim: Simulation, interval: int | None, what: list[str], off: Sequence[str] = ()) -> None:
+    """DRAW: `draw_<step>.jpg` every `interval` steps (in an IMPLE from its start), if the run was started with --draw.
+
+    what: bfill bline ball wall bondc cforce bang bid mesh, by default filled particles and walls; off: words of these
+    that are not wanted.
+
+    Scripts draw far more often than pictures are looked at, so without --draw it is noted in the log only.
+    """
+    if interval is not None and interval <= 0:
+        raise CommandError(f"DRAW INTERVAL must be positive, got {interval}")
+    words = [*(what or ("bfill", "wall"))]
+    # ZDEM draws particles as circles unless they are to be filled.
+    if "bline" in words or ("bfill" not in words and "bline" not in off):
+        words.append("ball")
+    sim.drawing = (interval or DRAW_INTERVAL, tuple(word for word in words if word not in (*off, "bline")))
+    if not sim.draws and sim.log is not None:
+        sim.log.info("DRAW: no pictures without the option --draw; zdem2jpg draws the frames of a finished run")

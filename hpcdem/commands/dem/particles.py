@@ -1,0 +1,247 @@
+"""START, LOAD, BALL, GEN, GLINE, DEL, EXP: who is there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.commands.dem.frame_state import load_frame
+from hpcdem.commands.dem.properties import chosen
+from hpcdem.core import limits
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.selection import Selection
+from hpcdem.io.dat import is_frame
+from hpcdem.io.files import write_sections
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.pre import packing
+from hpcdem.pre.rows import row
+
+NO_GROUP = "***"
+FAILURES = 1000
+"""Attempts without room in a row after which GEN gives up. Found from two published facts: see docs/physics.md."""
+
+
+def start(sim: Simulation) -> None:
+    """START: a new, empty model."""
+    sim.clear()
+
+
+def load(
+    sim: Simulation,
+    path: Path | str,
+    scale: float = 1.0,
+    x: tuple[float, float] | None = None,
+    y: tuple[float, float] | None = None,
+) -> int:
+    """LOAD: a new model from rows "x y r [group]" [m], or from a frame all_<step>.dat of ZDEM or hpcdem with all that
+    it holds (commands/dem/frame_state.py); returns the number of particles.
+
+    x, y: keep only centres in these ranges (of the file's numbers); then everything is multiplied by `scale`, which is
+    for rows.
+    """
+    if sim.comm.bcast(is_frame(path) if sim.comm.rank == 0 else None):
+        if scale != 1.0:
+            raise CommandError(f"scale {scale:g} is for files of x y r; {path} is a frame, with stiffnesses and forces")
+        return load_frame(sim, path, x, y)
+    rows, groups = sim.comm.bcast(_read_xyr(sim, Path(path)))
+    keep = np.ones(len(rows), bool)
+    for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
+        if bounds is not None:
+            keep &= (column >= bounds[0]) & (column < bounds[1])
+    if not scale > 0.0:
+        raise CommandError(f"scale must be positive, got {scale:g}")
+    if not keep.any():
+        raise CommandError(f"none of the {len(rows)} particles of {path} lies within the bounds of x and y")
+    rows, names = rows[keep] * scale, [g for g, k in zip(groups, keep, strict=True) if k]
+    check_circles(rows)
+    if sim.log is not None and not keep.all():
+        sim.log.info(f"LOAD: {len(rows)} of {len(keep)} particles lie within the bounds")
+    sim.clear()
+    numbers = {name: sim.group_number(name) for name in dict.fromkeys(names)}
+    return add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
+
+
+def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, list[str]] | None:
+    error, rows, groups = None, [], []
+    if sim.comm.rank == 0:
+        try:
+            for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+                words = line.split("#")[0].split()
+                if not words:
+                    continue
+                try:
+                    x, y, r = map(float, words[:3])
+                    if len(words) > 4 or "_" in "".join(words[:3]) or not np.isfinite([x, y, r]).all() or r <= 0.0:
+                        raise ValueError
+                except ValueError:
+                    shown = "".join(c if c.isprintable() else " " for c in line.strip()[:60])
+                    error = f"{path}:{number}: read '{shown}', expected x y r [group] with r > 0"
+                    break
+                rows.append((x, y, r))
+                groups.append(words[3] if len(words) == 4 else NO_GROUP)
+            if not rows and error is None:
+                error = f"{path}: holds no particles, expected rows x y r [group]"
+        except OSError as problem:
+            error = f"cannot read {path}: {problem.strerror}"
+    _agree(sim, error)
+    return (np.array(rows), groups) if sim.comm.rank == 0 else None
+
+
+def _agree(sim: Simulation, error: str | None) -> None:
+    """Raise as CommandError on all ranks, so that the script line is named."""
+    try:
+        sim.comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+
+
+def ball(
+    sim: Simulation, gid: int | None, x: float, y: float, rad: float, color: int = 0, group: str = NO_GROUP
+) -> None:
+    """BALL: one particle. gid None takes the next free id."""
+    limits.check_circle(x, y, rad)
+    if gid is not None:
+        if gid < 0:
+            raise CommandError(f"id must not be negative, got {gid}")
+        if sim.comm.any(bool((sim.particles["gid"] == gid).any())):
+            raise CommandError(f"there is a particle with id {gid} already")
+    add(sim, np.array([[x, y, rad]]), sim.group_number(group), color, first_gid=gid)
+
+
+def gen(
+    sim: Simulation,
+    num: int,
+    radii: list[float],
+    x: tuple[float, float],
+    y: tuple[float, float],
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GEN num: random insertion without overlap into a rectangle; returns the number of particles made.
+
+    Scripts ask for far more than fit: it gives up after FAILURES attempts in a row that found no room, or after SET
+    gentry attempts per particle asked for, if that is set.
+    """
+    limits.check_rectangle(radii, x, y, grid=False)
+    limits.check_attempts(num, sim.settings.gentry)
+    existing = _everyone(sim)
+    factor = sim.settings.gentry
+    ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
+    rows, tried = packing.insert_randomly(num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, **ends)
+    sim.streams += 1
+    made = add(sim, rows, sim.group_number(group), color)
+    if sim.log is not None:
+        cover = float(np.pi * (rows[:, 2] ** 2).sum() / ((x[1] - x[0]) * (y[1] - y[0])))
+        sim.log.info(f"GEN: {num} asked, {made} placed in {tried} attempts, {100.0 * cover:.1f} % of the area covered")
+    return made
+
+
+def gen_grid(
+    sim: Simulation,
+    radii: list[float],
+    x: tuple[float, float],
+    y: tuple[float, float],
+    idmin: int | None = None,
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GEN GRID: a particle of a random listed radius at each node of a square lattice of spacing 2 max(r)."""
+    limits.check_rectangle(radii, x, y, grid=True)
+    rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams)
+    sim.streams += 1
+    if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
+        raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
+    return add(sim, rows, sim.group_number(group), color, first_gid=idmin)
+
+
+def gline(
+    sim: Simulation,
+    p1: tuple[float, float],
+    p2: tuple[float, float],
+    rad: float,
+    cratio: float = 1.0,
+    kn: float | None = None,
+    ks: float | None = None,
+    fric: float | None = None,
+    color: int = 0,
+    group: str = NO_GROUP,
+) -> int:
+    """GLINE: a row of equal particles from p1 towards p2, spacing 2 rad cratio; overlaps are not looked at."""
+    limits.check_row(p1, p2, rad, cratio)
+    centres = row(p1, p2, rad, cratio)
+    material = {name: v for name, v in (("kn", kn), ("ks", ks), ("fric", fric)) if v is not None}
+    rows = np.column_stack([centres, np.full(len(centres), rad)])
+    sim.rows.append((sim.next_gid, sim.next_gid + len(rows)))
+    return add(sim, rows, sim.group_number(group), color, material=sim.materials.row(**material))
+
+
+def delete(sim: Simulation, where: Selection | None = None) -> int:
+    """DEL: remove particles with their contacts and bonds; returns how many. Their ids are not used again."""
+    which = chosen(sim, where)
+    if not sim.comm.any(bool(which.any())):
+        return 0
+    sim.open()
+    return sim.remove(chosen(sim, where))
+
+
+def export(sim: Simulation, path: Path | str, with_group: bool = False, where: Selection | None = None) -> None:
+    """EXP: rows "x y r [group]" in the order of ids, 13 significant digits."""
+    p = sim.particles
+    which = chosen(sim, where)
+    mine = (
+        np.column_stack([p["gid"][which], p["group"][which]]),
+        np.column_stack([p["x"][which], p["y"][which], p["radius"][which]]),
+    )
+    parts = sim.comm.gather(mine)
+    text = ""
+    if parts is not None:
+        ints, reals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        order = np.argsort(ints[:, 0])
+        lines = []
+        for (_, group), (x, y, r) in zip(ints[order], reals[order], strict=True):
+            lines.append(f"{x:.12e}   {y:.12e}   {r:.12e}" + (f"   {sim.groups[group]}" if with_group else ""))
+        text = "\n".join(lines) + "\n"
+    write_sections(path, sim.comm, lambda: [text.encode()])
+
+
+def check_circles(rows: np.ndarray) -> None:
+    """As limits.check_circle, for (n, 3) rows x, y, r."""
+    size = np.abs(rows[:, :2]).max(axis=1) / rows[:, 2]
+    for worst in {int(size.argmax()), int(rows[:, 2].argmin()), int(rows[:, 2].argmax())}:
+        limits.check_circle(*rows[worst])
+
+
+def _everyone(sim: Simulation) -> np.ndarray:
+    """(n, 3) [x, y, r] of all particles on all ranks."""
+    p = sim.particles
+    mine = np.column_stack([p["x"], p["y"], p["radius"]])
+    return np.concatenate(sim.comm.allgather(mine))
+
+
+def add(
+    sim: Simulation,
+    rows: np.ndarray,
+    group: np.ndarray | int,
+    color: int,
+    first_gid: int | None = None,
+    material: int = 0,
+) -> int:
+    """New particles from (n, 3) rows x, y, r, the same on all ranks; rank 0 takes them until the next cycle shares them
+    out."""
+    sim.open()
+    first = sim.next_gid if first_gid is None else first_gid
+    sim.next_gid = max(sim.next_gid, first + len(rows))
+    sim.note_maker(first)
+    mine = slice(None) if sim.comm.rank == 0 else slice(0)
+    count = len(rows[mine])
+    if count:
+        groups = np.broadcast_to(np.asarray(group, np.int64), (len(rows),))[mine]
+        sim.particles.append(
+            x=rows[mine, 0], y=rows[mine, 1], radius=rows[mine, 2], gid=first + np.arange(count), group=groups,
+            color=color, material=material, birth=sim.clock.step,
+        )  # fmt: skip
+        sim.hist = sim.hist.extended(count)
+    sim.ownership.wanted = True
+    sim.look_soon()
+    return len(rows)

@@ -1,0 +1,475 @@
+"""CYC and IMPLE: the loop over steps, and what is due between them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.engine import output
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import Budget
+from hpcdem.physics.dem.guards import NAMED
+from hpcdem.physics.dem.kernels.contacts import MODEL
+from hpcdem.physics.dem.kernels.laws import tangent_normal_stiffness
+from hpcdem.physics.dem.simulation import Simulation
+
+STEPBAR = 1000
+"""Steps between progress reports and rows of walls.csv when the script sets none."""
+NEAR = 0.5
+"""Time step over the estimate of the critical one from which the true limit is computed."""
+MOST_STEPS = 2**53
+"""Steps are counted exactly up to here, in frames and histories too."""
+KINDS = ("print", "vtk", "ps", "save")
+LATE = "contacts that began late"
+
+
+def cycle(sim: Simulation, n: int) -> None:
+    """CYC: n steps. Output at steps that are multiples of the SET intervals, and an `_ini` frame before the first."""
+    if n < 0:
+        raise CommandError(f"CYC needs a number of steps that is not negative, got {n}")
+    intervals = {kind: getattr(sim.settings, kind) for kind in KINDS}
+    _begin(sim, "CYC", n, 0, intervals, final_frame=False)
+
+
+def imple(
+    sim: Simulation,
+    wall: int,
+    xmove: float | None = None,
+    ymove: float | None = None,
+    save: float | None = None,
+    print: float | None = None,
+    ps: float | None = None,
+    vtk: float | None = None,
+) -> None:
+    """IMPLE: step until the wall has gone xmove or ymove [m]; intervals are ways of the wall [m] from the start of the
+    command.
+
+    Kinds of output that are left out are off during the command; a frame is always written at its end.
+    """
+    if (xmove is None) == (ymove is None):
+        raise CommandError("IMPLE needs either xmove or ymove")
+    axis, name = (0, "xv") if xmove is not None else (1, "yv")
+    way = float(xmove if xmove is not None else ymove or 0.0)
+    speed = float(sim.walls.v[sim.walls.row(wall), axis])
+    if speed == 0.0:
+        raise CommandError(f"wall {wall} does not move: {name} is 0, so it never gets {way:g} m far")
+    if way * speed < 0.0 and sim.log is not None:
+        sim.log.warn(
+            f"IMPLE: wall {wall} moves with {name} {speed:g}, against {way:g}; the distance is taken as positive"
+        )
+    prepare(sim)
+    per_step = abs(speed) * sim.clock.dt
+    given = {"save": save, "print": print, "ps": ps, "vtk": vtk}
+    for kind, distance in given.items():
+        if distance is not None and distance < 0.0:
+            raise CommandError(f"{kind} must not be negative, got {distance:g}")
+    intervals = {k: max(_nearest(d / per_step), 1) if d else 0 for k, d in given.items()}
+    _begin(sim, "IMPLE", _nearest(abs(way) / per_step), sim.clock.step, intervals, final_frame=True)
+
+
+def resume(sim: Simulation) -> None:
+    """Finish the CYC or IMPLE in which a checkpoint was written."""
+    if sim.progress is not None:
+        prepare(sim, dt_known=True)
+        _run(sim)
+
+
+def stop(sim: Simulation) -> None:
+    """STOP: the end of the script; histories are closed."""
+    output.finish(sim)
+    if sim.log is not None and sim.log.has_warned(LATE):
+        sim.log.info(f"in all, particles outran the contact search {sim.lattice.late} times in {sim.clock.step} steps")
+
+
+def _nearest(steps: float) -> int:
+    if not steps <= MOST_STEPS:
+        raise CommandError(f"that would take {steps:g} steps")
+    return math.floor(steps + 0.5)
+
+
+def prepare(sim: Simulation, dt_known: bool = False) -> None:
+    """Closed, checked and with a time step: ready for the first cycle. Collective."""
+    _check_materials(sim)
+    if sim.clumps and sim.settings.disk != "on":
+        raise CommandError(
+            f"there are clumps, and SET disk is {sim.settings.disk}: their mass is density times area, so they need "
+            "SET disk on"
+        )
+    sim.close()
+    _check_laws(sim)
+    dt = sim.clock.dt if dt_known else time_step(sim)
+    if dt != sim.clock.dt:
+        sim.clock.dt = dt
+        sim.tables_changed()
+        sim.look_soon()
+    sim.refresh_tables()
+
+
+def _check_materials(sim: Simulation) -> None:
+    p, rows = sim.particles, sim.materials.rows
+    if (sim.settings.energy > 0 or sim.energy is not None) and (rows["xp"].any() or rows["yp"].any()):
+        raise CommandError("the account of SET energy does not know the work of xp and yp; use one of them")
+    free = p["fix"] != 7
+    light = (rows["density"][p["material"]] <= 0.0) & free
+    if sim.comm.any(bool(light.any())):
+        raise CommandError(_described(sim, light, "that are free to move have no density (PROP density)"))
+    hertz = rows["hertz"] != 0.0
+    lawful = np.where(hertz, rows["shear"], rows["kn"]) > 0.0
+    in_use = sim.used(p["material"], sim.materials) & lawful
+    if not in_use.any():  # nobody has one: particles that fly through each other, which is meant
+        return
+    cure = "(PROP shear, poiss and hertz, or kn and ks, after the line that makes them)"
+    lawless = ~lawful[p["material"]]
+    if sim.comm.any(bool((lawless & free).any())):
+        raise CommandError(_described(sim, lawless & free, f"have no contact law, while others have {cure}"))
+    # Fixed ones may be out of reach; if not, Hertz particles have no common law with them.
+    if (in_use & hertz).any() and sim.comm.any(bool(lawless.any())):
+        text = _described(
+            sim, lawless, f"that are fixed have no contact law {cure}; a touch of Hertz particles is an error"
+        )
+        if sim.log is not None:
+            sim.log.warn_once(f"lawless {text}", text)
+
+
+def _described(sim: Simulation, which: np.ndarray, what: str) -> str:
+    """``9 particles WHAT: 9 of group sed, made in line 7``, for the flagged owned particles (n_own,). Collective."""
+    p = sim.particles
+    firsts = np.array([first for first, _ in sim.makers], np.int64)
+    lines = np.array([0, *(line for _, line in sim.makers)], np.int64)
+    made_in = lines[np.searchsorted(firsts, p["gid"][which], side="right")]
+    total: Counter[tuple[int, int]] = Counter()
+    for part in sim.comm.allgather(dict(Counter(zip(p["group"][which].tolist(), made_in.tolist())))):
+        total.update(part)
+    parts = [
+        f"{number} of group {sim.groups[group]}{f', made in line {line}' if line else ''}"
+        for (group, line), number in sorted(total.items(), key=lambda item: (item[0][1], item[0][0]))
+    ]
+    more = f"; and {len(parts) - NAMED} more" if len(parts) > NAMED else ""
+    return f"{sum(total.values())} particles {what}: {'; '.join(parts[:NAMED])}{more}"
+
+
+def _check_laws(sim: Simulation) -> None:
+    """Pairs in the list of which one particle is Hertz and the other linear have no law."""
+    if not np.isnan(sim.pair_laws[:, MODEL]).any():
+        return
+    _, iout = observe.contact_rows(sim)
+    p = sim.particles
+    hertz = dict(zip(p.ihot[:, 7].tolist(), sim.materials.rows["hertz"][p.ihot[:, 6]].tolist(), strict=True))
+    mixed = [(a, b) for a, b, _ in iout.tolist() if hertz[a] != hertz[b]]
+    first = [pairs[0] for pairs in sim.comm.allgather(mixed[:1]) if pairs]
+    if first:
+        a, b = first[0]
+        raise CommandError(f"particles {a} and {b} touch, but one has the Hertz law and the other the linear one")
+
+
+def time_step(sim: Simulation) -> float:
+    """The time step [s]: SET DT, or SET frac f: f sqrt(m_min / k_max). Collective.
+
+    m_min: the smallest mass of a particle with a free degree of freedom (of clumps see observe.lightest); k_max: the
+    largest pair stiffness, linear: of any two materials or material and wall in use; Hertz: tangent at the largest
+    overlap (1 % of R if none is larger than a millionth of it: discs of a grid touch without pressing).
+    Source: step count published with Li et al. 2021.
+    """
+    s, p = sim.settings, sim.particles
+    if s.dt > 0.0:
+        return s.dt
+    if s.frac <= 0.0:
+        raise CommandError("no time step: SET DT or SET frac must come before the first cycle")
+    light = observe.lightest(sim)
+    if not math.isfinite(light):
+        raise CommandError(
+            "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
+        )
+    used = np.flatnonzero(sim.used(p["material"], sim.materials))
+    n = len(sim.materials)
+    pairs = sim.pair_laws.reshape(n, n, 4)[np.ix_(used, used)].reshape(-1, 4)
+    walls = sim.wall_laws.reshape(-1, n, 4)[:, used].reshape(-1, 4)
+    rows = np.concatenate([pairs, walls])
+    stiffest = float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0))
+    out, _ = observe.contact_rows(sim)
+    wout, _ = observe.wall_rows(sim)
+    now = np.concatenate([out[:, observe.STIFFNESS], wout[:, observe.STIFFNESS]])
+    hertz = rows[rows[:, 0] == 1.0]
+    largest = np.array([now.max() if len(now) and len(hertz) else 0.0])
+    touching = float(sim.comm.max_into(largest)[0])
+    if len(hertz):
+        r = sim.largest_radius
+        barely, pressed = (
+            max(tangent_normal_stiffness(model, a, 2.0 * r, u * r) for model, a, *_ in hertz) for u in (1e-6, 0.01)
+        )
+        touching = touching if touching > barely else pressed
+    stiffest = max(stiffest, touching)
+    if stiffest <= 0.0:
+        raise CommandError("SET frac: no stiffness is set (PROP kn, or shear with HERTZ); use SET DT")
+    return s.frac * math.sqrt(light / stiffest)
+
+
+def _begin(sim: Simulation, name: str, n: int, origin: int, intervals: dict[str, int], final_frame: bool) -> None:
+    """Write the `_ini` frame and run n steps."""
+    if sim.progress is not None:
+        raise CommandError(
+            f"{name} cannot be used by a function that is called in the middle of {sim.progress['name']}"
+        )
+    if sim.coupled:
+        raise CommandError(
+            f"{name} would leave the blocks behind that these particles touch: `pcdc model step` steps both"
+        )
+    prepare(sim)
+    start(sim, name, n, origin, intervals, final_frame)
+    _run(sim)
+
+
+def start(
+    sim: Simulation,
+    name: str,
+    steps: int | None,
+    origin: int,
+    intervals: dict[str, int],
+    final_frame: bool = False,
+    initial_frame: bool = True,
+) -> None:
+    """What every command that steps particles begins with: sim.progress, the account of energy, the `_ini` frame.
+    steps: None if their number is not known beforehand. The model is ready to step. Collective."""
+    if sim.settings.energy > 0 and sim.energy is None:
+        sim.energy = Budget()
+    first = sim.clock.step
+    sim.progress = {
+        "name": name, "first": first, "last": None if steps is None else first + steps, "origin": origin,
+        "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
+    }  # fmt: skip
+    _warn_about_the_time_step(sim)
+    if initial_frame:
+        sim.last_frame = None  # the model may have been changed since, at the same step
+        output.Snapshot(sim, initial=True, waits=False).write_print()
+    if sim.energy is not None:
+        new = sim.energy.start is None
+        sim.energy.begin(sim)
+        if new:
+            output.write_energy(sim)
+
+
+def _warn_about_the_time_step(sim: Simulation) -> None:
+    """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
+    or if lattice-solid damping reverses a velocity."""
+    critical, dt = observe.critical_dt(sim), sim.clock.dt
+    damping = sim.settings.lsm * dt / observe.lightest(sim)
+    near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
+    highest = observe.highest_frequency(sim) if near else 0.0
+    if sim.log is None:
+        return
+    if highest > 0.0:
+        estimate = f"{dt / critical:.2f} of the estimate 0.8 min sqrt(m / sum k) = {critical:.4g} s, "
+        text = (
+            f"time step {dt:g} s: {estimate if math.isfinite(critical) else ''}{0.5 * dt * highest:.2f} of "
+            f"2 / omega = {2.0 / highest:.4g} s, the limit of the contacts and bonds there are"
+        )
+        if 0.5 * dt * highest > 1.0:
+            sim.log.warn_once("unstable time step", f"{text}; beyond it the undamped step is unstable")
+        elif dt > critical and not sim.log.has_warned("critical time step"):
+            sim.log.warn_once(
+                "critical time step",
+                f"{text}. Beyond the estimate results may be noisy; if the run blows up, repeat it with a smaller one",
+            )
+        else:
+            sim.log.info(text)
+    elif dt > critical:
+        sim.log.warn_once(
+            "critical time step",
+            f"the time step {dt:g} s is {dt / critical:.2f} times the estimate 0.8 min sqrt(m / sum k) = "
+            f"{critical:.4g} s; results may be noisy, and a run that blows up should be repeated with a smaller one",
+        )
+    if damping > 1.0:
+        sim.log.warn_once("damping", f"SET damp lsm: eta dt / m is {damping:.3g} for the lightest particle, above 1")
+
+
+@dataclass
+class Task:
+    """Something to do at the steps origin + k * every, k > 0, and at the step `also`."""
+
+    every: int
+    origin: int
+    run: Callable[..., object]
+    also: int = -1
+
+    def next_after(self, step: int) -> int:
+        """The first step after `step` at which it is due."""
+        regular = self.origin + ((step - self.origin) // self.every + 1) * self.every
+        return min(regular, self.also) if self.also > step else regular
+
+
+class Due:
+    """What is due while the running command (sim.progress) steps the particles; used by every loop that does.
+
+    checkpoint: writes one at the SET save intervals, last of all, so that it knows everything else was written; None:
+    somebody else does. at_reports: is called where rows of walls.csv are written.
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        checkpoint: Callable[[Simulation], object] | None = output.write_checkpoint,
+        at_reports: Callable[[], object] = lambda: None,
+    ) -> None:
+        self.sim, self._checkpoint, self._at_reports = sim, checkpoint, at_reports
+        self._bar = sim.settings.stepbar if sim.settings.stepbar > 0 else STEPBAR
+        self._tasks = self._listed()
+        if sim.log is not None:
+            sim.log.set_interval(explicit=sim.settings.stepbar > 0)
+
+    def _listed(self) -> list[Task]:
+        sim, progress = self.sim, self.sim.progress
+        assert progress is not None
+        origin, intervals = progress["origin"], progress["intervals"]
+        tasks: list[Task] = []
+        for ident, (every, _) in sorted(sim.history_wishes.items()):
+            tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
+        last = -1 if progress["last"] is None else progress["last"]
+        tasks.append(Task(self._bar, progress["first"], self._report, also=last))
+        shot = output.Snapshot
+        for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
+            if intervals[kind] > 0:
+                tasks.append(Task(intervals[kind], origin, write))
+        if sim.drawing is not None and sim.draws:
+            every, what = sim.drawing
+            tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))
+        if sim.energy is not None and sim.settings.energy > 0:
+            tasks.append(Task(sim.settings.energy, 0, partial(output.write_energy, sim)))
+        if intervals["save"] > 0 and self._checkpoint is not None:
+            write_checkpoint = self._checkpoint
+            tasks.append(Task(intervals["save"], origin, lambda _: write_checkpoint(sim)))
+        return tasks
+
+    def _report(self, _: object = None) -> None:
+        output.report(self.sim)
+        self._at_reports()
+
+    def next(self) -> int:
+        """The next step at which something is due, or a function waits."""
+        step = self.sim.clock.step
+        return min(task.next_after(step) for task in [*self._tasks, *_calls(self.sim)])
+
+    def finish(self) -> None:
+        """At the end of a command of which the end was not known: the report that is due then. Collective."""
+        sim, progress = self.sim, self.sim.progress
+        assert progress is not None
+        step, first = sim.clock.step, progress["first"]
+        if progress["last"] is None and step > first and (step - first) % self._bar:
+            self._report()
+
+    def serve(self) -> None:
+        """Call the functions that wait for this step and write what is due at it. If one of them wants the command to
+        end here, progress["last"] is this step. Collective."""
+        sim, step = self.sim, self.sim.clock.step
+        assert sim.progress is not None
+        if _call_watchers(sim):
+            sim.progress["last"] = step
+            self._tasks = self._listed()
+        moment = output.Snapshot(sim, waits=False)
+        for task in self._tasks:
+            if task.next_after(step - 1) == step:
+                task.run(moment)
+
+
+def _run(sim: Simulation) -> None:
+    """Steps up to the end of the running command (sim.progress)."""
+    progress = sim.progress
+    assert progress is not None
+    last = progress["last"]
+    if sim.log is not None:
+        before = sim.clock.step - progress["first"]
+        sim.log.command_started(progress["name"], sim.line, last - sim.clock.step, sim.clock.step, before)
+    due = Due(sim)
+    clock, counted = sim.clock, sim.clock.step
+    try:
+        while clock.step < last:
+            event = min(last, due.next())
+            request = 0
+            while clock.step < event:
+                request = sim.step()
+                if request:
+                    break
+            sim.timers.count(clock.step - counted, len(sim.particles))
+            counted = clock.step
+            due.serve()
+            last = progress["last"]
+            if request:
+                _answer(sim, request)
+    except PhysicsError:
+        sim.timers.count(clock.step - counted, len(sim.particles))
+        output.write_last_words(sim)
+        raise
+    finally:
+        output.wait_for_disk()
+        sim.progress = None
+        if sim.log is not None:
+            sim.log.command_finished()
+    if sim.energy is not None:
+        sim.energy.pause(sim)
+    if progress["final_frame"]:
+        output.Snapshot(sim).write_print()
+    output.settle(sim)
+    warn_about_late_lists(sim, progress)
+
+
+def _calls(sim: Simulation) -> list[Task]:
+    """The moments at which watchers are called; asked for anew each time, as they may come and go."""
+    return [Task(watcher.every, 0, watcher.call) for watcher in sim.watchers]
+
+
+def _call_watchers(sim: Simulation) -> bool:
+    """Call those who want to see this step, before anything of it is written: a checkpoint then has what they did.
+
+    They may have added particles or changed a wall, so the model is made ready again. Returns True if one of them, on
+    any rank, wants the command to end here.
+    """
+    step, enough = sim.clock.step, False
+    due = [task for task in _calls(sim) if task.next_after(step - 1) == step]
+    if due:
+        output.settle(sim)  # they may look at files
+        if sim.energy is not None:
+            sim.energy.pause(sim)
+    for task in due:
+        with sim.timers.around("callback"):
+            enough |= bool(task.run())
+    if not due:
+        return False
+    if sim.closed:
+        sim.refresh_tables()
+    else:
+        prepare(sim, dt_known=True)
+    if sim.energy is not None:
+        sim.energy.begin(sim)
+    return sim.comm.any(enough)
+
+
+def _answer(sim: Simulation, request: int) -> None:
+    """A signal or the time limit asked for a checkpoint, perhaps for the end."""
+    what = sim.stop.decide(request)
+    if what == "none":
+        return
+    path = output.write_checkpoint(sim, automatic=what == "auto")
+    if what == "stop":
+        raise StoppedWithCheckpoint(
+            f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
+            f"go on with {sim.goes_on_with}"
+        )
+    if sim.log is not None:
+        why = "as the last one was long ago" if what == "auto" else "on request"
+        sim.log.info(f"step {sim.clock.step}: checkpoint {path} written {why}")
+
+
+def warn_about_late_lists(sim: Simulation, progress: dict) -> None:
+    """At the end of a command that stepped. Only the first time; `stop` says how often it was in all."""
+    late = sim.lattice.late - progress["late"]
+    if late and sim.log is not None:
+        sim.log.warn_once(
+            LATE,
+            f"between steps {progress['first']} and {sim.clock.step} particles outran the contact search {late} times; "
+            "a contact may have begun a few steps late. A smaller time step avoids it. Later ones are counted only",
+        )

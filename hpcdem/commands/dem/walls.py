@@ -1,0 +1,86 @@
+"""WALL and BOX."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.core import limits
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem.simulation import Simulation
+
+
+def wall(
+    sim: Simulation,
+    id: int,
+    nodes: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    kn: float | None = None,
+    ks: float | None = None,
+    fric: float | None = None,
+    color: int | None = None,
+    xv: float | None = None,
+    yv: float | None = None,
+) -> None:
+    """Make a wall (with nodes) or change one. SI units; kn, ks act on particles of the linear law only."""
+    if id < 0:
+        raise CommandError(f"wall id must not be negative, got {id}")
+    if nodes is not None and not np.isfinite(nodes).all():
+        raise CommandError(f"nodes of wall {id} must be finite numbers, got {nodes}")
+    if nodes is not None:
+        limits.check_nodes(*nodes, name=f"wall {id}")
+        at_box = sim.walls.find(id)
+        if at_box is not None and sim.walls.side[at_box]:
+            raise CommandError(f"wall {id} is a side of BOX, which BOX alone can place; give this wall another id")
+        forget(sim, sim.walls.find(id))
+        sim.walls.put(id, *nodes, one_sided=sim.settings.wallside == "left")
+    at = sim.walls.row(id)
+    for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
+        if value is not None and value < 0.0:
+            raise CommandError(f"{name} must not be negative, got {value:g}")
+    _set(sim, at, kn, ks, fric)
+    if color is not None:
+        sim.walls.color[at] = color
+    for axis, value in enumerate((xv, yv)):
+        if value is not None:
+            sim.walls.v[at, axis] = value
+    sim.look_soon()
+
+
+def box(
+    sim: Simulation,
+    left: float,
+    right: float,
+    bottom: float,
+    height: float,
+    kn: float = 0.0,
+    ks: float = 0.0,
+    fric: float = 0.0,
+) -> None:
+    """BOX: four walls that keep particles in; who leaves it is deleted. `height` is measured from `bottom`."""
+    if right <= left or height <= 0.0:
+        raise CommandError(f"BOX is empty: left {left:g}, right {right:g}, height {height:g}")
+    top = bottom + height
+    corners = {
+        "left": ((left, top), (left, bottom)),
+        "right": ((right, bottom), (right, top)),
+        "bottom": ((left, bottom), (right, bottom)),
+        "top": ((right, top), (left, top)),
+    }  # inside lies to the left of P1 -> P2
+    for side, nodes in corners.items():
+        limits.check_nodes(*nodes, name=f"the {side} side of the BOX")
+    for side, (p1, p2) in corners.items():
+        forget(sim, sim.walls.of_side(side))
+        _set(sim, sim.walls.put_side(side, p1, p2), kn, ks, fric)
+
+
+def forget(sim: Simulation, row: int | None) -> None:
+    """Open the model for a new or replaced wall; contacts with the old one are forgotten."""
+    sim.open()
+    if row is not None:
+        sim.hist = sim.hist.keep(sim.hist.partner != -1 - row)
+
+
+def _set(sim: Simulation, at: int, kn: float | None, ks: float | None, fric: float | None) -> None:
+    for name, value in (("kn", kn), ("ks", ks), ("fric", fric)):
+        if value is not None:
+            getattr(sim.walls, name)[at] = value
+    sim.tables_changed()

@@ -1,0 +1,198 @@
+"""Groups, models, conditions and initial states of elements, nodes, faces and joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.commands.fdem.choosing import chosen, everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.tables import Value
+
+Number = float | str
+"""A number, or the name of a table of time."""
+
+
+def group(project: Project, kind: str, name: str, set_name: str = DEFAULT, where: Range | None = None) -> None:
+    """Put objects of a kind (model.blocks.groups) into a group, also of elements that were taken out: these may come
+    back. They leave the one of the set that they were in."""
+    project.groups[kind].assign(everything(project, kind, where, null_too=True), name, set_name)
+
+
+def element_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """A constitutive model of elements, with its properties (model.blocks.properties). Elements in the range that were
+    taken out come back, free of stress where their place is now; without a range these stay away."""
+    blocks = project.ready()
+    elements = chosen(project, ELEMENT, where, null_too=True)
+    blocks.element_model(elements, name, properties)
+    if elements is not None:
+        project.alive[elements] = True
+
+
+def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:
+    """Take elements out; relax: time, or steps of a static run, over which their forces on the others die down."""
+    blocks = project.ready()
+    elements = everything(project, ELEMENT, where)
+    left = project.alive.copy()
+    left[elements] = False
+    if not left.any():
+        raise CommandError("no element would be left")
+    blocks.null(elements, relax)
+    project.alive = left
+
+
+def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Change some properties of elements."""
+    project.ready().element_property(chosen(project, ELEMENT, where), properties)
+
+
+def face_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """A contact model of faces. Without penalty_normal it is 10 E of the element."""
+    blocks = project.ready()
+    faces = chosen(project, FACE, where)
+    if "penalty_normal" not in properties:
+        faces = everything(project, FACE, where)
+        properties = {**properties, "penalty_normal": _usual_penalty(project, faces, faces[:, None])}
+    blocks.face_model(faces, name, properties)
+
+
+def face_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Change some properties of contact models."""
+    project.ready().face_property(chosen(project, FACE, where), properties)
+
+
+def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Change some properties of cohesive models."""
+    project.ready().joint_property(chosen(project, JOINT, where), properties)
+
+
+def joint_model(project: Project, name: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """A cohesive model of joints. Without penalty_normal it is 10 E of the softer of both elements."""
+    blocks = project.ready()
+    joints = chosen(project, JOINT, where)
+    if "penalty_normal" not in properties:
+        joints = everything(project, JOINT, where)
+        edges = project.edges()
+        sides = edges.faces[np.isin(edges.faces[:, 0], joints)]
+        properties = {**properties, "penalty_normal": _usual_penalty(project, joints, sides)}
+    blocks.joint_model(joints, name, properties)
+
+
+def _usual_penalty(project: Project, numbers: np.ndarray, faces: np.ndarray) -> Value:
+    """10 E of the softest element beside each object (n,), or one number if it is the same for all; faces (n, k):
+    theirs. For elements that have no model yet CommandError."""
+    blocks = project.blocks
+    young = blocks.element_rows.column("young")[blocks.element_row[faces // 4]].min(axis=1)
+    if (young <= 0.0).any():
+        lost = int(numbers[young <= 0.0][0])
+        raise CommandError(
+            f"penalty-normal is left out and so 10 E, but an element beside {lost} has no model yet: element c-model "
+            "comes first"
+        )
+    return 10.0 * float(young[0]) if (young == young[0]).all() else 10.0 * young
+
+
+def initial_stress(
+    project: Project,
+    stress: Mapping[str, float],
+    gradient: Mapping[str, tuple[float, float]] | None = None,
+    where: Range | None = None,
+) -> None:
+    """Stress [Pa] by component xx, yy, xy, zz; gradient: by component, per metre in x and y."""
+    project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
+
+
+def initial_velocity(project: Project, velocity: tuple[float, float], where: Range | None = None) -> None:
+    """Velocity (2,) [m/s] of nodes now."""
+    project.ready().set_velocity(chosen(project, NODE, where), *velocity)
+
+
+# ---- conditions ----------------------------------------------------------------------------------------------------
+
+
+def velocity(
+    project: Project,
+    vx: Number | None = None,
+    vy: Number | None = None,
+    ax: Number | None = None,
+    ay: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Velocity [m/s] or acceleration [m/s2] of nodes; a text is the name of a table of time."""
+    _known(project, vx, vy, ax, ay)
+    project.ready().velocity_condition(chosen(project, NODE, where), vx, vy, ax, ay)
+
+
+def force(project: Project, fx: Number | None = None, fy: Number | None = None, where: Range | None = None) -> None:
+    """Force on each node [N per m of thickness]."""
+    _known(project, fx, fy)
+    project.ready().force_condition(chosen(project, NODE, where), fx, fy)
+
+
+def move(project: Project, kind: int, direction: tuple[float, float] = (0.0, 0.0), where: Range | None = None) -> None:
+    """Freedom of nodes: 0 free, 1 held, 2 along the direction only."""
+    if kind not in (0, 1, 2):
+        raise CommandError(f"type {kind} is unknown: 0 free, 1 held, 2 along a vector" + ", 3 is for 3-D" * (kind == 3))
+    if kind == 2 and not np.hypot(*direction) > 0.0:
+        raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
+    project.ready().move_constraint(chosen(project, NODE, where), kind, direction)
+
+
+def stress(
+    project: Project,
+    xx: Number | None = None,
+    yy: Number | None = None,
+    normal: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Traction of faces [Pa]. Without a range: all faces on the surface of the model."""
+    _known(project, xx, yy, normal)
+    faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
+    project.ready().stress_condition(faces, xx=xx, yy=yy, normal=normal)
+
+
+def remove_node_conditions(project: Project, where: Range | None = None) -> None:
+    """Nodes are free again."""
+    project.ready().remove_conditions(chosen(project, NODE, where))
+
+
+def remove_face_conditions(project: Project, where: Range | None = None) -> None:
+    """Faces are without traction again."""
+    project.ready().remove_stress_conditions(chosen(project, FACE, where))
+
+
+def _known(project: Project, *values: Number | None) -> None:
+    for value in values:
+        if isinstance(value, str) and value not in project.blocks.tables:
+            known = ", ".join(f"'{name}'" for name in project.blocks.tables) or "none so far"
+            raise CommandError(f"there is no table '{value}'; there is {known}")
+
+
+# ---- tables --------------------------------------------------------------------------------------------------------
+
+
+def table(project: Project, name: str, pairs: list[tuple[float, float]]) -> None:
+    """A function of time, linear from point to point."""
+    project.blocks.table(name, pairs)
+
+
+def random_field(project: Project, name: str, **about: Any) -> None:
+    """A random field, see physics.random_field.RandomField."""
+    project.blocks.random_field(name, RandomField.of(**about))
+
+
+def remove_field(project: Project, name: str) -> None:
+    """Forget a random field; properties that were drawn from it stay."""
+    project.blocks.remove_field(name)
+
+
+def remove_table(project: Project, name: str) -> None:
+    """Forget a table."""
+    if name not in project.blocks.tables:
+        _known(project, name)
+    project.blocks.remove_table(name)

@@ -1,0 +1,229 @@
+"""Ranges: which elements, nodes, faces and joints a command is meant for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
+from hpcdem.pre.mesh import geometry
+from hpcdem.pre.mesh.cracks import TOLERANCE, edges_on
+
+if TYPE_CHECKING:
+    from hpcdem.commands.fdem.project import Project
+
+NEAR = 1e-9
+"""Bounds of x and y reach so much of the size of the model further: coordinates of meshes are rounded."""
+
+
+def chosen(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray | None:
+    """Ascending numbers of the objects of this kind that a range chooses among those that are there; None stands for
+    all. null_too: also among elements that were taken out, and what belonged to them. CommandError if it chooses
+    nothing."""
+    if where is None:
+        return None
+    objects = _Objects(project, kind, null_too)
+    mask = objects.all_of(where)
+    if not mask.any():
+        raise CommandError(f"the range chooses no {kind}" + _why(objects, where))
+    return objects.numbers[mask]
+
+
+def everything(project: Project, kind: str, where: g.Range | None, null_too: bool = False) -> np.ndarray:
+    """The same as numbers in any case."""
+    found = chosen(project, kind, where, null_too)
+    return _Objects(project, kind, null_too).numbers if found is None else found
+
+
+def _why(objects: _Objects, where: g.Range) -> str:
+    """What it chose was taken out, or which of several terms is fulfilled by nothing at all."""
+    if not objects.null_too and not objects.project.alive.all():
+        gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
+        if gone:
+            return f": all that it names ({gone}) was taken out (element c-model null)"
+    if len(where) == 1:
+        return ""
+    empty = [type(term).__name__ for term in where if not objects.mask(term).any()]
+    return "; each of its terms alone chooses some" if not empty else ""
+
+
+_ONLY_JOINTS = (g.Between, g.OnCrack)
+_NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
+
+
+class _Objects:
+    """All objects of a kind that are there: numbers (n,), ends (n, 2) point numbers of faces and joints, sides (n, 2)
+    of joints. An element is there unless it was taken out, a node or face if one of its elements is, a joint if both
+    are. null_too: those that are not there as well."""
+
+    def __init__(self, project: Project, kind: str, null_too: bool = False) -> None:
+        self.project, self.kind, self.null_too = project, kind, null_too
+        self.mesh = mesh = project.whole_mesh()
+        self.groups = project.groups
+        self.now = False
+        there = np.ones(len(mesh.cells), bool) if null_too else project.alive
+        if kind == g.ELEMENT:
+            self.numbers = np.flatnonzero(there)
+        elif kind == g.NODE:
+            corners = mesh.cells[there]
+            self.numbers = np.unique(corners[corners >= 0])
+        else:
+            self.edges = edges = project.edges()
+            if kind == g.JOINT:
+                sides = edges.faces[edges.inner]
+                self.sides = sides[there[sides // 4].all(axis=1)]
+                self.numbers = self.sides[:, 0]
+            else:
+                faces = np.sort(edges.faces[edges.faces >= 0])
+                self.numbers = faces[there[faces // 4]]
+            self.ends = face_points(mesh.cells, self.numbers)
+
+    def all_of(self, where: g.Range) -> np.ndarray:
+        """(n,) bool: which of them all terms hold for."""
+        self.now = any(isinstance(term, g.Present) for term in where)
+        if self.now and not any(isinstance(term, (g.Span, g.OnLayer)) for term in where):
+            raise CommandError("present goes with x, y and geometry: it says which positions they look at")
+        mask = np.ones(len(self.numbers), bool)
+        for term in where:
+            mask &= self.mask(term)
+        return mask
+
+    def places(self) -> np.ndarray:
+        """(n, k, 2) [m] where x, y and geometry look for each: the centre of an element, a node, both ends of a face or
+        joint (of the element that it is numbered by)."""
+        mesh = self.mesh
+        if not self.now:
+            if self.kind == g.ELEMENT:
+                return centroids(mesh.points, mesh.cells[self.numbers])[:, None]
+            return mesh.points[self.numbers][:, None] if self.kind == g.NODE else mesh.points[self.ends]
+        if self.kind == g.NODE:
+            return self.project.positions()[self.numbers][:, None]
+        corners = self.project.corner_positions()
+        if self.kind == g.ELEMENT:
+            own = np.arange(4 * len(self.numbers)).reshape(-1, 4)
+            cells = np.where(mesh.cells[self.numbers] >= 0, own, -1)
+            return centroids(corners.reshape(-1, 4, 2)[self.numbers].reshape(-1, 2), cells)[:, None]
+        e, k = np.divmod(self.numbers, 4)
+        return corners[np.column_stack([self.numbers, 4 * e + (k + 1) % corner_counts(mesh.cells[e])])]
+
+    def mask(self, term: g.Term) -> np.ndarray:
+        """(n,) bool: which of them a term holds for."""
+        if isinstance(term, _ONLY_JOINTS) and self.kind != g.JOINT:
+            raise CommandError(f"{term} makes no sense for {self.kind}s")
+        if isinstance(term, _NOT_ELEMENTS) and self.kind == g.ELEMENT:
+            raise CommandError(f"{term} makes no sense for elements")
+        match term:
+            case g.InGroup(group, set_name):
+                return np.isin(self.numbers, self.groups[self.kind].members(group, set_name))
+            case g.InSet(set_name):
+                of = self.groups[self.kind].of_set(set_name)
+                return np.isin(self.numbers, np.concatenate([np.empty(0, np.int64), *of.values()]))
+            case g.Ids(first, last):
+                return self._ids(first, last)
+            case g.Span(axis, low, high):
+                return self._span(axis, low, high)
+            case g.OnLayer(layer):
+                return self._layer(layer)
+            case g.OnBoundary():
+                return self._boundary()
+            case g.OfElements(group, set_name):
+                return self._of_elements(self.groups[g.ELEMENT].members(group, set_name))
+            case g.Between(one, other, set_name):
+                groups = self.groups[g.ELEMENT]
+                a, b = (np.isin(self.sides // 4, groups.members(name, set_name)) for name in (one, other))
+                return (a[:, 0] & b[:, 1]) | (a[:, 1] & b[:, 0])
+            case g.Present():
+                return np.ones(len(self.numbers), bool)
+            case g.OnCrack():
+                rows = find_edges(self.edges, self.mesh.cracks, len(self.mesh.points))
+                return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
+        raise AssertionError(term)
+
+    def _ids(self, first: int, last: int) -> np.ndarray:
+        if first > last:
+            raise CommandError(f"id {first} {last}: the first number is above the last")
+        mask = (self.numbers >= first) & (self.numbers <= last)
+        if first == last and not mask.any():
+            known = _Objects(self.project, self.kind, True).numbers
+            if first in known:
+                raise CommandError(f"{self.kind} {first} was taken out (element c-model null)")
+            raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
+        return mask
+
+    def _span(self, axis: int, low: float, high: float) -> np.ndarray:
+        if low > high:
+            raise CommandError(f"{'xy'[axis]} {low:g} {high:g}: the first bound is above the second")
+        slack = NEAR * float(np.ptp(self.mesh.points, axis=0).max())
+        at = self.places()[:, :, axis]
+        return ((at >= low - slack) & (at <= high + slack)).all(axis=1)
+
+    def _layer(self, layer: str) -> np.ndarray:
+        if self.kind == g.ELEMENT:
+            return _inside(self._curves(layer), self.places()[:, 0], layer)
+        if self.now:
+            raise CommandError(
+                f"geometry '{layer}' present chooses elements, by where their centres are now; which {self.kind}s lie "
+                "on its lines is known in the mesh: leave out present"
+            )
+        pairs = self.mesh.layers[layer] if layer in self.mesh.layers else edges_on(self.mesh, self._curves(layer))
+        if self.kind == g.NODE:
+            return np.isin(self.numbers, pairs) | self._on_points(layer)
+        rows = find_edges(self.edges, pairs, len(self.mesh.points))
+        return np.isin(self.numbers, self.edges.faces[rows[rows >= 0]])
+
+    def _on_points(self, layer: str) -> np.ndarray:
+        """Nodes on the single points of a layer, or on a line of which no edge of the mesh is a part."""
+        found = np.zeros(len(self.numbers), bool)
+        points = self.mesh.points[self.numbers]
+        slack = TOLERANCE * float(np.ptp(self.mesh.points, axis=0).max())
+        for curve in self.project.layers[layer] if layer in self.project.layers else ():
+            if not curve.segments or layer not in self.mesh.layers:
+                found |= geometry.distance(curve, points) <= slack
+        return found
+
+    def _curves(self, layer: str) -> list[geometry.Curve]:
+        if layer not in self.project.layers:
+            known = ", ".join(f"'{name}'" for name in {**self.mesh.layers, **dict.fromkeys(self.project.layers)})
+            raise CommandError(f"there is no geometry layer '{layer}'; there is {known or 'none so far'}")
+        return self.project.layers[layer]
+
+    def _boundary(self) -> np.ndarray:
+        """Beside nothing, or beside an element that was taken out."""
+        alive, edges = self.project.alive, self.project.edges()
+        there = np.append(alive, False)[np.where(edges.faces >= 0, edges.faces // 4, len(alive))]
+        rim = there[:, 0] != there[:, 1]
+        if self.kind == g.NODE:
+            return np.isin(self.numbers, edges.points[rim])
+        return np.isin(self.numbers, edges.faces[rim][there[rim]])
+
+    def _of_elements(self, elements: np.ndarray) -> np.ndarray:
+        if self.kind == g.JOINT:
+            return np.isin(self.sides // 4, elements).all(axis=1)
+        if self.kind == g.NODE:
+            corners = self.mesh.cells[elements]
+            return np.isin(self.numbers, corners[corners >= 0])
+        return np.isin(self.numbers // 4, elements)
+
+
+SIDES = 1440
+"""Arcs of an outline stand for so many sides per closed curve when it is asked what lies inside."""
+
+
+def _inside(curves: list[geometry.Curve], points: np.ndarray, layer: str) -> np.ndarray:
+    """(n,) bool: an odd number of sides of the closed curves lies to the right of the point (even-odd rule)."""
+    outlines = [curve for curve in curves if curve.closed]
+    if not outlines:
+        raise CommandError(f"layer '{layer}' has no closed line, so nothing lies inside of it")
+    odd = np.zeros(len(points), bool)
+    x, y = points.T
+    for curve in outlines:
+        straight = not curve.bulges.any()
+        sides = curve.points if straight else geometry.sampled(curve, curve.length() / SIDES)
+        for (ax, ay), (bx, by) in zip(sides, np.roll(sides, -1, axis=0)):
+            across = (ay > y) != (by > y)
+            if across.any():
+                odd[across] ^= x[across] < ax + (y[across] - ay) * (bx - ax) / (by - ay)
+    return odd

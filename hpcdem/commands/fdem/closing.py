@@ -1,0 +1,94 @@
+"""What is written and told at the end of a run of blocks: histories, energy, the table of stages, the last figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hpcdem.commands.fdem import frames, histories
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.engine import output
+from hpcdem.io.agreed import on_first
+
+ENERGY_WORDS = {
+    "kinetic": "stored: motion",
+    "strain": "stored: strain of elements",
+    "joints": "stored: joints",
+    "joints_lost": "lost by fracture and friction in joints",
+    "contact": "lost or stored by contacts",
+    "viscous_lost": "lost by viscous damping",
+    "work_gravity": "work of gravity",
+    "work_outside": "work of loads and conditions",
+    "work_discs": output.ACROSS,
+    "commands": "brought by commands",
+    "closing": "closing error",
+}
+"""What the table at the end calls the entries of the energy budget."""
+ACROSS_WORDS = {
+    "work_on_particles": "work on particles",
+    "work_on_blocks": "work on blocks",
+    "stored": "stored in the contacts, more than at first",
+    "lost": "lost by friction, less overlaps at first",
+}
+"""The same of what went from one to the other: these four add up to nothing."""
+
+
+def close(project: Project, figure: bool = True) -> None:
+    """Bring what waits to the disk, tell how it was, draw the last state. Collective."""
+    histories.flush(project)
+    blocks, log = project.blocks, project.log
+    both = project.coupled
+    if log is None or not (blocks.timers.steps or (both is not None and both.particles.timers.steps)):
+        return
+    if blocks.budget is not None:
+        energies = blocks.energies()
+        rows = [
+            (text, f"{energies[name]:.6g}")
+            for name, text in ENERGY_WORDS.items()
+            if name != "work_discs" or energies["work_discs"]
+        ]
+        log.table("energy budget", ("energy", "J/m"), rows)
+        log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
+    _tell_both(project)
+    if figure:
+        path = last_figure(project)
+        log.info(f"figure: {path}")
+    if both is None:
+        log.stages(blocks.timers, project.comm, "element")
+    else:
+        log.stages_of_both(both.particles.timers, blocks.timers, project.comm)
+
+
+def _tell_both(project: Project) -> None:
+    """What went across the contacts of discs and faces, and how both accounts add up. Collective."""
+    both, log = project.coupled, project.log
+    if both is None or project.continues is not None or not both.accounted:
+        return
+    try:
+        found = both.energies()
+    except CommandError as error:  # the last commands of the script left them so that no step could follow
+        log.warn(f"no table of the energy between discs and faces: {error}")
+        return
+    found["stored"] -= found["stored_before"]
+    rows = [(text, f"{found[name]:.6g}") for name, text in ACROSS_WORDS.items()]
+    log.table(output.ACROSS, ("energy", "J/m"), rows)
+    if "closing" in found:
+        log.info(
+            f"energy of both: closing error {found['closing']:.4g} J/m, {found['relative']:.2g} of the largest flow"
+        )
+
+
+def last_figure(project: Project) -> Path:
+    """Cracks and stress at this moment, `all_<step>.jpg` in the folder of the results. Collective."""
+    path = project.folder() / f"all_{project.step:010d}.jpg"
+    with project.blocks.timers.around("figure"):
+        whole = frames.whole(project)
+
+        def draw() -> None:
+            from hpcdem.post import blocks
+
+            if whole is not None:
+                blocks.plot(whole, path)
+
+        on_first(project.comm, draw)
+    return path

@@ -1,0 +1,252 @@
+"""Particles beside the blocks of a script: hpcdem.couple, and what `model step` and `model solve` then do.
+
+Whatever is about particles is imported where they are there: a script of blocks alone does without their kernels, and
+numba keeps a kernel in the folder of those with which it was imported (see runtime/warmup.py).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem import saving
+
+if TYPE_CHECKING:
+    from hpcdem.physics.coupling.model import Coupled
+    from hpcdem.physics.dem.simulation import Simulation
+
+
+def couple(project: Project, particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupled:
+    """From now on both are stepped together. friction: largest one between discs and faces; dt [s]: time step of both,
+    0: as said for one of them, else the smaller of the stable ones. Collective."""
+    from hpcdem.commands.dem import running
+    from hpcdem.physics.coupling.model import Coupled
+
+    if project.coupled is not None:
+        raise CommandError("the blocks of this script are coupled to particles already")
+    if Path(particles.outdir).resolve() == Path(project.outdir).resolve():
+        raise CommandError(
+            f"particles and blocks would both write into {project.outdir}: give the particles a folder of their own, "
+            'hpcdem.Simulation(outdir="...")'
+        )
+    if dt < 0.0:
+        raise CommandError(f"the time step must be positive, got {dt:g}")
+    project.refuse_inside("couple")
+    blocks = project.ready()
+    if project.continues is not None and particles.number == project.asleep:
+        project.coupled = Coupled(particles, blocks, friction)  # both come out of the checkpoint, see take_up
+        return project.coupled
+    running.prepare(particles, dt_known=particles.settings.dt == 0.0)
+    both = Coupled(particles, blocks, friction)
+    try:
+        both.settle_time_step(dt or _by_frac(both))
+        if project.continues is None:
+            both.prepare()
+    except CommandError:
+        both.release()
+        raise
+    project.coupled = both
+    return both
+
+
+def _by_frac(both: Coupled) -> float:
+    """The time step [s] that SET frac of the particles asks for, if that is stable for all; 0 without SET frac."""
+    from hpcdem.commands.dem import running
+
+    particles, said = both.particles, both.blocks.options.dt
+    if particles.settings.frac <= 0.0:
+        return 0.0
+    wanted = running.time_step(particles)
+    if said > wanted:
+        raise CommandError(
+            f"the time steps differ: SET frac {particles.settings.frac:g} gives {wanted:g} s for the particles, model "
+            f"time-step is {said:g} s; say one of them only"
+        )
+    return said or min(wanted, both.stable_time_step())
+
+
+def _warn(both: Coupled) -> None:
+    """Once each: what is said for one of the two and may be meant for both."""
+    sim, options = both.particles, both.blocks.options
+    if sim.log is None:
+        return
+    of_particles, of_blocks = (sim.settings.gx, sim.settings.gy), (options.gx, options.gy)
+    if of_particles != of_blocks:
+        sim.log.warn_once(
+            f"gravity {of_particles} {of_blocks}",
+            f"gravity differs: SET gravity {of_particles[0]:g} {of_particles[1]:g} moves the particles, model gravity "
+            f"({of_blocks[0]:g},{of_blocks[1]:g}) the blocks; each is set for itself",
+        )
+    if not options.collision:
+        sim.log.warn_once(
+            "collision off", "model option collision off: blocks do not touch each other; they do touch particles"
+        )
+
+
+def _warn_of_walls(both: Coupled) -> None:
+    """Once per wall: a block that is in or behind a wall, which holds particles only. Collective."""
+    log = both.particles.log
+    for wall, element, x, y in both.beyond_walls():
+        if log is not None:
+            walls = both.particles.walls
+            side = walls.side_of(walls.find(wall) or 0)
+            name = f"the {side} side of the BOX" if side else f"wall {wall}"
+            log.warn_once(
+                f"beyond {wall}",
+                f"step {both.blocks.clock.step}: element {element} at ({x:g}, {y:g}) is in or beyond {name}: walls and "
+                "BOX hold particles only; hold blocks by conditions of their nodes, or by a fixed body in its place",
+            )
+
+
+# ---- while both are stepped ----------------------------------------------------------------------------------------
+
+
+@contextmanager
+def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
+    """Around a command that steps: what a run of particles writes and tells at its beginning and its end. steps: None
+    if their number is not known. Collective; without particles nothing."""
+    both = project.coupled
+    if both is None:
+        yield
+        return
+    from hpcdem.commands.dem import running
+    from hpcdem.engine import output
+
+    sim = both.particles
+    both.heed_time_step(partial(_by_frac, both))
+    both.prepare()
+    if sim.progress is None:  # else the command goes on from a checkpoint
+        intervals = {kind: int(getattr(sim.settings, kind)) for kind in running.KINDS}
+        running.start(sim, f"model {name}", steps, 0, intervals, initial_frame=sim.edited)
+        sim.edited = False
+    elif sim.energy is not None and not sim.energy.running:
+        sim.energy.begin(sim)
+    progress = sim.progress
+    assert progress is not None
+    project.due = running.Due(sim, None, partial(_warn_of_walls, both))
+    late = both.late
+    _warn(both)
+    _warn_of_walls(both)
+    if sim.log is not None:
+        total = 0 if progress["last"] is None else progress["last"] - sim.clock.step
+        sim.log.command_started(progress["name"], project.line, total, sim.clock.step, beside=True)
+    try:
+        yield
+        project.due.finish()
+    except PhysicsError:
+        output.write_last_words(sim)
+        raise
+    finally:
+        output.wait_for_disk()
+        sim.progress = project.due = None
+        sim.edited = False  # frames show what functions did in the middle of the command
+        if sim.log is not None:
+            sim.log.command_finished()
+    if sim.energy is not None:
+        sim.energy.pause(sim)
+    running.warn_about_late_lists(sim, progress)
+    if both.late > late and sim.log is not None:
+        sim.log.warn(
+            f"{both.late - late} times particles and faces outran the search for contacts between them; a contact may "
+            "have begun a few steps late. A smaller time step avoids it"
+        )
+
+
+def advance(project: Project, steps: int) -> int:
+    """Up to `steps` steps of the blocks, and of the particles with them; what the outside asked for. What is due of the
+    particles on the way is written; if one of their functions wants the command to end, project.progress["done"] says
+    so. Collective."""
+    both, due = project.coupled, project.due
+    if both is None or due is None:
+        return project.blocks.advance(steps)
+    sim = both.particles
+    assert project.progress is not None and sim.progress is not None
+    last, request = sim.clock.step + steps, 0
+    while sim.clock.step < last and not request and not project.progress.get("done"):
+        request = both.advance(min(last, due.next()) - sim.clock.step)
+        due.serve()
+        if sim.progress["last"] == sim.clock.step:
+            project.progress["done"] = True
+    return request
+
+
+def next_checkpoint(project: Project) -> float:
+    """The step of the blocks at which SET save of the particles asks for the next checkpoint of both."""
+    every = _save_interval(project)
+    if not every:
+        return math.inf
+    assert project.coupled is not None
+    return project.step + every - project.coupled.particles.clock.step % every
+
+
+def checkpoint_is_due(project: Project) -> bool:
+    """Whether SET save of the particles asks for one at this step."""
+    every = _save_interval(project)
+    return bool(every) and project.coupled is not None and project.coupled.particles.clock.step % every == 0
+
+
+def _save_interval(project: Project) -> int:
+    both = project.coupled
+    return both.particles.progress["intervals"]["save"] if both is not None and both.particles.progress else 0
+
+
+def refuse(project: Project, what: str) -> None:
+    """CommandError for what cannot be done of blocks that touch particles."""
+    if project.coupled is not None:
+        raise CommandError(
+            f"{what} would leave the particles behind that these blocks touch: model step and model solve step both"
+        )
+
+
+def take_up(project: Project) -> None:
+    """A run that goes on from a checkpoint: both as they were when it was written, in the middle of a command."""
+    both = project.coupled
+    if both is not None and project.continues is not None:
+        both.restore(project.continues)
+        both.particles.edited, both.particles.resumed = False, True
+        project.continues = None
+
+
+def release(project: Project) -> None:
+    """Part them."""
+    project.refuse_inside("end")
+    if project.coupled is not None:
+        project.coupled.release()
+    project.coupled = None
+
+
+def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
+    """Write all that is stepped together. Collective."""
+    if project.coupled is not None:
+        from hpcdem.engine import output
+
+        take_up(project)
+        output.secure_series(project.coupled.particles)
+        project.coupled.save(path, extra)
+    else:
+        project.blocks.save(path, extra)
+
+
+def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
+    """Take the state of a file; begins: the script has still to run, particles are taken when it steps first after
+    hpcdem.couple. Collective."""
+    if project.coupled is not None:
+        of_both = project.coupled.restore(path)
+        sim = project.coupled.particles
+        sim.progress = None  # the command in which it was written is not taken up
+        if sim.energy is not None and sim.energy.running:
+            sim.energy.pause(sim)
+        return of_both
+    if not begins:
+        return project.blocks.restore(path)
+    found = saving.restore_part(project.blocks, path)
+    if found is None:
+        return project.blocks.restore(path)
+    project.continues = path
+    return found

@@ -1,0 +1,44 @@
+"""The joints that broke, as rows of `cracks.csv` while the model runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hpcdem.commands.fdem.project import Project
+from hpcdem.io.columns import append_rows
+from hpcdem.physics.fdem.simulation import Crack
+
+NAME = "cracks.csv"
+COLUMNS = {
+    "step": "step", "time": "time [s]", "joint": "joint", "x": "x [m]", "y": "y [m]", "mode": "mode",
+    "length": "length [m]", "kinetic": "kinetic_energy [J/m]", "peak_step": "peak_step",
+    "peak_kinetic": "peak_kinetic_energy [J/m]",
+}  # fmt: skip
+"""Names of `Blocks.events` and of the columns, in their order."""
+
+
+def record(project: Project) -> None:
+    """Add what is known to have broken: steps look for broken joints from time to time. Collective."""
+    _write(project, project.blocks.event_rows)
+
+
+def flush(project: Project) -> None:
+    """Add all that has broken so far. The file of another model goes, if this one has no joints. Collective."""
+    if project.taken:
+        _write(project, project.blocks.crack_rows())
+        if project.cracks_filed is None and project.folder_made and project.comm.rank == 0:
+            (project.outdir / NAME).unlink(missing_ok=True)
+
+
+def _write(project: Project, cracks: Sequence[Crack]) -> None:
+    """A model that begins, or goes on from a checkpoint, begins a new file with all that has broken."""
+    done = project.cracks_filed
+    if done == len(cracks) or (not cracks and not project.blocks.joint_row.any()):
+        return
+    with project.blocks.timers.around("output"):
+        path = project.folder() / NAME
+        new = project.blocks.described(cracks[done or 0 :])
+        table = zip(*(new[name].tolist() for name in COLUMNS), strict=True)
+        rows = [",".join(map(repr, row)) for row in table]
+        append_rows(path, ",".join(COLUMNS.values()), rows, 0 if done is None else None, project.comm)
+    project.cracks_filed = len(cracks)

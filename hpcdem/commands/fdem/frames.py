@@ -1,0 +1,165 @@
+"""output vtk: frames of the model for ParaView.
+
+Those that are due while the model is stepped are written asynchronously, as those of particles are
+(hpcdem/engine/output.py): the next step with frames, a checkpoint and the end of the command wait for them; errors of
+the disk stop all ranks there, or at the next line of the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.io import vtkhdf_mesh
+from hpcdem.io.behind import Deliveries, under_way
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import to_slabs
+from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
+from hpcdem.physics.fdem.connectivity import face_points
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT
+from hpcdem.physics.fdem.looking import PROPERTIES
+from hpcdem.physics.fdem.model import QUANTITIES, Blocks
+
+
+def vtk(project: Project, name: str, every: int | None = None) -> None:
+    """Write `<name>_<step>.vtkhdf` into the folder of the results: now, or every so many steps. Collective."""
+    file_name(name)
+    if every is None:
+        project.ready(use=False)
+        _write(project, name)
+    else:
+        project.frames[name] = every
+
+
+def file_name(name: str) -> None:
+    """CommandError if it cannot be the first part of names of files."""
+    if "/" in name:
+        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
+
+
+def stop(project: Project, name: str) -> None:
+    """No more frames of this name."""
+    if name not in project.frames:
+        known = ", ".join(f"'{other}'" for other in project.frames) or "none"
+        raise CommandError(f"there are no frames '{name}' to stop; there is {known}")
+    del project.frames[name]
+
+
+def write_due(project: Project) -> None:
+    """The frames that are due at this step, once each; `settle` waits for them. Collective."""
+    due = [
+        name for name, every in project.frames.items()
+        if project.step % every == 0 and project.framed.get(name) != project.step
+    ]  # fmt: skip
+    if not due:
+        return
+    if not _particles_just_wrote(project):
+        settle(project)
+    for name in due:
+        _write(project, name, under_way)
+    under_way.go()
+
+
+def settle(project: Project) -> None:
+    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    with project.blocks.timers.around("output"):
+        under_way.settle(project.comm)
+
+
+def _particles_just_wrote(project: Project) -> bool:
+    """What is under way is a frame of this step, of the particles beside the blocks."""
+    both = project.coupled
+    return both is not None and both.particles.last_frame == (both.particles.clock.step, False)
+
+
+def write_last(project: Project) -> None:
+    """A frame of each name of a state that makes no sense any more, for the user to look at. Collective."""
+    with np.errstate(all="ignore"):
+        for name in project.frames:
+            _write(project, name)
+
+
+def _write(project: Project, name: str, later: Deliveries | None = None) -> None:
+    path, comm = project.folder() / f"{name}_{project.step:010d}.vtkhdf", project.comm
+    with project.blocks.timers.around("output"):
+        if later is None:
+            write_mesh_frame(path, frame(project), comm)
+        else:
+            moment = _kept(frame(project))
+            if comm.size == 1:
+                later.entrust(lambda: write_mesh_frame(path, moment, comm))
+            else:
+                write_mesh_frame(path, moment, comm, later)
+    project.framed[name] = project.step
+
+
+def _kept(moment: MeshFrame) -> MeshFrame:
+    """The same with arrays of its own: the model goes on."""
+
+    def own(table: Table) -> Table:
+        return Table({name: np.array(values) for name, values in table.columns.items()}, table.offset, table.total)
+
+    return replace(moment, corners=own(moment.corners), elements=own(moment.elements), joints=own(moment.joints))
+
+
+def whole(project: Project) -> MeshState | None:
+    """The present state as a frame, on rank 0. Collective."""
+    return vtkhdf_mesh.whole(frame(project), project.comm)
+
+
+def _names(blocks: Blocks, kind: str) -> list[str]:
+    """What is written of elements and joints: neither where they are, which the points say, nor single points of
+    joints; of properties those that a table or a field has made different from object to object."""
+    varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
+    return [
+        name for name, quantity in QUANTITIES.items()
+        if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
+    ]  # fmt: skip
+
+
+def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
+    """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
+    vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
+    columns = blocks.owned_values("corner", vectors)
+    columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
+    return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
+
+
+def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Joints, and the open edges beside this rank's elements that have no cohesive model: cracks from the beginning, of
+    state 0."""
+    mesh = blocks.the_mesh()
+    faces = (4 * elements[:, None] + np.arange(4)).reshape(-1)
+    beside = blocks.partner[faces]
+    cracks = faces[(beside > faces) & blocks.open[faces] & (blocks.joint_row[faces] == 0) & blocks.alive[beside // 4]]
+    ends = mesh.points[face_points(mesh.cells, cracks)]
+    known = {"number": cracks, "state": np.zeros(len(cracks)), "mode": np.zeros(len(cracks)),
+             "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
+    nothing = np.full(len(cracks), np.nan)
+    return {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
+
+
+def frame(project: Project) -> MeshFrame:
+    """What is written at this moment. Collective."""
+    blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
+    corners = _corners(blocks)
+    elements = blocks.owned_values("element", _names(blocks, "element"))
+    joints = _with_cracks(blocks, elements["number"], blocks.owned_values("joint", _names(blocks, "joint")))
+    elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
+    names: dict[str, list[str]] = {}
+    for set_name, groups in project.groups[ELEMENT].sets.items():
+        column = f"group_{set_name}"
+        code = np.full(len(mesh.cells), -1, np.int32)
+        for k, members in enumerate(groups.values()):
+            code[members] = k
+        elements[column] = code[elements["number"]]
+        names[column] = list(groups)
+    element, edge = np.divmod(joints["number"], 4)
+    count = np.where(mesh.cells[element, 3] >= 0, 4, 3)
+    joints["first"], joints["last"] = joints["number"], 4 * element + (edge + 1) % count
+    of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
+    clock = blocks.clock
+    return MeshFrame(int(clock.step), float(clock.time), float(clock.dt), of_corners, of_elements, of_joints, names)

@@ -1,0 +1,285 @@
+"""Histories: numbers that are recorded while the model runs, in memory and in `history_<name>.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.commands.fdem.choosing import chosen, everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.io.columns import append_rows
+from hpcdem.io.files import write_sections
+from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, Ids, Range
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.local import Local
+    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.probes import Probe
+
+MODEL = "model"
+UNITS = {
+    NODE: {
+        "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
+        "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m",
+    },
+    ELEMENT: {"stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa"},
+    JOINT: {
+        "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
+        "normal_stress_largest": "Pa", "normal_stress_first": "Pa", "normal_stress_middle": "Pa",
+        "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
+        "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
+    },
+    MODEL: {
+        "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",
+        "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
+        "contact_energy": "J/m", "viscous_loss": "J/m", "gravity_work": "J/m", "outside_work": "J/m",
+        "disc_work": "J/m", "energy_error": "J/m",
+    },
+}  # fmt: skip
+"""What can be recorded of each kind of object, with its unit."""
+_FORCES = ("reaction_x", "reaction_y")
+FLUSH = 500
+"""Records that wait at most before they go to the file."""
+
+
+def _of_joints(kind: int) -> Callable[[Any], float]:
+    return lambda blocks: float(blocks.joint_counts()[kind])
+
+
+def _energy(name: str) -> Callable[[Any], float]:
+    return lambda blocks: float(blocks.energies()[name])
+
+
+_OF_MODEL: dict[str, Callable[[Any], float]] = {
+    "time": lambda blocks: float(blocks.clock.time),
+    "cycle": lambda blocks: float(blocks.clock.step),
+    "ratio": lambda blocks: float(blocks.unbalanced_ratio()),
+    "intact_joints": _of_joints(0),
+    "yielded_joints": _of_joints(1),
+    "broken_joints": _of_joints(2),
+    "kinetic_energy": _energy("kinetic"),
+    "strain_energy": _energy("strain"),
+    "joint_energy": _energy("joints"),
+    "joint_loss": _energy("joints_lost"),
+    "contact_energy": _energy("contact"),
+    "viscous_loss": _energy("viscous_lost"),
+    "gravity_work": _energy("work_gravity"),
+    "outside_work": _energy("work_outside"),
+    "disc_work": _energy("work_discs"),
+    "energy_error": _energy("closing"),
+}
+ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")
+
+
+@dataclass
+class History:
+    """kind: of object, or MODEL; value: name of the quantity; numbers: of the objects; how: "", or sum, mean, minimum,
+    maximum of several; every: steps between two records; rows: (step, time, value); filed: rows that are in the
+    file."""
+
+    kind: str
+    value: str
+    numbers: list[int] = field(default_factory=list)
+    how: str = ""
+    every: int = 1
+    rows: list[tuple[int, float, float]] = field(default_factory=list)
+    filed: int = 0
+
+    def __post_init__(self) -> None:
+        self._probe: Probe | None = None
+        self._waits: tuple[int, float, Local, int] | None = None
+
+    @property
+    def unit(self) -> str:
+        return UNITS[self.kind][self.value]
+
+    @property
+    def waits(self) -> bool:
+        """Its record of this step comes with the forces of the next one."""
+        return self._waits is not None
+
+    def record(self, blocks: Blocks, goes_on: bool) -> None:
+        """Add the number of this step, once. goes_on: steps follow, in which the forces at the present positions are
+        computed anyway; those of supports are taken from there (`take`). Collective."""
+        clock = blocks.clock
+        if self.waits or (self.rows and self.rows[-1][0] == clock.step):
+            return
+        if goes_on and self.value in _FORCES:
+            probe = self._probe_of(blocks)
+            probe.find()
+            assert probe.local is not None
+            self._waits = int(clock.step), float(clock.time), probe.local, probe.local.passes
+        else:
+            self.rows.append((int(clock.step), float(clock.time), self.measure(blocks)))
+
+    def take(self, blocks: Blocks) -> None:
+        """Add the record that waits, if there is one. Collective."""
+        if self._waits is None:
+            return
+        step, time, local, passes = self._waits
+        self._waits = None
+        if local.passes == passes + 1:
+            self.rows.append((step, time, self._probe_of(blocks).reduced(self.how, local)))
+        elif step == blocks.clock.step:
+            self.rows.append((step, time, self.measure(blocks)))
+
+    def _probe_of(self, blocks: Blocks) -> Probe:
+        if self._probe is None or self._probe.sim is not blocks:
+            self._probe = blocks.probe(self.value, self.numbers)
+        return self._probe
+
+    def measure(self, blocks: Any) -> float:
+        """The number now. Collective, equal on all ranks."""
+        if self.kind == MODEL:
+            return _OF_MODEL[self.value](blocks)
+        return self._probe_of(blocks).reduced(self.how)
+
+
+def create(
+    project: Project,
+    name: str,
+    kind: str,
+    value: str,
+    ident: int | None = None,
+    nearest: tuple[float, float] | None = None,
+    how: str = "",
+    every: int = 1,
+    where: Range | None = None,
+) -> None:
+    """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
+    a range or of all (how: sum, mean, minimum, maximum), or of the model."""
+    file_name(name)
+    if name in project.histories:
+        raise CommandError(f"there is a history '{name}' already")
+    if value not in UNITS.get(kind, {}):
+        raise CommandError(f"a history of {kind} can follow {', '.join(UNITS.get(kind, {}))}, not {value}")
+    if value in ENERGIES and project.blocks.budget is None:
+        raise CommandError("no energy budget is kept: model option energy on comes first")
+    numbers: list[int] = []
+    if kind != MODEL:
+        if ident is not None:
+            found = chosen(project, kind, (Ids(ident, ident),))
+        elif nearest is not None:
+            found = np.array([_nearest(project, kind, nearest)])
+        elif where is not None:
+            found = chosen(project, kind, where)
+        else:
+            found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
+        assert found is not None
+        numbers = found.tolist()
+    project.histories[name] = History(kind, value, numbers, how, every)
+
+
+def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
+    mesh, xy = project.whole_mesh(), project.positions()
+    if kind == NODE:
+        return nearest_point(xy, at, np.flatnonzero(~np.isnan(xy[:, 0])))
+    if kind == ELEMENT:
+        return nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
+    edges = project.edges()
+    middles = xy[edges.points[edges.inner]].mean(axis=1)
+    there = np.flatnonzero(~np.isnan(middles[:, 0]))
+    if not len(there):
+        raise CommandError("the mesh has no joints: there is no edge between two elements")
+    return int(edges.faces[edges.inner, 0][nearest_point(middles, at, there)])
+
+
+def delete(project: Project, name: str) -> None:
+    """Stop a history. Its file stays."""
+    find(project, name)
+    flush(project)
+    del project.histories[name]
+
+
+def find(project: Project, name: str) -> History:
+    """A history by its name. CommandError if there is none."""
+    if name not in project.histories:
+        known = ", ".join(f"'{other}'" for other in project.histories) or "none so far"
+        raise CommandError(f"there is no history '{name}'; there is {known}")
+    return project.histories[name]
+
+
+def record(project: Project, goes_on: bool = False) -> None:
+    """Record what is due at this step. goes_on: steps follow in this command, see `History.record`. Collective."""
+    blocks = project.blocks
+    waiting = 0
+    with blocks.timers.around("history"), blocks.one_moment():
+        for history in project.histories.values():
+            history.take(blocks)
+            if blocks.clock.step % history.every == 0:
+                history.record(blocks, goes_on)
+            waiting = max(waiting, len(history.rows) - history.filed)
+    if waiting >= FLUSH:
+        _write(project)
+
+
+def wait(project: Project) -> bool:
+    """Records of this step come with the forces of the next one."""
+    return any(history.waits for history in project.histories.values())
+
+
+def flush(project: Project) -> None:
+    """Bring what was recorded to the files `history_<name>.csv` in the folder of the results. Collective."""
+    blocks = project.blocks
+    if wait(project):
+        with blocks.timers.around("history"), blocks.one_moment():
+            for history in project.histories.values():
+                history.take(blocks)
+    _write(project)
+
+
+def _write(project: Project) -> None:
+    for name, history in project.histories.items():
+        new = history.rows[history.filed :]
+        if not new:
+            continue
+        path = project.folder() / f"history_{file_name(name)}.csv"
+        header = f"step,time [s],{history.value} [{history.unit}]"
+        if not history.filed:  # a new model, or a restored one: the file holds what is in memory, no more
+            append_rows(path, header, [_line(row) for row in history.rows], 0, project.comm)
+        else:
+            append_rows(path, header, [_line(row) for row in new], None, project.comm)
+        history.filed = len(history.rows)
+
+
+def _line(row: Sequence[float]) -> str:
+    return ",".join(repr(number) for number in row)
+
+
+def file_name(name: str) -> str:
+    """A name that can be part of a file name. CommandError if it cannot."""
+    if any(char in '/\\:*?"<>|' for char in name) or len(name.encode()) > 200:
+        raise CommandError(f"'{name}' cannot be part of a file name; a history has a file of its name")
+    return name
+
+
+def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
+    """Write histories side by side as CSV into the folder of the results: step, time, one column each, empty where one
+    has no record. Collective."""
+    wanted = {name: find(project, name) for name in names} or project.histories
+    if not wanted:
+        raise CommandError("there is no history to write")
+    by_step: dict[int, dict[str, float]] = {}
+    times: dict[int, float] = {}
+    for name, history in wanted.items():
+        for step, time, value in history.rows:
+            times[step] = time
+            by_step.setdefault(step, {})[name] = value
+    titles = [_quoted(f"{name} {h.value} [{h.unit}]") for name, h in wanted.items()]
+    lines = [",".join(["step", "time [s]", *titles])]
+    for step in sorted(by_step):
+        cells = [repr(by_step[step][name]) if name in by_step[step] else "" for name in wanted]
+        lines.append(",".join([str(step), repr(times[step]), *cells]))
+    file = project.to_write(project.result(path))
+    project.folder()
+    write_sections(file, project.comm, lambda: [("\n".join(lines) + "\n").encode()])
+
+
+def _quoted(title: str) -> str:
+    doubled = title.replace('"', '""')
+    return f'"{doubled}"' if any(char in title for char in ',"') else title

@@ -1,0 +1,29 @@
+"""What Python in a script can ask of the model: numbers of objects, values, sums."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.commands.fdem.choosing import everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.physics.fdem.groups import Range
+
+
+def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
+    """Ascending numbers of the objects of a kind that a range chooses. Collective."""
+    return everything(project, kind, where)
+
+
+def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
+    """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
+    return project.ready(use=False).values(name, everything(project, kind, where))
+
+
+def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
+    """Exact sum of a quantity; of nodes over all corners there. Collective."""
+    return project.ready(use=False).total(name, everything(project, kind, where))
+
+
+def ratio(project: Project) -> float:
+    """Unbalanced over all forces of the nodes. Collective."""
+    return project.ready(use=False).unbalanced_ratio()

@@ -1,0 +1,237 @@
+"""Meshes of bodies, and the cracks in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
+from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
+from hpcdem.pre.mesh import cracks as cracks_of
+from hpcdem.pre.mesh import fractures, geometry, imported, quality, structured
+from hpcdem.pre.mesh import glue as glue_of
+from hpcdem.pre.mesh.once import made_once
+from hpcdem.pre.mesh.regions import polygon_of
+from hpcdem.pre.mesh.sizes import Refinement
+from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
+
+ARC_STEPS = 360
+"""Arcs of the outline of a fracture network stand for so many sides per its size."""
+
+
+def create(
+    project: Project,
+    outline: str,
+    size: float,
+    kind: str = "tri",
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+    refine: Sequence[tuple[str, float, float | None]] = (),
+    holes: Sequence[str] = (),
+    regions: Sequence[tuple[str, str]] = (),
+    embedded: Sequence[str] = (),
+    cracks: Sequence[str] = (),
+    irregular: bool = False,
+    smooth: bool = False,
+) -> None:
+    """Mesh the inside of a layer with Gmsh; kind: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
+    points in the middle of their neighbours. Collective.
+
+    refine: (layer, size there [m], distance over which it grows [m] or None); holes: layers whose inside stays empty;
+    regions: (layer, group) of parts with a group of their own; embedded: layers that become edges; cracks: layers that
+    become edges with a crack.
+    """
+    for layer in (outline, *(name for name, *_ in refine), *holes, *(name for name, _ in regions), *embedded, *cracks):
+        _ = project.layers[layer]
+    first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
+    wishes = Wishes(
+        [Region(outline, group, set_name), *(Region(layer, name, set_name) for layer, name in regions)],
+        size,
+        kind,
+        holes,
+        embedded,
+        [(layer, first + k) for k, layer in enumerate(cracks)],
+        refine=[Refinement(layer, fine, distance=distance) for layer, fine, distance in refine],
+        irregular=irregular,
+        smooth=smooth,
+    )
+    made: Meshed = made_once(project.comm, lambda: triangulate(project.layers, wishes))
+    for note in made.notes:
+        _say(project, note)
+    _add(project, made.mesh)
+
+
+def rectangle(
+    project: Project,
+    first: tuple[float, float],
+    second: tuple[float, float],
+    cells: tuple[int, int],
+    kind: str = "tri",
+    diagonal: str = "alternate",
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+    ratio: tuple[float, float] = (1.0, 1.0),
+) -> None:
+    """A regular mesh of the rectangle between two corners [m]; cells along x and y; ratio: each is so many times as
+    large as the one before. Its sides are the layers left, right, bottom and top."""
+    _add(project, structured.rectangle(*grid_lines(first, second, cells, ratio), kind, diagonal, (set_name, group)))
+
+
+def grid_lines(
+    first: tuple[float, float], second: tuple[float, float], cells: tuple[int, int], ratio: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates along x and along y [m] of such a mesh."""
+    x, y = (structured.spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
+    return x, y
+
+
+def equilateral(
+    project: Project,
+    first: tuple[float, float],
+    second: tuple[float, float],
+    size: float,
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+) -> None:
+    """Nearly equilateral triangles with edges of about `size` [m] in the rectangle between two corners [m]."""
+    corner = min(first[0], second[0]), min(first[1], second[1])
+    width, height = abs(second[0] - first[0]), abs(second[1] - first[1])
+    _add(project, structured.equilateral(corner, width, height, size, (set_name, group)))
+
+
+def import_file(
+    project: Project,
+    path: str,
+    group: str | None = None,
+    set_name: str = DEFAULT,
+    merge: float = 0.0,
+    scale: float = 1.0,
+) -> None:
+    """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
+    this are one [m]; scale: metres in a unit of the file."""
+    file = project.to_read(path)
+    mesh = made_once(project.comm, lambda: imported.import_mesh(file, merge, scale))
+    first = 0 if project.mesh is None else len(project.mesh.cells)
+    _add(project, mesh)
+    if group is not None:
+        project.groups["element"].assign(range(first, first + len(mesh.cells)), group, set_name)
+
+
+def intersect(project: Project, layer: str, follow: bool = False) -> None:
+    """The joints on a layer become cracks. follow: its lines are no edges of the mesh, those that follow them best are
+    taken."""
+    mesh = project.whole_mesh()
+    number = int(mesh.crack_sets.max(initial=-1)) + 1
+    if follow:
+        size = float(np.sqrt(mesh.areas().mean()))
+        cracked = cracks_of.follow(mesh, fractures.of_curves(project.layers[layer], number, size))
+    else:
+        pairs = mesh.layers[layer] if layer in mesh.layers else cracks_of.edges_on(mesh, project.layers[layer])
+        cracked = cracks_of.with_cracks(mesh, pairs, number)
+    if len(cracked.cracks) == len(mesh.cracks):
+        advice = "" if follow else "; with follow the nearest edges are taken"
+        raise CommandError(f"no joint lies on layer '{layer}'{advice}")
+    if project.in_use:
+        edges = mesh.edges()
+        new = ~np.isin(crack_rows(cracked, edges), crack_rows(mesh, edges))
+        joints = edges.faces[crack_rows(cracked, edges)[new]]
+        project.blocks.crack(joints[project.alive[joints // 4].all(axis=1), 0])  # others are, once they are back
+        project.mesh = cracked
+    else:
+        project.replace_mesh(cracked)
+
+
+def glue(
+    project: Project,
+    tolerance: float | None = None,
+    between: tuple[str, str] | None = None,
+    set_name: str = DEFAULT,
+) -> None:
+    """Bodies that were meshed separately hang together where their faces coincide: these become joints, as inside of a
+    body. tolerance [m]: points nearer than this are one; between: only faces between the elements of two groups."""
+    mesh = project.whole_mesh()
+    project.refuse_in_use("bodies are glued")
+    sides = None
+    if between is not None:
+        one, other = (project.groups[ELEMENT].members(name, set_name) for name in between)
+        numbers = np.arange(len(mesh.cells))
+        sides = np.isin(numbers, one), np.isin(numbers, other)
+    made = glue_of.glued(mesh, tolerance, sides)
+    project.merge_points(made.mesh, made.points)
+    _say(
+        project,
+        f"glue: {made.faces} faces of different bodies are joints now, {len(mesh.points) - len(made.mesh.points)} "
+        f"points have become one with another (within {made.tolerance:g} m)",
+    )
+
+
+def tell_quality(project: Project) -> None:
+    """Sizes and angles of the mesh, in the log."""
+    for line in quality.quality(project.whole_mesh()).lines():
+        _say(project, line)
+
+
+def fracture_set(
+    orientation: tuple[str, float, float],
+    length: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    scanline: float,
+    ends_at: float,
+    reached: bool,
+) -> fractures.FractureSet:
+    """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
+    greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see pre.mesh.fractures."""
+    longest = math.inf if length[4] is None else length[4]
+    return fractures.FractureSet(
+        fractures.Orientation(*orientation), fractures.Length(*length[:4], longest), *density, scanline,
+        "reached" if reached else "random", ends_at,
+    )  # fmt: skip
+
+
+def fracture_network(
+    project: Project,
+    layer: str,
+    inside: str,
+    orientation: tuple[str, float, float],
+    length: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    seed: int,
+    holes: Sequence[str] = (),
+    scanline: float = 0.0,
+    ends_at: float = 0.0,
+    reached: bool = False,
+    least: float = 0.0,
+) -> None:
+    """A set of fractures with given statistics (see `fracture_set`) inside of a layer becomes lines of another one;
+    least: shorter pieces at the rim are left out [m]. Collective."""
+    outline = project.layers[inside]
+    for hole in holes:
+        _ = project.layers[hole]
+    size = max(curve.length() for curve in outline) / ARC_STEPS
+    if size <= 0.0:
+        raise CommandError(f"layer '{inside}' has no closed line")
+    one = fracture_set(orientation, length, density, scanline, ends_at, reached)
+    number, project.networks = project.networks, project.networks + 1
+
+    def make() -> fractures.Fractures:
+        return fractures.network([one], polygon_of(project.layers, [inside], size, holes), seed, least, number)
+
+    found = made_once(project.comm, make)
+    project.layers.add(layer, *(geometry.polyline(ends.tolist()) for ends in found.ends))
+    _say(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
+
+
+def _add(project: Project, mesh: Mesh) -> None:
+    check(mesh)
+    project.add_mesh(mesh)
+    triangles = int((mesh.cells[:, 3] < 0).sum())
+    _say(project, f"mesh: {triangles} triangles, {len(mesh.cells) - triangles} quads, {len(mesh.points)} points")
+
+
+def _say(project: Project, text: str) -> None:
+    if project.log is not None:
+        project.log.info(text)

@@ -1,0 +1,73 @@
+"""model new, gravity, option, time-step; reset."""
+
+from __future__ import annotations
+
+from hpcdem.commands.fdem.choosing import chosen
+from hpcdem.commands.fdem.histories import ENERGIES
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
+
+
+def new(project: Project) -> None:
+    """A new model: no geometry, no mesh, step 0, default options."""
+    project.clear()
+
+
+def gravity(project: Project, g: tuple[float, float]) -> None:
+    """Gravity (2,) [m/s2] from now on."""
+    project.blocks.gravity(*g)
+
+
+def option(
+    project: Project,
+    dynamic: bool | None = None,
+    collision: bool | None = None,
+    large_strain: bool | None = None,
+    overlap: str | None = None,
+    energy: bool | None = None,
+) -> None:
+    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
+    energy: keep the energy budget from here on."""
+    if dynamic is not None:
+        project.dynamic = dynamic
+    if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
+        project.blocks.option(dynamic=dynamic, collision=collision, large_strain=large_strain, overlap=overlap)
+    if energy is not None:
+        needed = [name for name, history in project.histories.items() if history.value in ENERGIES]
+        if not energy and needed:
+            raise CommandError(f"history '{needed[0]}' follows the energy budget: history delete '{needed[0]}' first")
+        project.ready().account_energy(energy)
+
+
+def time_step(
+    project: Project,
+    value: float | None = None,
+    auto: bool | None = None,
+    safety: float | None = None,
+    mass_scaling: float | None = None,
+) -> None:
+    """The time step of dynamic runs [s]; see `Blocks.time_step`."""
+    project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)
+    if value or mass_scaling or auto is not None:
+        project.adapts = bool(auto)
+
+
+def reset_velocity(project: Project) -> None:
+    """All velocities become zero."""
+    project.ready().reset_velocity()
+
+
+def reset_displacement(project: Project) -> None:
+    """Displacements are counted from here."""
+    project.ready().reset_displacement()
+
+
+def reset_elements(project: Project, where: Range | None = None) -> None:
+    """Plastic states are forgotten."""
+    project.ready().reset_state(chosen(project, ELEMENT, where))
+
+
+def reset_joints(project: Project, where: Range | None = None) -> None:
+    """Damage of joints is forgotten."""
+    project.ready().reset_joint_state(chosen(project, JOINT, where))

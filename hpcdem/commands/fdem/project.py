@@ -1,0 +1,252 @@
+"""What a script of blocks has at hand: the simulation, geometry layers, the mesh, groups, what is recorded."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.connectivity import Edges
+from hpcdem.physics.fdem.groups import ELEMENT, KINDS, NODE, Groups
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.pre.mesh.geometry import Layers
+from hpcdem.runtime import launch, run_folder
+
+if TYPE_CHECKING:
+    from hpcdem.commands.dem.running import Due
+    from hpcdem.commands.fdem.charts import Chart
+    from hpcdem.commands.fdem.histories import History
+    from hpcdem.physics.coupling.model import Coupled
+    from hpcdem.physics.fdem.model import Blocks
+
+
+class Project:
+    """blocks: the simulation (its comm, log and stop are used); directory: where file names begin; outdir: folder of
+    the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
+
+    layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object; alive (ne,) bool: elements
+    that are not null; histories, charts and frames (steps between two by name) that are kept up; cracks_filed: broken
+    joints that are in their file, None: the file is not of this model yet; framed: step of the last frame by name;
+    dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
+    fractures made so far; solved: how the last `model solve` ended, reason, ratio and steps; line:
+    of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
+    the way to where the script is; progress: of the command that steps at this moment, see running.py; resumed: this
+    run goes on from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
+    when the log spoke last of a line of the script that steps; coupled: the particles that are stepped with the
+    blocks; continues: the checkpoint from which they go on, asleep: the number of these particles, which are empty
+    until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint knows nothing
+    of methods of particles; stepping: the name of that command, "" if there is none; inputs: files that the script
+    reads, by their real paths, in words; made: files that were written by name.
+    """
+
+    def __init__(self, blocks: Blocks, directory: Path | str = ".", outdir: Path | str = "data") -> None:
+        self.blocks = blocks
+        self.directory = Path(directory)
+        self.outdir = Path(outdir)
+        self.job: Any = None
+        self.keep = 0
+        self.line = 0
+        self.folder_made = False
+        self.names: Callable[[], dict[str, Any]] = dict
+        self.place: Callable[[], dict[str, Any] | None] = lambda: None
+        self.progress: dict[str, Any] | None = None
+        self.resumed = False
+        self.restored: tuple[Path, int] | None = None
+        self.told: dict[int, float] = {}
+        self.coupled: Coupled | None = None
+        self.continues: Path | None = None
+        self.inputs: dict[str, str] = {}
+        self.made: set[str] = set()
+        self.asleep: int | None = None
+        self.calls_lost = False
+        self.due: Due | None = None
+        self.stepping = ""
+        self._forget()
+
+    @property
+    def comm(self) -> Any:
+        """The communicator."""
+        return self.blocks.comm
+
+    @property
+    def log(self) -> Any:
+        """The log, or None."""
+        return self.blocks.log
+
+    @property
+    def step(self) -> int:
+        """Steps done."""
+        return int(self.blocks.clock.step)
+
+    def refuse_inside(self, what: str) -> None:
+        """CommandError in a function that is called in the middle of a command that steps."""
+        if self.stepping:
+            raise CommandError(
+                f"{what} cannot be used by a function that is called in the middle of model {self.stepping}"
+            )
+
+    def clear(self) -> None:
+        """A new model."""
+        self.refuse_inside("model new")
+        if self.coupled is not None:
+            self.coupled.release()
+        self.coupled = self.continues = None
+        self.blocks.clear()
+        self._forget()
+
+    def _forget(self) -> None:
+        self.layers = Layers()
+        self.mesh: Mesh | None = None
+        self._edges: tuple[np.ndarray, Edges] | None = None
+        self.alive = np.empty(0, bool)
+        self.groups = {kind: Groups(kind) for kind in KINDS}
+        self.histories: dict[str, History] = {}
+        self.cracks_filed: int | None = None
+        self.charts: dict[str, Chart] = {}
+        self.frames: dict[str, int] = {}
+        self.framed: dict[str, int] = {}
+        self.dynamic = True
+        self.adapts = False
+        self.networks = 0
+        self.solved: dict[str, Any] = {}
+        self.taken = False
+        self.in_use = False
+
+    # ---- the mesh ------------------------------------------------------------------------------------------------
+
+    def add_mesh(self, mesh: Mesh) -> None:
+        """One more body. CommandError if models or conditions were assigned to the mesh already."""
+        self.refuse_in_use("all bodies are meshed")
+        first = 0 if self.mesh is None else len(self.mesh.cells)
+        self.mesh = mesh if self.mesh is None else joined(self.mesh, mesh)
+        for set_name, of in mesh.groups.items():
+            for name, numbers in of.items():
+                self.groups[ELEMENT].assign(numbers + first, name, set_name)
+        self.alive = np.concatenate([self.alive, np.ones(len(mesh.cells), bool)])
+        self.taken = False
+
+    def refuse_in_use(self, what: str) -> None:
+        """CommandError if models or conditions were assigned to the mesh already."""
+        if self.in_use:
+            raise CommandError(
+                f"the mesh has models or conditions already: {what} before the first of them is assigned"
+            )
+
+    def merge_points(self, mesh: Mesh, number: np.ndarray) -> None:
+        """The same elements with fewer points; number (np,): the new one of each. Of points that were in several groups
+        of a set the lowest counts."""
+        self.replace_mesh(mesh)
+        for sets in self.groups[NODE].sets.values():
+            lowest = np.full(len(mesh.points), len(number))
+            for members in sets.values():
+                np.minimum.at(lowest, number[members], members)
+            for name, members in sets.items():
+                sets[name] = np.unique(number[members[lowest[number[members]] == members]])
+        for history in self.histories.values():
+            if history.kind == NODE:
+                history.numbers = np.unique(number[history.numbers]).tolist()
+
+    def edges(self) -> Edges:
+        """The edges of the mesh."""
+        mesh = self.whole_mesh()
+        if self._edges is None or self._edges[0] is not mesh.cells:
+            self._edges = mesh.cells, mesh.edges()
+        return self._edges[1]
+
+    def whole_mesh(self) -> Mesh:
+        """The mesh. CommandError if there is none."""
+        if self.mesh is None:
+            raise CommandError("there is no mesh yet: mesh create, mesh structured or mesh import comes first")
+        return self.mesh
+
+    def replace_mesh(self, mesh: Mesh) -> None:
+        """The same points and elements with other cracks."""
+        self.mesh = mesh
+        self.taken = False
+
+    def ready(self, use: bool = True) -> Blocks:
+        """The simulation, with the mesh taken. use: something is assigned to it or it is run, so the mesh stays."""
+        mesh = self.whole_mesh()
+        if not self.taken:
+            self.blocks.place_mesh(mesh)  # each body was checked; those that touch have points in the same places
+            self.taken = True
+        self.in_use = self.in_use or use
+        return self.blocks
+
+    def positions(self) -> np.ndarray:
+        """(np, 2) where the nodes are now [m]; NaN where there is none any more."""
+        mesh = self.whole_mesh()
+        if not self.taken or self.step == 0:
+            return mesh.points
+        return np.column_stack([self.blocks.values(f"position_{axis}") for axis in "xy"])
+
+    def corner_positions(self) -> np.ndarray:
+        """(4 ne, 2) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
+        mesh = self.whole_mesh()
+        if not self.taken or self.step == 0:
+            return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, 2)
+        return self.blocks.corner_values("position")
+
+    # ---- files ---------------------------------------------------------------------------------------------------
+
+    def path(self, name: str) -> Path:
+        """A file of the script: beside it, unless the name says otherwise."""
+        return self.directory / name
+
+    def to_read(self, name: str, what: str = "") -> Path:
+        """A file that the script reads, beside it; nothing is written over it unless this run has made it."""
+        path = self.path(name)
+        real = os.path.realpath(path)
+        if real not in self.made:
+            self.inputs.setdefault(real, what or f"'{name}', which this run has read")
+        return path
+
+    def to_write(self, path: Path) -> Path:
+        """A file that is about to be written. CommandError if it is the script, or one that was read."""
+        real = os.path.realpath(path)
+        if real in self.inputs:
+            raise CommandError(f"{path} would be written over {self.inputs[real]}; give it another name")
+        self.made.add(real)
+        return path
+
+    def result(self, name: str) -> Path:
+        """A file in the folder of the results, unless the name says otherwise."""
+        return self.outdir / name
+
+    def folder(self) -> Path:
+        """The folder of the results, made and locked on the first call. Collective."""
+        if not self.folder_made:
+            job = self.job or run_folder.Job()
+            locked = run_folder.enter(self.outdir, self.comm, job, launch.version(), self.resumed, self.restored)
+            self.folder_made = True
+            if not locked and self.log is not None:
+                why = f"the file system of {self.outdir} has no locks"
+                self.log.warn_once("lock", f"{why}: nobody will notice if two runs write there at once")
+        return self.outdir
+
+
+def joined(one: Mesh, other: Mesh) -> Mesh:
+    """Two bodies in one mesh: numbers of the second follow those of the first, equal names are united, nothing is
+    merged."""
+    n_points, n_cells = len(one.points), len(one.cells)
+    groups = {s: dict(of) for s, of in one.groups.items()}
+    for set_name, of in other.groups.items():
+        mine = groups.setdefault(set_name, {})
+        for name, numbers in of.items():
+            mine[name] = np.concatenate([mine.get(name, np.empty(0, np.int64)), numbers + n_cells])
+    layers = dict(one.layers)
+    for name, pairs in other.layers.items():
+        layers[name] = np.concatenate([layers.get(name, np.empty((0, 2), np.int64)), pairs + n_points])
+    sets = one.crack_sets.max(initial=-1) + 1
+    return Mesh.of(
+        np.concatenate([one.points, other.points]),
+        np.concatenate([one.cells, np.where(other.cells >= 0, other.cells + n_points, -1)]),
+        groups,
+        layers,
+        np.concatenate([one.cracks, other.cracks + n_points]),
+        np.concatenate([one.crack_sets, other.crack_sets + sets]),
+    )

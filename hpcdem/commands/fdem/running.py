@@ -1,0 +1,300 @@
+"""model step and model solve: the loop over steps, and what is due between them."""
+
+from __future__ import annotations
+
+import math
+import time as clocks
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hpcdem.commands.fdem import coupling, cracks, frames, histories, saving
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.io.behind import under_way
+from hpcdem.physics.fdem.solving import RATIO, Watch
+from hpcdem.runtime.progress import duration, rate
+from hpcdem.runtime.stopping import STOP
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.model import Blocks
+
+LOOK_STATIC, LOOK_DYNAMIC = 50, 100
+"""Steps between two looks at the ratio, counted from the beginning of the command."""
+STRIDE = 100
+"""Steps at most between two looks at the model time, as the time step may change."""
+CONTINUE = "continue"
+"""What a script may do when a run towards a ratio has failed; else it stops."""
+FAILED = ("no progress", "limit")
+"""Reasons of `blocks.Watch`; "runaway": a body moved too fast to go on."""
+QUIET_SECONDS = 10.0
+"""Between two lines of the log."""
+
+
+def step(project: Project, steps: int) -> None:
+    """So many steps."""
+    _run(project, f"step {steps}", steps, None, None)
+
+
+def solve(
+    project: Project,
+    ratio: float | None = None,
+    cycles: int | None = None,
+    time: float | None = None,
+    window: int | None = None,
+    limit: int | None = None,
+    on_failure: str = "stop",
+) -> None:
+    """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whatever comes
+    first. Without any of them: until the ratio is RATIO.
+
+    window, limit [steps]: when a run towards a ratio has failed, see `Blocks.watch`; it ends the script with an
+    EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
+    """
+    words = [f"{name} {value:g}" for name, value in (("ratio", ratio), ("cycles", cycles), ("time", time)) if value]
+    if ratio is None and cycles is None and time is None:
+        ratio = RATIO
+        words = [f"ratio {ratio:g}"]
+    if time is not None and not project.dynamic:
+        raise CommandError("time does not pass in static runs: use ratio or cycles")
+    first = project.step if project.progress is None else project.progress["first"]
+    text = ""
+    try:
+        reason, found, watch = _run(project, "solve " + " ".join(words), cycles, ratio, time, window, limit)
+        if reason in FAILED:
+            text = _no_equilibrium(project, watch, reason, ratio or RATIO, found)
+    except EquilibriumError as error:
+        reason, found, text = "runaway", math.nan, f"no equilibrium: {error}; {_what_moves(project)}"
+    project.solved = {"reason": reason, "ratio": found, "steps": project.step - first}
+    if text and on_failure != CONTINUE:
+        raise EquilibriumError(text)
+    if text and project.log is not None:
+        project.log.warn(text)
+
+
+def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto") -> None:
+    """Static equilibrium at once, see `Blocks.solve_elastic`; the histories and frames that are due then."""
+    project.refuse_inside("model solve elastic")
+    coupling.refuse(project, "model solve elastic")
+    blocks = project.ready()
+    began = clocks.monotonic()
+    given = {} if ratio is None else {"ratio": ratio}
+    found = blocks.solve_elastic(cycles=cycles, solver=solver, **given)
+    project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
+    if project.log is not None:
+        where = f"line {project.line}: " if project.line else ""
+        project.log.info(
+            f"{where}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations, "
+            f"{found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
+        )
+    histories.record(project)
+    frames.write_due(project)
+    histories.flush(project)
+    frames.settle(project)
+
+
+def _run(
+    project: Project, name: str, steps: int | None, ratio: float | None, time: float | None,
+    window: int | None = None, limit: int | None = None,
+) -> tuple[str, float, Watch]:  # fmt: skip
+    """Step, and write what is due. Returns why it ended, "ratio", "cycles", "time", "function" (one of the particles
+    wanted it to) or one of FAILED, the last ratio that was looked at (NaN: none), and who looked."""
+    project.refuse_inside(f"model {name}")
+    coupling.take_up(project)
+    clock = project.ready().clock
+    _settle_time_step(project)
+    if time is not None and project.progress is None and time <= 0.5 * clock.dt and project.log is not None:
+        project.log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
+    if project.progress is None:
+        project.progress = {"first": clock.step, "end": None if time is None else clock.time + time}
+        if ratio is not None:
+            ends = steps is not None or time is not None
+            project.progress["watch"] = asdict(project.blocks.watch(window, limit, ends))
+    first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
+    alone = steps if ratio is None and time is None else None  # the number of steps, if it is known
+    try:
+        with coupling.stepping(project, name, alone):
+            project.stepping = name
+            ended = _advance(project, name, first, math.inf if steps is None else first + steps,
+                             math.inf if end is None else end, ratio)  # fmt: skip
+        frames.settle(project)
+        return ended
+    finally:
+        under_way.wait()  # the way out after an error, too
+        project.progress, project.stepping = None, ""
+
+
+def _advance(
+    project: Project, name: str, first: int, last: float, end: float, ratio: float | None
+) -> tuple[str, float, Watch]:
+    """To step `last` or model time `end` [s], whatever comes first; see `_run`."""
+    blocks, clock, progress = project.blocks, project.blocks.clock, project.progress
+    assert progress is not None
+    # A checkpoint of a version that did not watch has none.
+    watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
+    reason, found = progress.get("ended", ["", math.nan])
+    look = LOOK_DYNAMIC if project.dynamic else LOOK_STATIC
+    report = _Report(project, name, last)
+    frames.write_due(project)
+    while clock.step < last and clock.time < end - 0.5 * clock.dt and not progress.get("done"):
+        due = min(last, _after(clock.step, STRIDE, first), coupling.next_checkpoint(project))
+        due = min([due, *(_after(clock.step, every, 0) for every in _intervals(project))])
+        if histories.wait(project):
+            due = clock.step + 1
+        if ratio is not None:
+            due = min(due, _after(clock.step, look, first))
+        try:
+            request = coupling.advance(project, int(min(due - clock.step, _within(project, end))))
+        except (EquilibriumError, PhysicsError):
+            histories.flush(project)
+            cracks.flush(project)
+            frames.write_last(project)
+            raise
+        _settle_time_step(project)
+        more = not request and clock.step < last and clock.time < end - 0.5 * clock.dt
+        histories.record(project, more)
+        cracks.record(project)
+        frames.write_due(project)
+        if ratio is not None and ((clock.step - first) % look == 0 or clock.step == last):
+            found = blocks.unbalanced_ratio()
+            reason = "ratio" if found <= ratio else watch.failed(clock.step, found, blocks.joint_counts()[2])
+            done = progress.get("done", False) or bool(reason)
+            progress.update(watch=asdict(watch), done=done, ended=[reason, found])
+        report.tell(blocks)
+        if coupling.checkpoint_is_due(project):
+            histories.flush(project)
+            cracks.flush(project)
+            saving.write_checkpoint(project)
+        if reason:  # a request is answered by the next command: nothing is left to do in this one
+            break
+        if request:
+            _answer(project, request)
+    histories.flush(project)
+    cracks.flush(project)
+    report.finish(blocks)
+    over = "cycles" if clock.step >= last else "function" if progress.get("done") else "time"
+    return reason or over, found, watch
+
+
+def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, found: float) -> str:
+    """What is said of a run that has failed, with the body that slides away. Collective."""
+    step = project.step
+    why = {
+        "limit": f"after {step - watch.began} steps, the limit",
+        "no progress": f"for {step - watch.progress} steps the ratio has not fallen by a tenth",
+    }[reason]
+    return (
+        f"no equilibrium: {why}; the ratio is {found:.3g}, the least was {watch.least:.3g}, asked {ratio:g}; "
+        f"{_what_moves(project)}"
+    )
+
+
+def _what_moves(project: Project) -> str:
+    """The body that slides away, or that there is none. Collective."""
+    body = project.blocks.sliding_body()
+    if body is None:
+        return "no body slides away: joints may go on to yield, loads to change, or rounding allows no better balance"
+    return f"{body} {'m/s' if project.dynamic else 'm per step'}: hold it, or give it time to come to rest (window)"
+
+
+def _settle_time_step(project: Project) -> None:
+    """Give the clock the time step of the model as it is now: how many steps a time takes follows from it. Coupled
+    blocks have the one that was settled with the particles."""
+    if project.coupled is None:
+        project.blocks.close_model()
+
+
+def _within(project: Project, end: float) -> float:
+    """Steps to the moment nearest to a model time, at least one. Near the end one at a time if dt may change on the
+    way: where the run ends must not depend on where it was interrupted."""
+    clock = project.blocks.clock
+    if not math.isfinite(end):
+        return math.inf
+    steps = max(1, math.ceil((end - clock.time) / clock.dt - 0.5))
+    return 1 if project.adapts and steps <= 2 * STRIDE else steps
+
+
+def _intervals(project: Project) -> list[int]:
+    return [history.every for history in project.histories.values()] + list(project.frames.values())
+
+
+def _after(step: int, every: int, origin: int) -> int:
+    """The first step after this one that is a multiple of `every` from the origin on."""
+    return origin + ((step - origin) // every + 1) * every
+
+
+def stop_here(project: Project, request: int) -> None:
+    """A command is about to be carried out, and none that steps has answered a signal or the time limit that asked for
+    the end: between two commands is a good place. Collective; the request is the same on all ranks."""
+    if request >= STOP:
+        _answer(project, request)
+
+
+def _answer(project: Project, request: int) -> None:
+    """A signal or the time limit asked for a checkpoint, perhaps for the end."""
+    stop, log, step = project.blocks.stop, project.log, project.step
+    what = stop.decide(request)
+    if what == "none":
+        return
+    histories.flush(project)
+    cracks.flush(project)
+    path = saving.write_checkpoint(project, automatic=what == "auto")
+    if what == "stop":
+        raise StoppedWithCheckpoint(
+            f"stopped at step {step} by {stop.reason}; checkpoint {path} written, go on with {_onwards(project, path)}"
+        )
+    if log is not None:
+        why = "as the last one was long ago" if what == "auto" else "on request"
+        log.info(f"step {step}: checkpoint {path} written {why}")
+
+
+def _onwards(project: Project, path: Path) -> str:
+    place = project.place()
+    return "--resume" if place is not None and place["journal"] is not None else f"pcdc model restore '{path}'"
+
+
+class _Report:
+    """What the log says of a run: a line at its beginning, one every QUIET_SECONDS, one at its end. Of a line of the
+    script that runs again and again, as in a loop, it speaks every QUIET_SECONDS only."""
+
+    def __init__(self, project: Project, name: str, last: float) -> None:
+        self.project, self.last = project, last
+        self.began = self.told = clocks.monotonic()
+        self.began_step = self.told_step = project.step
+        before = project.told.get(project.line)
+        self.speaks = project.comm.bcast(before is None or self.began - before >= QUIET_SECONDS)
+        where = f"line {project.line}: " if project.line else ""
+        if project.log is not None and self.speaks:
+            project.told[project.line] = self.began
+            project.log.info(f"{where}{name}")
+
+    def tell(self, blocks: Blocks) -> None:
+        """Collective: the line, if one is due."""
+        now = clocks.monotonic()
+        if self.project.log is None or not self.project.comm.bcast(now - self.told >= QUIET_SECONDS):
+            return
+        done = blocks.clock.step - self.told_step
+        speed = done / max(now - self.told, 1e-9)
+        left = f" | left {duration((self.last - blocks.clock.step) / speed)}" if self.last < math.inf and speed else ""
+        under_way.look(self.project.comm)
+        elements = int(self.project.alive.sum())
+        self.project.log.info(
+            f"{self._state(blocks)} | {rate(speed)} steps/s, {rate(speed * elements)} element-steps/s{left}"
+        )
+        self.told, self.told_step, self.speaks = now, blocks.clock.step, True
+
+    def _state(self, blocks: Blocks) -> str:
+        clock = blocks.clock
+        intact, yielded, broken = blocks.joint_counts()
+        joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
+        time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
+        return f"step {clock.step}{time} | ratio {blocks.unbalanced_ratio():.3g}{joints}"
+
+    def finish(self, blocks: Blocks) -> None:
+        """Collective: how it ended."""
+        if self.project.log is None or not self.speaks:
+            return
+        state, steps = self._state(blocks), blocks.clock.step - self.began_step
+        spent = clocks.monotonic() - self.began
+        speed = steps * int(self.project.alive.sum()) / max(spent, 1e-9)
+        self.project.log.info(f"{state} | {steps} steps in {duration(spent)}, {rate(speed)} element-steps/s")

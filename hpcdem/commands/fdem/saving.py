@@ -1,0 +1,170 @@
+"""model save and restore: the simulation, and what the script has prepared for it, in one file."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.commands.fdem import coupling, frames
+from hpcdem.commands.fdem.charts import Chart, Curve
+from hpcdem.commands.fdem.histories import History, flush
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError, UsageError
+from hpcdem.physics.fdem.groups import Groups
+from hpcdem.pre.mesh.geometry import Layers
+from hpcdem.runtime import checkpoints, run_folder
+
+FORMAT = 1
+"""Of what is saved beside the simulation."""
+
+
+def save(project: Project, path: str) -> None:
+    """The whole state to a file beside the script. Collective."""
+    _write(project, project.to_write(project.path(path)), {"names": project.names()})
+
+
+def write_checkpoint(project: Project, automatic: bool = False) -> Path:
+    """The whole state into the folder of the results, `<step>.sav`, and the place in the script with it; returns its
+    path. Checkpoints that are too many are removed. Collective."""
+    path = project.folder() / run_folder.checkpoint_name(project.step, automatic)
+    try:
+        names = project.names()
+    except CommandError as error:  # nobody asked for it here, so it must not end the run
+        names = {}
+        if project.log is not None:
+            project.log.warn_once("names", f"{error}; checkpoints of this run hold no m_ names")
+    place = project.place()
+    journal = place.get("journal") if place is not None else None
+    particles = None if project.coupled is None else project.coupled.particles.number
+    run = {**(place or {}), "progress": project.progress, "particles": particles}
+    more = {"run": run, "position": len(journal or ())}
+    _write(project, path, {"names": names, **more})
+    run_folder.retire(path.parent, project.comm, project.step, project.keep)
+    return path
+
+
+def _write(project: Project, path: Path, more: dict[str, Any]) -> None:
+    if project.mesh is not None:
+        project.ready(use=False)
+    frames.settle(project)
+    began = time.perf_counter()
+    coupling.save(project, path, {"project": _state(project), **more})
+    if project.blocks.stop is not None:
+        project.blocks.stop.saved(time.perf_counter() - began)
+
+
+def restore(project: Project, path: str) -> dict[str, Any]:
+    """The state of a file; returns the names (of variables and functions) that were saved with it. Collective.
+
+    CommandError if there is no such file, or if it is no checkpoint of blocks; the model is then as it was.
+    """
+    project.refuse_inside("model restore")
+    flush(project)
+    file = project.to_read(path)
+    names = dict(_restored(project, file).get("names") or {})
+    project.restored = file, project.step
+    return names
+
+
+def take_up(project: Project) -> list[Any] | None:
+    """Take the state of the newest whole checkpoint in the folder of the results, which a run of the same script wrote;
+    returns its journal (lang.pcdc.journal), None if there is no checkpoint. Collective. A damaged file is named in the
+    log and the one before it is tried. UsageError if the script cannot be brought back to where it was written."""
+    folder, comm, log = project.outdir, project.comm, project.log
+    found, damaged = checkpoints.newest_first([folder]) if comm.rank == 0 else ([], [])
+    for error in damaged:
+        log.warn(f"{error}; it is passed over")
+    for path in comm.bcast(found):
+        try:
+            extra = _restored(project, path, begins=True)
+        except CommandError as error:
+            log.warn(f"{error}; trying the checkpoint before it")
+            project.clear()
+            continue
+        log.info(f"going on from {path}, step {project.step}")
+        run = extra.get("run")
+        journal = run.get("journal") if isinstance(run, dict) else None
+        if not isinstance(run, dict) or not isinstance(journal, list):
+            raise UsageError(
+                f"{path} does not tell how the script came to where it was; go on with a script of your own that "
+                f"begins with pcdc model restore '{path}'"
+            )
+        project.progress, project.resumed = run.get("progress"), True
+        project.asleep, project.calls_lost = run.get("particles"), "particles" not in run
+        return journal
+    log.info(f"no checkpoint in {folder}: starting at the beginning")
+    return None
+
+
+def _restored(project: Project, path: Path, begins: bool = False) -> dict[str, Any]:
+    """Take the state of a file; returns what was saved with it. begins: the script has still to run."""
+    extra = coupling.restore(project, path, begins)
+    state = extra.get("project")
+    if not isinstance(state, dict) or state.get("format", 0) > FORMAT:
+        raise CommandError(f"{path} was not saved by this language, or by a later version of it")
+    try:
+        _take(project, state)
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
+        raise CommandError(f"{path} is damaged: {problem!r}") from None
+    project.progress = None
+    return extra
+
+
+def _state(project: Project) -> dict[str, Any]:
+    """What the project holds beside the simulation, as JSON values."""
+    return {
+        "format": FORMAT,
+        "layers": {name: values.tolist() for name, values in project.layers.tables().items()},
+        "groups": {kind: groups.state() for kind, groups in project.groups.items()},
+        "null": np.flatnonzero(~project.alive).tolist(),
+        "histories": {name: asdict(history) for name, history in project.histories.items()},
+        "charts": {name: asdict(chart) for name, chart in project.charts.items()},
+        "frames": project.frames,
+        "framed": project.framed,
+        "dynamic": project.dynamic,
+        "adapts": project.adapts,
+        "in_use": project.in_use,
+        "networks": project.networks,
+        "solved": {name: None if value != value else value for name, value in project.solved.items()},
+    }
+
+
+def _take(project: Project, state: dict[str, Any]) -> None:
+    tables = {name: np.array(values) for name, values in state["layers"].items()}
+    tables["layer_names"] = np.array(state["layers"]["layer_names"], dtype=object)
+    for name in ("points", "bulges"):
+        tables[name] = tables[name].astype(np.float64)
+    tables["points"] = tables["points"].reshape(-1, 2)
+    layers = Layers.from_tables(tables)
+    groups = {kind: Groups.restored(kind, of) for kind, of in state["groups"].items()}
+    histories = {name: _history(given) for name, given in state["histories"].items()}
+    charts = {
+        name: Chart(given["title"], given["x_label"], given["y_label"], [_curve(curve) for curve in given["curves"]])
+        for name, given in state["charts"].items()
+    }
+    mesh = project.blocks.mesh
+    alive = np.ones(0 if mesh is None else len(mesh.cells), bool)
+    alive[np.array(state["null"], np.int64)] = False
+    project.layers, project.mesh, project.alive = layers, mesh, alive
+    project.groups.update(groups)
+    project.histories, project.charts, project.frames = histories, charts, dict(state["frames"])
+    project.framed, project.cracks_filed = dict(state["framed"]), None
+    project.networks = int(state["networks"])
+    solved = state.get("solved", {})  # versions before did not keep it
+    project.solved = {name: math.nan if value is None else value for name, value in solved.items()}
+    project.adapts = bool(state["adapts"])
+    project.dynamic, project.in_use, project.taken = bool(state["dynamic"]), bool(state["in_use"]), mesh is not None
+
+
+def _history(given: dict[str, Any]) -> History:
+    rows = [(int(step), float(time), float(value)) for step, time, value in given["rows"]]
+    return History(**{**given, "rows": rows, "filed": 0})  # its file begins anew, with all that was recorded
+
+
+def _curve(given: dict[str, Any]) -> Curve:
+    return Curve(**{**given, "points": [(float(x), float(y)) for x, y in given["points"]]})

@@ -1,0 +1,1 @@
+"""What every part needs: errors, tables of fields, cells, clock, timers, limits. Imports nothing else of hpcdem."""

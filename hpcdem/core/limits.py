@@ -1,0 +1,102 @@
+"""Sizes and places that a model can have, and what is refused because it is surely a slip.
+
+The language asks here while it reads a script, the verbs ask again with the numbers of the moment; so both say the
+same. All lengths in metres.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from hpcdem.core.errors import CommandError
+
+LONGEST, SHORTEST = 1e30, 1e-30
+"""Beyond these, squares and cubes of lengths leave the range of a double."""
+FARTHEST = 1e12
+"""Largest coordinate of a particle in radii: a double still resolves 1e-4 of the radius there."""
+MOST = 10**8
+"""Most particles that one command makes. Every rank makes all of them, a cluster's node could not hold more."""
+MOST_ATTEMPTS = 10**10
+"""Most attempts of one GEN, about half an hour."""
+
+Point = Sequence[float]
+
+
+def check_circle(x: float, y: float, r: float) -> None:
+    """CommandError unless a particle can have this centre and radius."""
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise CommandError(f"the centre ({x:g}, {y:g}) is no place")
+    check_radius(r)
+    if max(abs(x), abs(y)) > FARTHEST * r:
+        raise CommandError(
+            f"a particle of radius {r:g} m at ({x:g}, {y:g}) is too far from the origin for its size; at most "
+            f"{FARTHEST:g} radii"
+        )
+
+
+def check_radius(r: float) -> None:
+    """CommandError unless a particle can have this radius."""
+    if not r > 0.0:
+        raise CommandError(f"a radius must be positive, got {r:g}")
+    if not SHORTEST <= r <= LONGEST:
+        raise CommandError(f"a radius of {r:g} m is out of range ({SHORTEST:g} to {LONGEST:g})")
+
+
+def check_nodes(p1: Point, p2: Point, name: str = "the wall") -> None:
+    """CommandError unless a wall can have these ends."""
+    if not all(abs(c) <= LONGEST for c in (*p1, *p2)):
+        raise CommandError(f"the nodes of {name}, {_point(p1)} and {_point(p2)}, are out of range ({LONGEST:g} m)")
+    if tuple(p1) == tuple(p2):
+        raise CommandError(f"{name} has zero length: both nodes are {_point(p1)}")
+    if math.dist(p1, p2) < SHORTEST:
+        raise CommandError(f"{name} is {math.dist(p1, p2):g} m long, too short")
+
+
+def check_rectangle(radii: Sequence[float], x: Point, y: Point, grid: bool) -> None:
+    """CommandError unless GEN can fill this rectangle with these radii."""
+    if not len(radii):
+        raise CommandError("no radii given")
+    for r in radii:
+        check_radius(r)
+    # A lattice is as wide as its largest particle; at random, the smaller ones may still find room.
+    needed = 2.0 * (max(radii) if grid else min(radii))
+    cells = 1.0
+    for name, (low, high) in (("x", x), ("y", y)):
+        if not max(abs(low), abs(high)) <= LONGEST:
+            raise CommandError(f"the bounds of {name}, {low:g} and {high:g}, are out of range ({LONGEST:g} m)")
+        if not high > low:
+            raise CommandError(f"the rectangle is empty in {name}: {low:g} to {high:g}")
+        if (high - low) * (1.0 + 1e-9) < needed:
+            raise CommandError(
+                f"the rectangle is {high - low:g} m in {name}, too narrow for a particle of radius {needed / 2:g}"
+            )
+        cells *= (high - low) / (2.0 * max(radii)) + 1.0
+    if cells > MOST:
+        raise CommandError(
+            f"the rectangle {x[1] - x[0]:g} m x {y[1] - y[0]:g} m is {cells:.2g} particles large; at most {MOST:g}"
+        )
+
+
+def check_attempts(num: int, factor: float) -> None:
+    """CommandError if GEN num would try for hours."""
+    if num * factor > MOST_ATTEMPTS:
+        raise CommandError(
+            f"{num:g} particles asked for, {factor:g} attempts each: that is {num * factor:.2g} attempts, at most "
+            f"{MOST_ATTEMPTS:g}"
+        )
+
+
+def check_row(p1: Point, p2: Point, rad: float, cratio: float) -> None:
+    """CommandError unless GLINE can make this row."""
+    check_circle(p1[0], p1[1], rad)
+    check_circle(p2[0], p2[1], rad)
+    if not 0.0 < cratio <= 1.0:
+        raise CommandError(f"cratio must lie in (0, 1], got {cratio:g}")
+    n = math.dist(p1, p2) / (2.0 * rad * cratio) if rad * cratio > 0.0 else math.inf
+    if n > MOST:
+        raise CommandError(f"the row has {n:.2g} particles; at most {MOST:g}")
+
+
+def _point(p: Point) -> str:
+    return f"({p[0]}, {p[1]})"

@@ -1,0 +1,1 @@
+"""What runs a model, whatever its physics: what is due between steps, output."""

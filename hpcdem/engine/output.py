@@ -1,0 +1,376 @@
+"""What a run writes: frames, pictures, histories, wall forces, checkpoints, progress.
+
+All functions are collective and need a closed model. The folder is made when the first file is written, so a script
+that fails before leaves nothing behind.
+
+While a CYC or IMPLE runs, frames are written behind its back (io/behind.py): the model is copied, all ranks make their
+part of the files, and a thread of rank 0 brings them to the disk while the ranks step on. One moment at most is under
+way: the next frame, a checkpoint, a function of a Python program and the end of the command wait for it. Errors of the
+disk stop all ranks at the next report or at one of these.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.io.agreed import atomic_path, on_first
+from hpcdem.io.behind import under_way as _under_way
+from hpcdem.io.columns import append_rows
+from hpcdem.io.dat import write_dat
+from hpcdem.io.disk import to_disk
+from hpcdem.io.files import write_sections
+from hpcdem.io.frame import Frame, whole
+from hpcdem.io.frames import frame_name
+from hpcdem.io.ps import write_ps
+from hpcdem.io.vtk import write_vtk
+from hpcdem.io.vtkhdf import write_vtkhdf
+from hpcdem.physics.dem import budget, guards, observe, saving
+from hpcdem.physics.dem.platens import OF_PARTS
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.runtime import launch, run_folder
+from hpcdem.runtime.progress import StepStatus
+
+WALL_COLUMNS = "step,time,wall,x1,y1,x2,y2,fx,fy"
+ENERGY_COLUMNS = ",".join(["step", "time", *budget.NAMES])
+
+
+class Snapshot:
+    """The model at one moment, gathered once for all files that are due.
+
+    waits: files have their names when a method returns; otherwise when `settle` does.
+    """
+
+    def __init__(self, sim: Simulation, initial: bool = False, waits: bool = True) -> None:
+        self.sim, self.initial = sim, initial
+        self._later = None if waits else _under_way
+        self._frame: Frame | None = None
+
+    @property
+    def frame(self) -> Frame:
+        """The frame, made when first asked for; what was under way is settled then."""
+        if self._frame is None:
+            settle(self.sim)
+            self._frame = observe.frame(self.sim)
+        return self._frame
+
+    def _path(self, suffix: str, stem: str = "all") -> str:
+        return str(folder(self.sim) / frame_name(self.sim.clock.step, suffix, self.initial, stem))
+
+    def _write(self, write: Callable[..., None], suffix: str) -> None:
+        path, frame, comm = self._path(suffix), self.frame, self.sim.comm
+        if self._later is not None and comm.size == 1:
+            self._later.entrust(lambda: write(path, frame, comm))
+        else:
+            write(path, frame, comm, self._later)
+
+    def write_print(self) -> None:
+        """`all_<step>[_ini].vtkhdf` and `.dat`."""
+        key = (self.sim.clock.step, self.initial)
+        if self.sim.last_frame == key:
+            return
+        with self.sim.timers("output"):
+            self._write(write_vtkhdf, ".vtkhdf")
+            self._write(write_dat, ".dat")
+            _under_way.go()
+        self.sim.last_frame = key
+
+    def write_vtk(self) -> None:
+        """`all_<step>.vtk` and `wall_<step>.vtk`."""
+        with self.sim.timers("output"):
+            self._write(write_vtk, ".vtk")
+            _under_way.go()
+
+    def write_ps(self) -> None:
+        """`all_<step>.ps`."""
+        with self.sim.timers("output"):
+            self._write(write_ps, ".ps")
+            _under_way.go()
+
+    def write_drawing(self, what: tuple[str, ...]) -> None:
+        """`draw_<step>.jpg`, by rank 0: the words of DRAW."""
+        with self.sim.timers("figure"):
+            path, error = self._path(".jpg", "draw"), None
+            all_rows = whole(self.frame, self.sim.comm)
+            if all_rows is not None:
+                from hpcdem.post import plots
+
+                try:
+                    plots.plot_frame(all_rows, path, 200.0, what)
+                except HpcdemError as problem:
+                    error = str(problem)
+            self.sim.comm.agree(error)
+
+
+def settle(sim: Simulation) -> None:
+    """Wait until all files have their names. Raises HpcdemError on all ranks if one could not be written."""
+    _under_way.settle(sim.comm)
+
+
+def wait_for_disk() -> None:
+    """Wait for the disk on this rank alone, whatever it says: the way out after an error. Not collective."""
+    _under_way.wait()
+
+
+def folder(sim: Simulation) -> Path:
+    """The output folder, made and locked on the first call."""
+    path = Path(sim.outdir)
+    if not sim.folder_made:
+        job = sim.job or run_folder.Job()
+        locked = run_folder.enter(path, sim.comm, job, launch.version(), sim.resumed, sim.restored)
+        sim.folder_made = True
+        if not locked and sim.log is not None:
+            sim.log.warn_once(
+                "lock", f"the file system of {path} has no locks: nobody will notice if two runs write there at once"
+            )
+    return path
+
+
+def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool = False) -> Path:
+    """`<step>.sav`, once everything else is written; returns its path. automatic: `auto_<step>.sav`, of which the last
+    two are kept. Checkpoints that are too many are removed when the new one is safe."""
+    with sim.timers("output"):
+        settle(sim)
+        path = folder(sim) / run_folder.checkpoint_name(sim.clock.step, automatic)
+        secure_series(sim)
+    saving.save(sim, path)
+    run_folder.retire(path.parent, sim.comm, sim.clock.step, sim.keep)
+    return path
+
+
+def write_last_words(sim: Simulation) -> None:
+    """A frame of a state that makes no sense any more, for the user to look at."""
+    with np.errstate(all="ignore"):
+        sim.refresh_tables()
+        Snapshot(sim).write_print()
+
+
+# ---- time series -------------------------------------------------------------------------------------------------
+
+
+def unbalanced(sim: Simulation) -> float:
+    """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
+    Collective."""
+    return observe.survey(sim).unbalanced
+
+
+HISTORIES = {
+    "kinetic": ("J", observe.kinetic_energy),
+    "step": ("1", lambda sim: float(sim.clock.step)),
+    "time": ("s", lambda sim: sim.clock.time),
+    "unbalanced": ("1", unbalanced),
+    "contacts": ("1", lambda sim: float(observe.survey(sim).contacts)),
+    "bonds": ("1", lambda sim: float(sim.bonds_left())),
+    "energy": ("J", budget.stored_energy),
+}
+"""What HIST can follow: unit and function of the simulation."""
+
+
+def unit_of(what: str) -> str:
+    """The unit of what a HIST follows."""
+    name = what.split()[0]
+    return OF_PARTS[name].unit if name in OF_PARTS else HISTORIES[what][0]
+
+
+def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
+    """Append (step, time, value) to `hist_<id>.csv`, and (step, value) to `hist_id_<id>.dat`.
+
+    The layout of the latter is that of which public readers of ZDEM's histories take the numbers: a line with the word
+    hist, two lines of headings, rows, and a last line that is passed over (written by `finish`).
+    """
+    what = sim.history_wishes[ident][1]
+    step, time = sim.clock.step, sim.clock.time
+    with sim.timers("output"):
+        name, unit = what.split()[0], unit_of(what)
+        value = OF_PARTS[name].value(sim, what, ident) if name in OF_PARTS else HISTORIES[what][1](sim)
+        _append(sim, f"hist_{ident}.csv", f"step,time [s],{what} [{unit}]", [f"{step},{time!r},{value!r}"])
+        header = f"hpcdem\nhist id {ident}\n{what} [{unit}]\nstep value"
+        _append(sim, f"hist_id_{ident}.dat", header, [f"{step} {value!r}"])
+
+
+def report(sim: Simulation, _: Snapshot | None = None) -> None:
+    """A row per wall in `walls.csv`, and the progress line where one is due."""
+    with sim.timers("output"):
+        _under_way.look(sim.comm)
+        force = observe.wall_forces(sim)
+        w, clock = sim.walls, sim.clock
+        rows = []
+        for k in w.in_output_order():
+            numbers = (clock.time, *w.p1[k], *w.p2[k], *force[k])
+            time, *rest = (repr(float(v)) for v in numbers)
+            rows.append(",".join([str(clock.step), time, str(w.id[k]), *rest]))
+        if rows:
+            _append(sim, "walls.csv", WALL_COLUMNS, rows)
+        own = w.side == 0
+        wanted = sim.log is not None and sim.log.wants(clock.step)
+        if sim.comm.bcast(wanted):
+            walls = [(int(i), float(fx), float(fy)) for i, (fx, fy) in zip(w.id[own], force[own], strict=True)]
+            sim.log.step(status(sim, walls))
+
+
+DEEP = 0.5
+"""Overlap over the smaller radius from which contacts are named."""
+
+
+def warn_of_overlaps(sim: Simulation) -> None:
+    """Name the worst contacts with an overlap beyond half the smaller radius, once per command. Collective."""
+    key = f"overlaps since step {sim.progress['first'] if sim.progress is not None else sim.clock.step}"
+    if sim.comm.bcast(sim.log.has_warned(key)):
+        return
+    worst, number = observe.overlaps_beyond(sim, DEEP, guards.NAMED)
+    lines = []
+    for o in worst:
+        who = f"particle {o.id1} and wall {o.id2}" if o.wall else f"particles {o.id1} and {o.id2}"
+        made_of = " | ".join(sim.materials.describe(m) for m in dict.fromkeys(o.materials))
+        lines.append(f"  {who} at ({o.x:g}, {o.y:g}): overlap {o.u:g} m, {o.ratio:.2f} of the radius; {made_of}")
+    sim.log.warn_once(
+        key,
+        f"step {sim.clock.step}: {number} contacts overlap by more than half the smaller radius; the stiffness is too "
+        "small for the load, or particles were made inside each other\n" + "\n".join(lines),
+    )
+
+
+def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
+    """A row of `energy.csv`: the budget now."""
+    with sim.timers("output"):
+        seen = sim.energy.look(sim)
+        numbers = (repr(v) for v in (sim.clock.time, *dataclasses.astuple(seen)))
+        _append(sim, "energy.csv", ENERGY_COLUMNS, [",".join([str(sim.clock.step), *numbers])])
+
+
+def tell_energy(sim: Simulation) -> None:
+    """The budget as a table in the log, at the end of a run; nothing without SET energy. Collective."""
+    if sim.energy is None or sim.energy.start is None:
+        return
+    seen = sim.energy.look(sim)
+    if sim.log is None:
+        return
+    rows = [
+        (words, f"{getattr(seen, name):.6g}")
+        for name, words in ENERGY_WORDS.items()
+        if name != "work_blocks" or seen.work_blocks
+    ]
+    sim.log.table("energy budget", ("energy", "J"), rows)
+    sim.log.info(
+        f"energy: closing error {seen.closing:.4g} J, {seen.relative:.2g} of the largest flow "
+        "(docs/physics.md says which terms close to rounding and which with the time step)"
+    )
+
+
+ACROSS = "work across contacts of discs and faces"
+"""The same in the tables of both sides."""
+ENERGY_WORDS = {
+    "kinetic_translation": "stored: motion",
+    "kinetic_rotation": "stored: rotation",
+    "elastic_normal": "stored: contacts, normal",
+    "elastic_shear": "stored: contacts, shear",
+    "elastic_bonds": "stored: open bonds",
+    "work_gravity": "work of gravity",
+    "work_walls": "work of moving walls",
+    "work_driven": "work on fixed particles",
+    "loss_friction": "lost by friction",
+    "loss_local_damping": "lost by local damping",
+    "loss_lattice_damping": "lost by lattice-solid damping",
+    "loss_bonds": "lost when bonds broke",
+    "loss_opened": "lost when contacts opened",
+    "loss_stiffness": "lost by change of shear stiffness",
+    "commands": "brought by commands",
+    "box": "brought by leaving the BOX",
+    "work_blocks": ACROSS,
+    "closing": "closing error",
+}
+"""What the table at the end calls the columns of energy.csv."""
+
+
+def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
+    """What a progress line tells. Collective."""
+    clock, seen = sim.clock, observe.survey(sim)
+    tension, shear = sim.broken()
+    if seen.deepest > DEEP and sim.log is not None:
+        warn_of_overlaps(sim)
+    return StepStatus(
+        step=clock.step, time=clock.time, dt=clock.dt,
+        dt_critical=seen.critical_dt if math.isfinite(seen.critical_dt) else 0.0,
+        kinetic=seen.kinetic, unbalanced_ratio=seen.unbalanced, particles=seen.particles, contacts=seen.contacts,
+        bonds=sim.bonds_left(), broken_tension=tension, broken_shear=shear, walls=walls,
+    )  # fmt: skip
+
+
+def _append(sim: Simulation, name: str, header: str, rows: list[str]) -> None:
+    """Add rows to a text file whose rows begin with the step. The first time in a run, a new model starts a new file, a
+    restarted one cuts what lies after its step."""
+    path = folder(sim) / name
+    since = None
+    if name not in sim.series_open:  # a row of this step, if there is one, was written after the checkpoint
+        since = min(sim.restart_step, sim.clock.step - 0.5) if sim.restart_step else 0
+    append_rows(path, header, rows, since, sim.comm)
+    sim.series_open.add(name)
+
+
+def secure_series(sim: Simulation) -> None:
+    """A restart takes rows up to its step for granted, so they must be as safe as the checkpoint. Collective."""
+
+    def flush() -> None:
+        for name in sorted(sim.series_open):
+            with suppress(FileNotFoundError):
+                to_disk(str(Path(sim.outdir) / name))
+
+    on_first(sim.comm, flush)
+
+
+def close_histories(sim: Simulation) -> None:
+    """The last line of each `hist_id_<id>.dat`, which its readers pass over; once. Collective."""
+    for ident in sim.history_wishes:
+        name = f"hist_id_{ident}.dat"
+        if name in sim.series_open and name not in sim.series_closed:
+            append_rows(folder(sim) / name, "", ["end"], None, sim.comm)
+            sim.series_closed.add(name)
+
+
+def finish(sim: Simulation) -> None:
+    """At STOP: the last line of histories, and the curves asked for by PLOT, `hist_<y>_vs_<x>.txt` and `.png`."""
+    close_histories(sim)
+    for y, x in sim.plots:
+        missing = [i for i in (y, x) if i not in sim.history_wishes]
+        if missing:
+            raise CommandError(f"PLOT {y} {x}: there is no HIST {missing[0]}")
+        text, names = "", [""]
+        pairs: list[tuple[str, str]] = []
+        if sim.comm.rank == 0:
+            columns = []
+            for ident in (x, y):
+                path = Path(sim.outdir) / f"hist_{ident}.csv"
+                lines = path.read_text().splitlines()[1:] if path.exists() else []
+                columns.append({line.split(",")[0]: line.split(",")[2] for line in lines})
+            names = [sim.history_wishes[i][1] for i in (x, y)]
+            pairs = [(columns[0][s], columns[1][s]) for s in columns[0] if s in columns[1]]
+            text = "\n".join([f"# {names[0]} {names[1]}", *(f"{a} {b}" for a, b in pairs)]) + "\n"
+        path = folder(sim) / f"hist_{y}_vs_{x}.txt"
+        write_sections(path, sim.comm, partial(_sections, text))
+        points = [(float(a), float(b)) for a, b in pairs]
+        on_first(sim.comm, partial(_draw_curve, sim, path.with_suffix(".png"), names, points))
+
+
+def _draw_curve(sim: Simulation, path: Path, names: list[str], points: list[tuple[float, float]]) -> None:
+    """The picture of PLOT, on one rank; a run without matplotlib says that it has none."""
+    if find_spec("matplotlib") is None:
+        if sim.log is not None:
+            sim.log.warn(f"{path.name} is not drawn: matplotlib is not installed")
+        return
+    from hpcdem.post import charts
+
+    x, y = (name if unit_of(name) == "1" else f"{name} ({unit_of(name)})" for name in names)
+    with atomic_path(path) as temporary:
+        charts.draw(Path(temporary), "png", "", x, y, [("", "line" if len(points) > 1 else "points", points)])
+
+
+def _sections(text: str) -> list[bytes]:
+    return [text.encode()]

@@ -1,0 +1,1 @@
+"""Arithmetic of contacts between discs and faces."""

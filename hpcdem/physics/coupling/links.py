@@ -1,0 +1,317 @@
+"""Who meets whom: discs near free faces, and the messages between those who own them, from one search to the next.
+
+The strips of the particles and those of the blocks stay what they are. At a search each rank tells the others the box
+of its discs, the free faces in a box go there, and the owners of discs answer which faces have a disc near. Every step
+the ends of these faces travel to the owners of the discs, who compute the contacts, and their forces travel back; the
+owner of a face adds them up in the order of gids. So sums know no ranks, and only those exchange messages who share a
+contact.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.cells import keys
+from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import GID, RADIUS, X, Y
+from hpcdem.physics.coupling.kernels import disc_faces
+from hpcdem.physics.coupling.kernels.disc_faces import ENDS, SCRATCH
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem.connectivity import corner_counts
+from hpcdem.physics.fdem.kernels.elements import FORCE
+from hpcdem.physics.fdem.model import Blocks
+
+TO_DISCS, TO_FACES = 41, 42
+"""Tags of messages."""
+
+
+@dataclass
+class Touching:
+    """What contacts remember: of the disc gid (n,) i8 with the face (n,) i8 the friction (n,) [N]."""
+
+    gid: np.ndarray
+    face: np.ndarray
+    friction: np.ndarray
+
+    @staticmethod
+    def nothing() -> Touching:
+        """No contact."""
+        return Touching(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+
+    def take(self, which: np.ndarray) -> Touching:
+        """Some of them."""
+        return Touching(self.gid[which], self.face[which], self.friction[which])
+
+    def shared_out(self, mine: np.ndarray, comm: Any) -> Touching:
+        """Those of the discs `mine`, from all ranks. Collective."""
+        here = np.isin(self.gid, mine)
+        if comm.size == 1:
+            return self.take(here)
+        away = self.take(~here)
+        others = comm.allgather((away.gid, away.face, away.friction))
+        found = [np.concatenate(part) for part in zip((self.gid, self.face, self.friction), *others)]
+        every = Touching(*found)
+        keep = np.isin(every.gid, mine)
+        keep[: len(here)] = here
+        return every.take(keep)
+
+
+def face_frictions(blocks: Blocks) -> np.ndarray:
+    """Coefficients of friction of the kinds of faces (see `kinds`): inf, those of the contact models, of the joints."""
+    of = (np.tan(np.radians(rows.column("friction")[1:])) for rows in (blocks.face_rows, blocks.joint_rows))
+    return np.concatenate([[math.inf], *of])
+
+
+def kinds(blocks: Blocks, faces: np.ndarray) -> np.ndarray:
+    """Row of the table of laws for each face: that of the element model, plus the number of these for each kind of
+    face: without friction of its own, with a contact model, of what was a joint."""
+    model, joint = blocks.face_row[faces], blocks.joint_row[faces]
+    kind = np.where(model > 0, model, np.where(joint > 0, len(blocks.face_rows) - 1 + joint, 0))
+    return blocks.element_row[faces // 4] + len(blocks.element_rows) * kind
+
+
+class Link:
+    """The contacts that can come about while discs and faces have not gone `room` [m] towards each other. Collective.
+
+    Arrays of discs and slots are those of physics/coupling/kernels/disc_faces.py; face_row, face_k, face_k2,
+    face_force: of owned faces with discs near, in ascending order.
+    """
+
+    def __init__(self, particles: Simulation, blocks: Blocks, room: float, known: Touching) -> None:
+        self.comm = particles.comm
+        self.particles, self.blocks = particles, blocks
+        self.room = room
+        self.made_for = particles.rebuilds, blocks.rebuilds, particles.closed
+        p = particles.particles
+        self._rows = np.arange(p.owned.start, p.owned.stop)
+        self.origin, self.corners = p.positions(), blocks.x[blocks.owned].copy()
+        faces, sources = self._faces_near()
+        pairs = self._pairs(faces)
+        self._make_slots(faces, pairs)
+        self._make_messages(faces, sources)
+        self._remember(known)
+
+    # ---- search ------------------------------------------------------------------------------------------------------
+
+    def _box(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of the owned discs and the room around them [m]."""
+        hot = self.particles.particles.hot[self._rows]
+        if not len(hot):
+            return math.inf, -math.inf, math.inf, -math.inf
+        x, y, r = hot[:, X], hot[:, Y], hot[:, RADIUS] + self.room
+        return float((x - r).min()), float((x + r).max()), float((y - r).min()), float((y + r).max())
+
+    def _boxes(self) -> list[tuple[float, float, float, float]]:
+        return self.comm.allgather(self._box())
+
+    def _faces_near(self) -> tuple[np.ndarray, np.ndarray]:
+        """Free faces of all ranks in the box of this one: (n, 6) number, row of the table of laws, ends; and the rank
+        (n,) of each."""
+        blocks = self.blocks
+        own = blocks.owned
+        number = blocks.number[own]
+        cells = blocks.the_mesh().cells[number]
+        there = (
+            ~blocks.closed_faces()[4 * number[:, None] + np.arange(4)] & (cells >= 0) & blocks.alive[number][:, None]
+        )
+        i, k = np.nonzero(there)
+        k2 = (k + 1) % corner_counts(cells)[i]
+        x = blocks.x[own]
+        ends = np.column_stack([x[i, 2 * k], x[i, 2 * k + 1], x[i, 2 * k2], x[i, 2 * k2 + 1]]).reshape(-1, 4)
+        table = np.column_stack([4 * number[i] + k, kinds(blocks, 4 * number[i] + k), ends]).reshape(-1, 6)
+        low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+        parts = [
+            table[(high[:, 0] > left) & (low[:, 0] < right) & (high[:, 1] > bottom) & (low[:, 1] < top)]
+            for left, right, bottom, top in self._boxes()
+        ]
+        arrived = self.comm.alltoallv(parts)
+        return np.concatenate(arrived), np.repeat(np.arange(len(arrived)), [len(part) for part in arrived])
+
+    def _discs_by_cells(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Discs near the rectangle around places (n, 2): rows in the order of cells, keys of these, side of a cell."""
+        hot = self.particles.particles.hot
+        rows = self._rows
+        side = (float(hot[rows, RADIUS].max()) if len(rows) else 1.0) + self.room
+        if not len(places) or not len(rows):
+            return rows[:0], np.empty(0, np.int64), side
+        low, high = places.min(axis=0) - side, places.max(axis=0) + side
+        x, y = hot[rows, X], hot[rows, Y]
+        rows = rows[(x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1])]
+        key = keys(hot[rows], side)
+        order = np.argsort(key, kind="stable")
+        return rows[order], key[order], side
+
+    def _pairs(self, faces: np.ndarray) -> np.ndarray:
+        """(n, 2) row of the disc and of the face."""
+        rows, key, side = self._discs_by_cells(faces[:, 2:].reshape(-1, 2))
+        hot, places = self.particles.particles.hot, np.ascontiguousarray(faces[:, 2:])
+        pairs = np.empty((4 * len(rows) + 16, 2), np.int64)
+        n = int(disc_faces.near(hot, rows, key, side, places, self.room, pairs))
+        if n > len(pairs):
+            pairs = np.empty((n, 2), np.int64)
+            disc_faces.near(hot, rows, key, side, places, self.room, pairs)
+        return pairs[:n]
+
+    def _make_slots(self, faces: np.ndarray, pairs: np.ndarray) -> None:
+        """Discs with a face near, and their slots by the number of the face."""
+        blocks = self.blocks
+        self._used, face = np.unique(pairs[:, 1], return_inverse=True)
+        number = faces[self._used, 0].astype(np.int64)
+        self.face_model = faces[self._used, 1].astype(np.int64)
+        self.ends = np.zeros((len(number), ENDS))
+        self.ends[:, :4] = faces[self._used, 2:]
+        order = np.lexsort((number[face], pairs[:, 0]))
+        self.slot_face = face[order].astype(np.int64)
+        self.slot_number = number[self.slot_face]
+        self.disc_row, each = np.unique(pairs[order, 0], return_counts=True)
+        self.disc_begin = np.concatenate([[0], np.cumsum(each)]).astype(np.int64)
+        gid = self.particles.particles.ihot[self.disc_row, GID].copy()
+        self.slot_gid = np.repeat(gid, each)
+        n = len(self.slot_face)
+        before, after = np.empty(len(number), np.int64), np.empty(len(number), np.int64)
+        disc_faces.neighbours_along(
+            number, blocks.the_mesh().cells, blocks.partner, blocks.closed_faces(), before, after
+        )  # fmt: skip
+        self.slot_before, self.slot_after = np.empty(n, np.int64), np.empty(n, np.int64)
+        disc_faces.link(
+            self.disc_begin, self.slot_number, before[self.slot_face], after[self.slot_face], self.slot_before,
+            self.slot_after,
+        )  # fmt: skip
+        self.slot_on, self.slot_fs = np.zeros(n, bool), np.zeros(n)
+        self.disc_force, self.slot_force = np.zeros((len(self.disc_row), 3)), np.zeros((n, 4))
+        self.seen = np.zeros((int(each.max(initial=1)), SCRATCH))
+
+    def _remember(self, known: Touching) -> None:
+        """Friction of contacts that touched before the search. Collective."""
+        gids = self.particles.particles.ihot[self._rows, GID]
+        mine = known.shared_out(gids, self.comm)
+        at = np.flatnonzero(np.isin(self.slot_gid, mine.gid))
+        slots = dict(zip(zip(self.slot_gid[at].tolist(), self.slot_number[at].tolist()), at.tolist()))
+        for gid, face, friction in zip(mine.gid.tolist(), mine.face.tolist(), mine.friction.tolist()):
+            slot = slots.get((gid, face), -1)
+            if slot >= 0:
+                self.slot_on[slot], self.slot_fs[slot] = True, friction
+
+    def touching(self) -> Touching:
+        """What the contacts that touch remember, those of discs of this rank."""
+        on = self.slot_on
+        return Touching(self.slot_gid[on], self.slot_number[on], self.slot_fs[on])
+
+    def refuse_discs_inside(self) -> None:
+        """CommandError if the centre of a disc is inside an element. Collective."""
+        blocks = self.blocks
+        own = blocks.owned
+        number = blocks.number[own]
+        x = blocks.x[own][:, :8]
+        table = np.column_stack([number, x])[blocks.alive[number]]
+        low, high = table[:, 1::2].min(axis=1, initial=math.inf), table[:, 1::2].max(axis=1, initial=-math.inf)
+        bottom, top = table[:, 2::2].min(axis=1, initial=math.inf), table[:, 2::2].max(axis=1, initial=-math.inf)
+        parts = [
+            table[(high > box[0]) & (low < box[1]) & (top > box[2]) & (bottom < box[3])] for box in self._boxes()
+        ]  # fmt: skip
+        arrived = np.concatenate(self.comm.alltoallv(parts))
+        corners = np.ascontiguousarray(arrived[:, 1:])
+        p = self.particles.particles
+        rows, key, side = self._discs_by_cells(corners.reshape(-1, 2))
+        found = disc_faces.centres_inside(p.hot, p.ihot, rows, key, side, corners, arrived[:, 0].astype(np.int64))
+        every = [pair for pair in self.comm.allgather((int(found[0]), int(found[1]))) if pair[0] >= 0]
+        if every:
+            gid, element = min(every)
+            raise CommandError(f"the centre of particle {gid} is inside element {element}: it has no outside to be on")
+
+    # ---- messages ----------------------------------------------------------------------------------------------------
+
+    def _make_messages(self, faces: np.ndarray, sources: np.ndarray) -> None:
+        """Agree with the others on what travels in each step."""
+        blocks, comm = self.blocks, self.comm
+        number = faces[self._used, 0].astype(np.int64)
+        cuts = np.searchsorted(sources[self._used], np.arange(comm.size + 1))
+        wanted = comm.alltoallv([number[a:b] for a, b in itertools.pairwise(cuts)])
+        cells = blocks.the_mesh().cells
+
+        def corners(of: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            e, k = np.divmod(of, 4)
+            return blocks.where[e], k, (k + 1) % corner_counts(cells[e])
+
+        self._asked = [corners(of) for of in wanted]
+        self._told = [np.empty((len(of), ENDS)) for of in wanted]
+        self._ends = [self.ends[a:b] for a, b in itertools.pairwise(cuts)]
+        # The way back: slots by the owner of their face.
+        owner = sources[self._used][self.slot_face]
+        self._slots = [np.flatnonzero(owner == rank) for rank in range(comm.size)]
+        names = comm.alltoallv([np.column_stack([self.slot_gid[s], self.slot_number[s]]) for s in self._slots])
+        self._back = [np.zeros((len(s), 4)) for s in self._slots]
+        each = np.cumsum([0] + [len(part) for part in names])
+        gid, face = np.concatenate(names).T
+        self._arrived = np.zeros((len(gid), 4))
+        self._pieces = [self._arrived[a:b] for a, b in itertools.pairwise(each)]
+        self._order = np.lexsort((gid, face))
+        self.face_number, self._of_face = np.unique(face, return_inverse=True)
+        self.face_row, self.face_k, self.face_k2 = corners(self.face_number)
+        self.face_force = np.zeros((len(self.face_number), 4))
+        self._to_discs: list[Any] = []
+        self._to_faces: list[Any] = []
+        if comm.mpi is None:
+            return
+        for into, outof, incoming, tag in (
+            (self._to_discs, self._told, self._ends, TO_DISCS), (self._to_faces, self._back, self._pieces, TO_FACES),
+        ):  # fmt: skip
+            for rank in range(comm.size):
+                if rank == comm.rank:
+                    continue
+                if len(incoming[rank]):
+                    into.append(comm.mpi.Recv_init(_bytes(incoming[rank]), rank, tag))
+                if len(outof[rank]):
+                    into.append(comm.mpi.Send_init(_bytes(outof[rank]), rank, tag))
+
+    def _travel(self, requests: list[Any], outof: list[np.ndarray], into: list[np.ndarray]) -> None:
+        comm: Any = self.comm
+        if requests:
+            from mpi4py import MPI
+
+            MPI.Prequest.Startall(requests)
+        into[comm.rank][:] = outof[comm.rank]
+        if requests:
+            comm.wait_all(requests)
+
+    def fetch(self) -> None:
+        """The ends of faces, where they are now, to the owners of the discs. Collective."""
+        x, v = self.blocks.x, self.blocks.v
+        timers = self.blocks.timers
+        with timers("couple"):
+            for (rows, k, k2), out in zip(self._asked, self._told):
+                if len(out):
+                    disc_faces.pack(rows, k, k2, x, v, out)
+        with timers("exchange"):
+            self._travel(self._to_discs, self._told, self._ends)
+
+    def deliver(self) -> None:
+        """Forces of contacts to the owners of the faces, added up there by faces. Collective."""
+        timers = self.blocks.timers
+        with timers("couple"):
+            for slots, out in zip(self._slots, self._back):
+                np.take(self.slot_force, slots, axis=0, out=out)
+        with timers("exchange"):
+            self._travel(self._to_faces, self._back, self._pieces)
+        with timers("couple"):
+            disc_faces.gather(self._order, self._of_face, self._arrived, self.face_force)
+
+    def apply(self, applied: np.ndarray) -> None:
+        """Add the forces of faces to those applied to corners (n, 8) [N]."""
+        assert applied.shape[1] == FORCE
+        disc_faces.apply(self.face_force, self.face_row, self.face_k, self.face_k2, applied)
+
+    def close(self) -> None:
+        """Give the requests back to MPI."""
+        for request in self._to_discs + self._to_faces:
+            request.Free()
+        self._to_discs, self._to_faces = [], []
+
+
+def _bytes(rows: np.ndarray) -> np.ndarray:
+    return rows.reshape(-1).view(np.uint8)

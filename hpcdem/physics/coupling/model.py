@@ -1,0 +1,584 @@
+"""Particles and blocks in one run: discs that touch the free faces of elements.
+
+Both simulations stay what they are, each with its strips, lists and clock; `Coupled` steps them with one time step.
+After both have moved, the contacts between them are computed where the discs are owned (links.py,
+physics/coupling/kernels/disc_faces.py) and added to the forces on both sides, with which both move in the next step.
+
+A step after which a command changed one of the models begins with the forces that there were: contacts that touched go
+on as they were, new ones begin at its end, as contacts of new particles do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.fields import GID, X, Y
+from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
+from hpcdem.physics.coupling import saving
+from hpcdem.physics.coupling.kernels import disc_faces
+from hpcdem.physics.coupling.links import Link, Touching, face_frictions
+from hpcdem.physics.dem import observe
+from hpcdem.physics.dem.budget import EMPTIED
+from hpcdem.physics.dem.kernels import laws, motion
+from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
+from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem import build
+from hpcdem.physics.fdem.model import Blocks
+
+__all__ = ["Coupled"]
+
+ROOM = 0.5
+"""How far discs and faces may go towards each other between two searches, over the largest radius."""
+LONGEST_WATCH = 64
+"""Most steps between two looks at how far they have gone."""
+SAFETY = 0.8
+"""Part of the stability limit that is used."""
+ON_DISCS, ON_FACES = 0, 1
+"""The two sides of the work done across the contacts."""
+
+
+class Coupled:
+    """A model of particles and a model of blocks on the same ranks. Every method is collective.
+
+    friction: of the contacts between them, the smaller of this and that of the disc counts; None: that of the disc.
+    late: searches that came late.
+    """
+
+    def __init__(self, particles: Simulation, blocks: Blocks, friction: float | None = None) -> None:
+        if friction is not None and not 0.0 <= friction < math.inf:
+            raise CommandError(f"friction must be a number that is not negative, got {friction}")
+        if blocks.surface_loads is not None or particles.coupled:
+            raise CommandError("these blocks or particles are coupled already")
+        self.particles, self.blocks = particles, blocks
+        self.comm = particles.comm
+        self.friction = math.inf if friction is None else float(friction)
+        self.link: Link | None = None
+        self.late = 0
+        self._known = Touching.nothing()
+        self._asleep = False
+        self._changed = True
+        self._stepping = False
+        self._inside = -1
+        self._countdown = self._pace = 1
+        self._bins = np.zeros((2, *BINS_SHAPE), np.int64)
+        self._done = [0, 0]
+        self._booked = 0
+        self._stored_at_start: float | None = None
+        self._settled = 0.0, 0.0, 0.0
+        self._law_key: Any = None
+        blocks.open_model()
+        blocks.surface_loads = self
+        particles.coupled = True
+
+    # ---- one step ----------------------------------------------------------------------------------------------------
+
+    def advance(self, steps: int) -> int:
+        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+        request = done = 0
+        self.prepare()
+        while done < steps and not request:
+            request = self._step()
+            done += 1
+        self._empty()
+        self.particles.timers.count(done, len(self.particles.particles))
+        self.blocks.timers.count(done, len(self.blocks.number[self.blocks.owned]))
+        return request
+
+    def _step(self) -> int:
+        """Advance both by one dt. Returns what the outside asked for (0: nothing), agreed by all ranks."""
+        particles, blocks = self.particles, self.blocks
+        self._close()
+        books = self.accounted
+        if books:
+            self._book_discs(kick=True)
+        self._stepping = True
+        request = particles.step()
+        request = max(request, blocks.step())
+        if books:
+            self._book_faces()
+        particles.close()
+        blocks.close_model()
+        self._stepping = False
+        self._countdown -= 1
+        if not self._link_holds():
+            self._connect()
+        elif self._countdown <= 0 and self._look():
+            self._connect()
+        self._interact()
+        if books:
+            self._book_discs(kick=False)
+            self._book_faces()
+            self._booked += 1
+            if self._booked >= EMPTIED:
+                self._empty()
+        return request
+
+    def prepare(self) -> None:
+        """Both models closed, one time step, contacts found, with the laws of the present materials: ready to step."""
+        self._close()
+        if self._renew_laws():
+            self._replay()
+
+    def _close(self) -> None:
+        self.particles.close()
+        self.blocks.close_model()
+        if self._link_holds() and not self._changed and self.particles.clock.dt == self.blocks.clock.dt:
+            return
+        self._check()
+        self.blocks.check_start()
+        self._connect()
+        self._link().refuse_discs_inside()
+        self._replay()
+        self._changed = False
+        if self._stored_at_start is None:
+            self._stored_at_start = self._stored()
+
+    def _check_options(self) -> None:
+        """CommandError for options of the blocks that do not go with particles."""
+        options = self.blocks.options
+        if not options.dynamic:
+            raise CommandError("particles move in time: blocks that are coupled to them need model option dynamic on")
+        if options.auto:
+            raise CommandError("blocks that are coupled to particles have one time step: time-step auto must be off")
+        if options.mass_scaling > 0.0:
+            raise CommandError(
+                "blocks that are coupled to particles keep their masses, which particles feel: time-step mass-scaling "
+                "must be 0"
+            )
+
+    def _check(self) -> None:
+        """CommandError if the two cannot be stepped together."""
+        self._check_options()
+        one, other = self.particles.clock.dt, self.blocks.clock.dt
+        if one != other:
+            raise CommandError(
+                f"the time steps differ: {one!r} s of the particles, {other!r} s of the blocks; one must be said "
+                "for both (SET dt and model time-step), or `settle_time_step` called anew"
+            )
+        if self.accounted and self.particles.clumps:
+            raise CommandError("there is no account of energy for clumps that touch blocks: leave it off")
+
+    def _link(self) -> Link:
+        assert self.link is not None
+        return self.link
+
+    def _link_holds(self) -> bool:
+        """Whether rows, owners and free faces are those for which contacts were found."""
+        particles, blocks = self.particles, self.blocks
+        return self.link is not None and self.link.made_for == (particles.rebuilds, blocks.rebuilds, particles.closed)
+
+    def _connect(self) -> None:
+        """Search for contacts at the present positions."""
+        particles, blocks = self.particles, self.blocks
+        with particles.timers("search"):
+            if self.link is not None:
+                self._known = self.link.touching()
+                self.link.close()
+            p = particles.particles
+            radii = p["radius"]
+            largest = float(self.comm.max_into(np.array([radii.max(initial=0.0)]))[0])
+            self.link = Link(particles, blocks, ROOM * largest if largest > 0.0 else 1.0, self._known)
+            self._known = Touching.nothing()
+            self._renew_laws()
+        self._look()
+
+    def _look(self) -> bool:
+        """How far has anyone gone since the search? Sets the step of the next look. Returns whether it is time for a
+        search. PhysicsError if a disc went through a face."""
+        particles, blocks, link = self.particles, self.blocks, self._link()
+        p, mesh, dt = particles.particles, blocks.the_mesh(), particles.clock.dt
+        of_discs, of_blocks = np.zeros(4), np.zeros(4)
+        with particles.timers("search"):
+            motion.survey(p.hot, p.n_left, p.n_own, link.origin, dt, NO_ROWS, of_discs)
+            build.survey(
+                blocks.x, blocks.v, link.corners, blocks.owned.start, len(link.corners), mesh.cells, blocks.number,
+                of_blocks,
+            )  # fmt: skip
+            found = np.array([of_discs[0], of_discs[1], of_blocks[0], of_blocks[1], float(self._inside)])
+        with particles.timers("reduce"):
+            self.comm.max_into(found)
+        if found[4] >= 0.0:
+            self._stop_on_breakthrough(int(found[4]))
+        path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
+        room, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
+        self.late += room < 0.0
+        wait = min(LONGEST_WATCH, 2 * self._pace)
+        if stride > 0.0:
+            wait = int(min(wait, 0.5 * max(room, 0.0) / stride))
+        self._pace = self._countdown = max(1, wait)
+        return room < 2.0 * stride
+
+    # ---- forces ------------------------------------------------------------------------------------------------------
+
+    def _interact(self) -> None:
+        """Forces between the two at the present positions; friction moves on by dt."""
+        link, particles = self._link(), self.particles
+        link.fetch()
+        with particles.timers("couple"):
+            self._inside = max(self._inside, self._forces(False))
+            b = particles.lists.blocks
+            disc_faces.add_to_discs(1.0, link.disc_row, link.disc_force, b.cut, b.lo, b.foff, particles.lists.force)
+        link.deliver()
+        if particles.clumps:
+            particles.clumps.sum_forces(particles.particles, particles.halo, particles.lists)
+
+    def _replay(self) -> None:
+        """The forces on the blocks as they were; those on the particles are stored with them."""
+        link = self._link()
+        link.fetch()
+        with self.particles.timers("couple"):
+            self._forces(True)
+        link.deliver()
+
+    def _forces(self, again: bool) -> int:
+        link, particles = self._link(), self.particles
+        p = particles.particles
+        return int(
+            disc_faces.forces(
+                again, link.disc_row, link.disc_begin, p.hot, p.ihot, link.slot_face, link.slot_before, link.slot_after,
+                link.slot_on, link.slot_fs, link.ends, link.face_model, self._laws, len(particles.materials),
+                particles.clock.dt, link.seen, link.disc_force, link.slot_force,
+            )
+        )  # fmt: skip
+
+    def _stop_on_breakthrough(self, gid: int) -> None:
+        """PhysicsError: the centre of this disc, on some rank, has gone into an element."""
+        p = self.particles.particles
+        rows = np.flatnonzero(p.ihot[p.owned, GID] == gid) + p.owned.start
+        mine = [(float(p.hot[i, X]), float(p.hot[i, Y])) for i in rows]
+        ((x, y),) = [place for part in self.comm.allgather(mine) for place in part]
+        raise PhysicsError(
+            f"step {self.blocks.clock.step}: the centre of particle {gid}, now at ({x:g}, {y:g}), went through the "
+            "surface of an element; its stiffness is too small for this load, or the time step too large"
+        )
+
+    def _renew_laws(self) -> bool:
+        """The table of laws: kinds of faces by element models by materials, see `law_table`. Whether it is another
+        now."""
+        rows, materials = self.blocks.element_rows, self.particles.materials.rows
+        frictions = np.minimum(face_frictions(self.blocks), self.friction)
+        key = len(rows), frictions.tobytes(), materials.tobytes()
+        if key == self._law_key:
+            return False
+        self._laws = law_table(
+            np.array(rows.column("shear")), np.array(rows.column("poisson_ratio")), materials, frictions
+        )
+        self._law_key = key
+        return True
+
+    # ---- called by the blocks ----------------------------------------------------------------------------------------
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        """(n_own, 4) bool: corners of owned elements on faces that are free or may become so."""
+        number = blocks.number[blocks.owned]
+        cells = blocks.the_mesh().cells[number]
+        faces = 4 * number[:, None] + np.arange(4)
+        loose = (cells >= 0) & (~blocks.closed_faces()[faces] | (blocks.joint_row[faces] > 0))
+        count = np.where(cells[:, 3] >= 0, 4, 3)[:, None]
+        before = np.where(np.arange(4) > 0, np.arange(4) - 1, count - 1)
+        return (loose | np.take_along_axis(loose, before, axis=1)) & (cells >= 0)
+
+    def add_to(self, applied: np.ndarray) -> None:
+        """Add the forces of discs to those applied to corners (n, 8) [N/m]."""
+        if self.link is not None and not self._asleep:
+            self.link.apply(applied)
+
+    def made_anew(self) -> None:
+        """The storage of the blocks is another: find the places of the forces in it."""
+        if self.link is not None and not self._asleep:
+            self._changed |= not self._stepping
+            self._connect()
+            self._replay()
+
+    def meshed_anew(self) -> None:
+        """The blocks are others: nothing touches."""
+        if self.link is not None:
+            self.link.close()
+        self.link, self._known = None, Touching.nothing()
+
+    # ---- time step ---------------------------------------------------------------------------------------------------
+
+    def settle_time_step(self, dt: float = 0.0) -> float:
+        """Give both the same time step and return it [s]: `dt`; else what was said for one of them or for both alike
+        (SET dt, model time-step); else `stable_time_step`. CommandError if they were told different ones."""
+        particles, blocks = self.particles, self.blocks
+        self._check_options()
+        said = [value for value in (particles.settings.dt, blocks.options.dt) if value > 0.0]
+        if dt <= 0.0 and len(set(said)) > 1:
+            raise CommandError(
+                f"the time steps differ: SET dt {said[0]:g} s of the particles, model time-step {said[1]:g} s of the "
+                "blocks; say the same for both, or leave one of them out"
+            )
+        stable = self.stable_time_step()
+        dt = dt if dt > 0.0 else said[0] if said else stable
+        if not math.isfinite(dt):
+            raise CommandError("there is no time step: neither contacts nor elements give a limit; say one (SET dt)")
+        particles.settings.dt = dt
+        if particles.clock.dt != dt:
+            particles.clock.dt = dt
+            particles.tables_changed()
+            particles.look_soon()
+            particles.refresh_tables()
+        if blocks.options.dt != dt:
+            blocks.time_step(value=dt)
+        blocks.close_model()
+        self._changed = True
+        self._settled = self._said()
+        if particles.log is not None:
+            particles.log.info(f"particles and blocks: time step {dt:.4g} s, {dt / stable:.2f} of the stable one")
+        return dt
+
+    def _said(self) -> tuple[float, float, float]:
+        settings = self.particles.settings
+        return settings.dt, settings.frac, self.blocks.options.dt
+
+    def heed_time_step(self, by_frac: Callable[[], float]) -> None:
+        """Settle the time step again if a command has said one, for particles or blocks, since that was done. by_frac:
+        what SET frac asks for [s], 0 without it. CommandError if the two were told different ones."""
+        if self._said() == self._settled:
+            return
+        (dt, _, value), (dt_before, _, value_before) = self._said(), self._settled
+        new = {one for one, before in ((dt, dt_before), (value, value_before)) if one > 0.0 and one != before}
+        if len(new) > 1:
+            raise CommandError(
+                f"the time steps differ: SET dt {dt:g} s of the particles, model time-step {value:g} s of the blocks"
+            )
+        if not new and value == value_before:  # SET frac: what was settled before counts no more
+            self.blocks.time_step(value=0.0)
+        self.settle_time_step(new.pop() if new else by_frac())
+
+    def stable_time_step(self) -> float:
+        """The time step [s] that is stable for the particles, the blocks and their contacts.
+
+        omega^2 of a disc: what its contacts give, and k/m of two faces; of a corner at the surface: what elements,
+        joints and contacts give, and the same bound 2 k/m for each of two discs; k: the stiffness of the contact, of
+        Hertz at an overlap of 1 % of the radius. dt = 0.8 * 2 / omega."""
+        particles, blocks = self.particles, self.blocks
+        particles.close()
+        blocks.close_model()
+        self._renew_laws()
+        p, local = particles.particles, blocks.local
+        of_discs, of_blocks = observe.critical_dt(particles), local.critical_time_step()
+        stiffness = np.zeros(1)
+        used = np.flatnonzero(particles.used(p["material"], particles.materials))
+        table = self._laws.reshape(-1, len(particles.materials), 4)[1 : len(blocks.element_rows), used].reshape(-1, 4)
+        radius = float(self.comm.max_into(np.array([p["radius"].max(initial=0.0)]))[0])
+        for model, a, _, _ in table.tolist():
+            stiffness[0] = max(stiffness[0], laws.tangent_normal_stiffness(model, a, 4.0 * radius, 0.01 * radius))
+        own = blocks.owned
+        corner = local.true_mass[own][self.corners(blocks)]
+        lightest = float(self.comm.min_into(np.array([corner.min(initial=math.inf)]))[0])
+        # 1 / dt^2 of springs adds up: both limits are safety * 2 / omega.
+        safety = blocks.options.safety
+        of_corner = (1.0 / of_blocks) ** 2 + 4.0 * stiffness[0] / lightest / (2.0 * safety) ** 2
+        of_disc = (1.0 / of_discs) ** 2 + 2.0 * stiffness[0] / observe.lightest(particles) / (2.0 * SAFETY) ** 2
+        fastest = max(of_corner, of_disc)
+        return 1.0 / math.sqrt(fastest) if fastest > 0.0 else math.inf
+
+    # ---- looking -----------------------------------------------------------------------------------------------------
+
+    def contacts(self) -> dict[str, np.ndarray]:
+        """Contacts between discs and faces on all ranks, in the order of gid and face: id (of the disc), face, fn, fs
+        [N] (their part of the load), x, y of the contact [m], overlap [m], energy [J]."""
+        self.prepare()
+        link, p = self._link(), self.particles.particles
+        out, at = np.zeros((len(link.slot_on), 6)), np.zeros((len(link.slot_on), 2), np.int64)
+        n = disc_faces.contacts(
+            link.disc_row, link.disc_begin, p.hot, p.ihot, link.slot_face, link.slot_before, link.slot_after,
+            link.slot_on, link.slot_fs, link.ends, link.face_model, self._laws, len(self.particles.materials),
+            link.seen, out, at,
+        )  # fmt: skip
+        slots = at[:n, 0]
+        mine = link.slot_gid[slots], link.slot_number[slots], out[:n]
+        gid, face, rows = (np.concatenate(part) for part in zip(*self.comm.allgather(mine)))
+        order = np.lexsort((face, gid))
+        names = ("fn", "fs", "x", "y", "overlap", "energy")
+        return {"id": gid[order], "face": face[order], **dict(zip(names, rows[order].T))}
+
+    def beyond_walls(self) -> list[tuple[int, int, float, float]]:
+        """Walls of the particles that cut an element, or BOX sides beyond which one is: their ids, the first such
+        element, and its first corner [m]. Collective."""
+        self.blocks.close_model()
+        walls, blocks = self.particles.walls, self.blocks
+        own = blocks.owned
+        number = blocks.number[own]
+        keep = blocks.alive[number]
+        number, x = number[keep], blocks.x[own][keep][:, :8]
+        # The first corner of a triangle stands twice, which makes its fourth edge one without length.
+        ends = np.stack([x.reshape(-1, 4, 2), np.roll(x.reshape(-1, 4, 2), -1, axis=1)], axis=2)
+        low, high = x.reshape(-1, 4, 2).min(axis=1), x.reshape(-1, 4, 2).max(axis=1)
+        found = []
+        box = walls.box()
+        sides = {} if box is None else {
+            "left": low[:, 0] < box[0], "right": high[:, 0] > box[1], "bottom": low[:, 1] < box[2],
+            "top": high[:, 1] > box[3],
+        }  # fmt: skip
+        for k in range(len(walls)):
+            wall = int(walls.id[k])
+            side = walls.side_of(k)
+            hit = sides[side] if side in sides else _cuts(ends, walls.p1[k], walls.p2[k])
+            first = int(number[hit].min(initial=np.iinfo(np.int64).max))
+            at = x[number == first][:1, :2]
+            found.append((wall, first, *(at[0].tolist() if len(at) else (0.0, 0.0))))
+        return [min(each) for each in zip(*self.comm.allgather(found)) if min(each)[1] < np.iinfo(np.int64).max]
+
+    def force_on_blocks(self) -> tuple[float, float]:
+        """Sum of the forces of all discs on the blocks [N]."""
+        self.prepare()
+        force = self._link().face_force
+        return tuple(exact_sum(force[:, [c, c + 2]], self.comm) for c in range(2))  # type: ignore[return-value]
+
+    def _stored(self) -> float:
+        """Elastic energy of the contacts between the two [J]."""
+        return math.fsum(self.contacts()["energy"])
+
+    # ---- energy ------------------------------------------------------------------------------------------------------
+
+    def _book_discs(self, kick: bool) -> None:
+        """Half a step's work of the present forces on the discs; kick: with the velocities of the coming half step."""
+        particles, link, s = self.particles, self._link(), self.particles.settings
+        p = particles.particles
+        forces = particles.lists.owned_forces() if kick else np.empty((0, 3))
+        with particles.timers("energy"):
+            disc_faces.work_on_discs(
+                kick, link.disc_row, link.disc_force, p.hot, p.n_left, particles.body, forces, s.gx, s.gy, s.lsm,
+                particles.clock.dt, self._bins[ON_DISCS],
+            )  # fmt: skip
+
+    def _book_faces(self) -> None:
+        """The same on the blocks, whose velocities are those after the kick once they have stepped."""
+        blocks, link = self.blocks, self._link()
+        e = link.face_number // 4
+        if link.made_for[1] == blocks.rebuilds and blocks.closed:
+            rows = link.face_row
+        else:  # storage was left at the end of the step
+            order = np.argsort(blocks.number)
+            rows = order[np.searchsorted(blocks.number, e, sorter=order)] if len(e) else e
+        with blocks.timers("energy"):
+            disc_faces.work_on_faces(
+                link.face_force, rows, link.face_k, link.face_k2, blocks.v, blocks.clock.dt, self._bins[ON_FACES]
+            )
+
+    def _empty(self) -> None:
+        """What was booked in the steps since then, to the accounts."""
+        if not self._booked:
+            return
+        self._booked = 0
+        for side in (ON_DISCS, ON_FACES):
+            value = as_integer(self._bins[side]) or 0
+            self._done[side] += value
+            if side == ON_DISCS and self.particles.energy is not None:
+                self.particles.energy.add_from_blocks(value)
+            if side == ON_FACES and self.blocks.budget is not None and self.blocks.budget.start is not None:
+                self.blocks.budget.add_from_discs(value)
+        self._bins[:] = 0
+
+    @property
+    def accounted(self) -> bool:
+        """An account of energy is kept, of one model at least."""
+        return self.particles.energy is not None or self.blocks.budget is not None
+
+    def energies(self) -> dict[str, float]:
+        """Energy that went across the contacts since the account began [J]: work_on_particles, work_on_blocks; stored:
+        elastic energy of the contacts now, stored_before: at the beginning; lost: by their friction, and by errors of
+        the time step. With accounts of both models also closing: what does not add up in all, and relative: that over
+        the largest flow."""
+        self.prepare()
+        parts = self.comm.allgather(tuple(self._done))
+        discs, faces = (from_integer(sum(part[side] for part in parts)) for side in (ON_DISCS, ON_FACES))
+        stored = self._stored()
+        before = self._stored_at_start or 0.0
+        found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored, "stored_before": before}
+        found["lost"] = -(discs + faces) - (stored - before)
+        if self.particles.energy is not None and self.blocks.budget is not None:
+            one, other = self.particles.energy.look(self.particles), self.blocks.energies()
+            found["closing"] = one.closing + other["closing"]
+            flows = [abs(v) for name, v in vars(one).items() if name not in ("closing", "relative")]
+            flows += [abs(v) for name, v in other.items() if name not in ("closing", "relative")]
+            found["relative"] = abs(found["closing"]) / max(max(flows), 1e-300)
+        return found
+
+    # ---- files -------------------------------------------------------------------------------------------------------
+
+    def save(self, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
+        """Write the state of both into one file, and `extra` (JSON values) with it. Reads only."""
+        saving.save(self, path, extra or {})
+
+    def restore(self, path: Path | str) -> dict[str, Any]:
+        """Take the state of both from a file, on any number of ranks and threads; returns `extra`. CommandError if the
+        file is missing, foreign or damaged; both are then as they were."""
+        return saving.restore(self, path)
+
+    def known(self) -> Touching:
+        """What contacts remember."""
+        return self.link.touching() if self.link is not None else self._known
+
+    def state(self) -> dict[str, Any]:
+        """What else is saved, as JSON values."""
+        done = [sum(part[side] for part in self.comm.allgather(tuple(self._done))) for side in (ON_DISCS, ON_FACES)]
+        friction = None if math.isinf(self.friction) else self.friction
+        return {"friction": friction, "done": [hex(v) for v in done], "start": self._stored_at_start, "late": self.late}
+
+    def begin_restore(self) -> None:
+        """Both models are about to be replaced."""
+        self._asleep = True
+        self.meshed_anew()
+
+    def end_restore(self, state: Mapping[str, Any], known: Touching) -> None:
+        """They have been."""
+        first = self.comm.rank == 0
+        self.friction = math.inf if state["friction"] is None else float(state["friction"])
+        self._done = [int(v, 16) if first else 0 for v in state["done"]]
+        self._stored_at_start, self.late = state["start"], int(state["late"])
+        self._bins[:] = 0
+        self._law_key = None
+        self._known, self._changed, self._asleep = known, True, False
+        self._settled = self._said()
+
+    def release(self) -> None:
+        """Part the two again; both may go on alone. Not collective."""
+        self.meshed_anew()
+        self.blocks.surface_loads = None
+        self.particles.coupled = False
+
+
+def _cuts(ends: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> np.ndarray:
+    """(n,) bool: elements, ends (n, 4, 2, 2) of their edges [m], of which an edge crosses the line from p1 to p2."""
+
+    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+        u, w = b - a, c - a
+        return u[..., 0] * w[..., 1] - u[..., 1] * w[..., 0]
+
+    a, b = ends[:, :, 0], ends[:, :, 1]
+    across = side(p1, p2, a) * side(p1, p2, b) < 0.0
+    return (across & (side(a, b, p1) * side(a, b, p2) < 0.0)).any(axis=1)
+
+
+def law_table(shear: np.ndarray, poisson: np.ndarray, materials: np.ndarray, frictions: np.ndarray) -> np.ndarray:
+    """Laws of discs at faces, (kinds of faces * element models * materials, 4) [MODEL, A, B, MU]; row 0 of the models
+    is none. frictions (kinds,): of the disc and of the face the smaller one counts.
+
+    Linear discs: their own springs. Hertz discs: a sphere at a half-space of another material (Johnson 1985, ch. 4 and
+    7), 1/E* = (1 - nu1)/(2 G1) + (1 - nu2)/(2 G2), F = 4/3 E* sqrt(R) U^1.5; 1/G* = (2 - nu1)/G1 + (2 - nu2)/G2,
+    ks = 8 G* sqrt(R U). shear [Pa] and poisson: of the element models.
+    """
+    table = np.zeros((len(shear), len(materials), 4))
+    for e in range(1, len(shear)):
+        for m, mat in enumerate(materials):
+            mu = float(mat["fric"])
+            if mat["hertz"]:
+                with np.errstate(divide="ignore"):  # a modulus of zero: no force
+                    soft = (1.0 - mat["poiss"]) / (2.0 * mat["shear"]) + (1.0 - poisson[e]) / (2.0 * shear[e])
+                    slack = (2.0 - mat["poiss"]) / mat["shear"] + (2.0 - poisson[e]) / shear[e]
+                table[e, m] = laws.HERTZ, 2.0 / 3.0 / soft, 4.0 / slack, mu
+            else:
+                table[e, m] = laws.LINEAR, mat["kn"], mat["ks"], mu
+    every = np.tile(table, (len(frictions), 1, 1, 1))
+    every[..., disc_faces.MU] = np.minimum(every[..., disc_faces.MU], frictions[:, None, None])
+    return every.reshape(-1, 4)

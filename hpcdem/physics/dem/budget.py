@@ -1,0 +1,279 @@
+"""The energy budget of a run: what is stored, what was done and lost, and by how much it does not add up.
+
+`Budget` is the account; it is there only after SET energy. The step calls it before it moves particles and around the
+forces; the passes are in physics/dem/kernels/energy.py and read only, so a run with it has the same bits as one
+without. All sums are exact integers (numerics/exact_sum.py): neither ranks, threads nor a restart change a bit of them.
+
+Flows are booked a whole kick at a time, from half step to half step, but read at whole steps: a reading adds the first
+half of the coming kick. `begin` takes that half out again with the forces and settings of the command that begins, so
+that what a command between two runs changes is the difference of two readings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, from_integer
+from hpcdem.physics.dem.kernels import energy, mass
+from hpcdem.physics.dem.simulation import Simulation
+
+COMMANDS, BOX = energy.FLOWS, energy.FLOWS + 1
+BLOCKS = energy.FLOWS + 2
+ACCOUNTS = energy.FLOWS + 3
+"""Flows of the kernels, then stored energy changed by commands, gone with particles that left the BOX, and work done by
+blocks that touch the particles."""
+EMPTIED = 512
+"""Steps after which bins are emptied into integers: long before they are full."""
+
+
+# Called with the tuple of _wall_slots, which mypy cannot count.
+_wall_work: Any = energy.wall_work
+_wall_losses: Any = energy.wall_losses
+_wall_energy: Any = energy.wall_energy
+
+
+@dataclass(frozen=True)
+class Energy:
+    """All in joules but `relative`. Flows count since the start of the account: work_* was done on the model, loss_* it
+    lost, commands and box came with commands and with particles deleted by the BOX.
+
+    closing: change of what is stored + losses - work - commands - box; relative: that over the largest flow (over
+    what is stored, where nothing flowed).
+    """
+
+    kinetic_translation: float
+    kinetic_rotation: float
+    elastic_normal: float
+    elastic_shear: float
+    elastic_bonds: float
+    work_gravity: float
+    work_walls: float
+    work_driven: float
+    loss_friction: float
+    loss_local_damping: float
+    loss_lattice_damping: float
+    loss_bonds: float
+    loss_opened: float
+    loss_stiffness: float
+    commands: float
+    box: float
+    work_blocks: float
+    closing: float
+    relative: float
+
+
+NAMES = tuple(f.name for f in fields(Energy))
+SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1)
+"""Whether an account raises what is stored."""
+
+
+class Budget:
+    """The account of one simulation. Integers are in units of exact_sum.as_integer; they are this rank's share, the sum
+    over the ranks counts.
+
+    running: a CYC or IMPLE goes on; accounts then stand at the half step, otherwise at the whole step.
+    """
+
+    def __init__(self) -> None:
+        self.accounts = [0] * ACCOUNTS
+        self.start: list[int] | None = None
+        self.left = [0] * energy.STORED
+        self.running = False
+        self.finite = True
+        self._bins = np.zeros((energy.FLOWS, *BINS_SHAPE), np.int64)
+        self._steps = 0
+        self._at_rebuild: tuple[int, list[int]] | None = None
+        self._shear, self._bonds = np.empty(0), np.empty(0, np.int32)
+        self._wall_shear, self._wall_side = np.empty(0), np.empty(0)
+
+    # ---- called by the step ----------------------------------------------------------------------------------------
+
+    def before_move(self, sim: Simulation) -> None:
+        """Book the coming kick."""
+        with sim.timers("energy"):
+            _kicks(sim, True, 1.0, self._bins)
+        self._steps += 1
+        if self._steps % EMPTIED == 0:
+            self._empty()
+
+    def before_rebuild(self, sim: Simulation) -> None:
+        """The lists may be rebuilt without some particles: note what is stored with them."""
+        self._at_rebuild = sim.lost, self._stored(sim, whole_step=False)
+
+    def before_forces(self, sim: Simulation) -> None:
+        """Keep the histories of the slots."""
+        if self._at_rebuild is not None:
+            lost, stored = self._at_rebuild
+            self._at_rebuild = None
+            if sim.lost != lost:
+                self.accounts[BOX] += sum(self._stored(sim, whole_step=False)) - sum(stored)
+        lists = sim.lists
+        self._shear = _copied(lists.fs, self._shear)
+        self._wall_shear = _copied(lists.slot_fs, self._wall_shear)
+        self._wall_side = _copied(lists.slot_side, self._wall_side)
+        self._bonds = _copied(lists.bond, self._bonds) if sim.bonds else lists.bond
+
+    def after_forces(self, sim: Simulation) -> None:
+        """Book what contacts and bonds lost in this step."""
+        lists, p, b, dt = sim.lists, sim.particles, sim.lists.blocks, sim.clock.dt
+        spheres = mass.SPHERES[sim.settings.disk]
+        n_mat = len(sim.materials)
+        with sim.timers("energy"):
+            for t in range(lists.n_blocks):
+                energy.pair_losses(
+                    t, p.hot, p.ihot, b.cut, b.lo, b.poff, lists.ptr, lists.partner, lists.fs, lists.bond,
+                    lists.u_made, self._shear, self._bonds, sim.pair_laws, sim.bond_laws, n_mat, dt, spheres,
+                    self._bins,
+                )  # fmt: skip
+            _wall_losses(*_wall_slots(sim), self._wall_shear, self._wall_side, sim.wall_laws, n_mat, dt, self._bins)
+
+    # ---- called by the commands ------------------------------------------------------------------------------------
+
+    def begin(self, sim: Simulation) -> None:
+        """A CYC or IMPLE begins (or goes on after a function of the user). The model is closed, its tables fresh."""
+        _kicks(sim, False, -1.0, self._bins)
+        stored = self._stored(sim)
+        if self.start is None:
+            self.start = stored
+        else:
+            self.accounts[COMMANDS] += sum(stored) - sum(self.left)
+        self.running = True
+
+    def pause(self, sim: Simulation) -> None:
+        """It ends: bring the accounts to the whole step, and note what is stored."""
+        _kicks(sim, False, 1.0, self._bins)
+        self.left = self._stored(sim)
+        self.running = False
+
+    def look(self, sim: Simulation) -> Energy:
+        """The budget now. The model must be closed. Collective."""
+        self._empty()
+        accounts = list(self.accounts)
+        if self.running:
+            stored = self._stored(sim)
+            bins = np.zeros_like(self._bins)
+            _kicks(sim, False, 1.0, bins)
+            accounts[: energy.FLOWS] = [a + self._integer(b) for a, b in zip(accounts, bins)]
+        else:  # what commands have changed since then is booked when the next run begins
+            stored = self.left
+        mine = [*stored, *(self.start or stored), *accounts]
+        total = _summed(sim, mine)
+        if sim.comm.any(not self.finite):
+            return Energy(*[float("nan")] * len(NAMES))
+        n = energy.STORED
+        now, start, flows = total[:n], total[n : 2 * n], total[2 * n :]
+        closing = sum(now) - sum(start) - sum(sign * flow for sign, flow in zip(SIGNS, flows))
+        scale = max(map(abs, flows)) or max(sum(now), sum(start))
+        relative = closing / scale if scale else 0.0
+        return Energy(*[from_integer(v) for v in (*now, *flows, closing)], relative)  # type: ignore[call-arg]
+
+    def add_from_blocks(self, work: int) -> None:
+        """Book work that blocks did on particles, this rank's share, as an integer of exact_sum.as_integer."""
+        self.accounts[BLOCKS] += work
+
+    # ---- checkpoints -----------------------------------------------------------------------------------------------
+
+    def state(self, sim: Simulation) -> dict[str, Any]:
+        """As JSON values; whole integers, so nothing is rounded. Collective."""
+        self._empty()
+        n = energy.STORED
+        total = [hex(v) for v in _summed(sim, [*self.accounts, *(self.start or [0] * n), *self.left])]
+        return {
+            "accounts": total[:ACCOUNTS],
+            "start": None if self.start is None else total[ACCOUNTS : ACCOUNTS + n],
+            "left": total[ACCOUNTS + n :],
+            "running": self.running,
+            "finite": not sim.comm.any(not self.finite),
+        }
+
+    @staticmethod
+    def restored(state: dict[str, Any], first: bool) -> Budget:
+        """From `state`; first: this rank takes the whole of it, the others nothing."""
+        budget = Budget()
+
+        def share(numbers: list[str]) -> list[int]:
+            return [int(v, 16) if first else 0 for v in numbers]
+
+        missing = ["0x0"] * (ACCOUNTS - len(state["accounts"]))  # in files of earlier versions
+        budget.accounts, budget.left = share([*state["accounts"], *missing]), share(state["left"])
+        budget.start = None if state["start"] is None else share(state["start"])
+        budget.running, budget.finite = state["running"], state["finite"]
+        return budget
+
+    # ---- ours ------------------------------------------------------------------------------------------------------
+
+    def _integer(self, bins: np.ndarray) -> int:
+        value = as_integer(bins)
+        self.finite &= value is not None
+        return value or 0
+
+    def _empty(self) -> None:
+        for k, bins in enumerate(self._bins):
+            self.accounts[k] += self._integer(bins)
+        self._bins[:] = 0
+
+    def _stored(self, sim: Simulation, whole_step: bool = True) -> list[int]:
+        return [self._integer(bins) for bins in _stored_bins(sim, whole_step)]
+
+
+def stored_energy(sim: Simulation) -> float:
+    """Kinetic and elastic energy at the whole step [J], exactly summed. Needs no account. Collective."""
+    values = [as_integer(bins) for bins in _stored_bins(sim)]
+    if sim.comm.any(None in values):
+        return float("nan")
+    return from_integer(sum(_summed(sim, [v or 0 for v in values])))
+
+
+def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
+    """What the particles and contacts of this rank store (5, 2, 2112) i8; motion at the whole step or half before."""
+    lists, p, s, b = sim.lists, sim.particles, sim.settings, sim.lists.blocks
+    bins = np.zeros((energy.STORED, *BINS_SHAPE), np.int64)
+    spheres, n_mat = mass.SPHERES[s.disk], len(sim.materials)
+    for t in range(lists.n_blocks):
+        energy.kinetic(
+            t, p.hot, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, whole_step, bins
+        )  # fmt: skip
+        energy.pair_energy(
+            t, p.hot, p.ihot, b.cut, b.lo, b.poff, lists.ptr, lists.partner, lists.fs, lists.bond, lists.u_made,
+            sim.pair_laws, sim.bond_laws, n_mat, spheres, bins,
+        )  # fmt: skip
+    if sim.clumps:
+        c = sim.clumps.bodies
+        energy.kinetic(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, whole_step, bins)
+    _wall_energy(*_wall_slots(sim), sim.wall_laws, n_mat, bins)
+    return bins
+
+
+def _kicks(sim: Simulation, whole: bool, sign: float, bins: np.ndarray) -> None:
+    lists, p, s, b, dt = sim.lists, sim.particles, sim.settings, sim.lists.blocks, sim.clock.dt
+    for t in range(lists.n_blocks):
+        energy.kicks(
+            t, p.hot, p.n_left, b.cut, b.lo, b.foff, lists.force, sim.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins
+        )
+    if sim.clumps:
+        c = sim.clumps.bodies
+        energy.kicks(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, dt, whole, sign, bins)
+    if sim.walls.v.any():
+        _wall_work(*_wall_slots(sim), sim.wall_laws, len(sim.materials), sign * (dt if whole else 0.5 * dt), bins)
+
+
+def _wall_slots(sim: Simulation) -> Any:
+    """Particles, walls where they are now, and slots."""
+    lists, p = sim.lists, sim.particles
+    table = sim._wall_table
+    table[:, 0:2], table[:, 2:4] = sim.walls.p1, sim.walls.p2
+    return p.hot, p.ihot, table, lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side
+
+
+def _copied(values: np.ndarray, into: np.ndarray) -> np.ndarray:
+    if len(into) != len(values) or into is values:
+        return values.copy()
+    np.copyto(into, values)
+    return into
+
+
+def _summed(sim: Simulation, mine: list[int]) -> list[int]:
+    return [sum(column) for column in zip(*sim.comm.allgather(mine))]

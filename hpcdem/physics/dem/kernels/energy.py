@@ -1,0 +1,313 @@
+"""Where energy is and where it goes: the sums of the energy budget (docs/physics.md, Energy). Reads only.
+
+Flows are booked in passes beside those of the step: `kicks` and `wall_work` before the particles move, `pair_losses`
+and `wall_losses` after the forces, with the shear forces of the step before. What is stored is summed when somebody
+asks. Every number of a particle or contact goes into exact bins (numerics/exact_sum.py), a pair where its earlier
+partner is owned, so no sum depends on ranks, threads or order.
+
+Velocities stand at half steps. A kick v -> v' = v + F dt/m changes (m v^2)/2 by exactly F . (v + v')/2 dt; all work is
+therefore taken with the mean of the velocities before and after the kick. At the whole step between, the motion is
+given m v . v'/2, and half of the kick is that with v alone: from one whole step to the next all forces then do the work
+(F before + F now)/2 dx, the trapezium, exactly. (m v . v'/2 is (m v^2)/2 of the mean velocity less m (F dt/m)^2/8; it
+is what a leap-frog keeps constant together with the energy of linear springs.)
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.numerics.exact_sum import add_to_bins
+from hpcdem.numerics.lanes import as_bits
+from hpcdem.physics.dem.kernels import laws
+from hpcdem.physics.dem.kernels import walls as wall_kernels
+from hpcdem.physics.dem.kernels.contacts import E_MOD, G_MOD, KIND, MODEL, A, B
+from hpcdem.physics.dem.kernels.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
+from hpcdem.physics.dem.kernels.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY
+
+# Flows [J], the rows of bins (9, 2, 2112): work done on the model, then what it loses.
+GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS = range(9)
+FLOWS = 9
+# What is stored [J], rows of bins (5, 2, 2112).
+TRANSLATION, ROTATION, NORMAL, SHEAR, BONDED = range(5)
+STORED = 5
+
+
+@njit(cache=True, error_model="numpy")
+def _book(bins, row, value):
+    if value != 0.0:
+        add_to_bins(bins[row], as_bits(value))
+
+
+# ---- particles -----------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kicks(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, dt, whole, sign, bins):
+    """Work of gravity, of what drives fixed particles, and losses by damping in the coming kick of block t.
+
+    whole: the whole kick, otherwise the half up to the whole step; sign: 1 to book, -1 to take back. Arguments else as
+    motion.move. Members of clumps are passed over; the clumps themselves come in the same way as particles (rigid.py).
+    """
+    shift = foff[t] - lo[t]
+    span, to_mean = (sign * dt, 0.5) if whole else (sign * 0.5 * dt, 0.0)
+    for i in range(cut[t], cut[t + 1]):
+        c, r = i - n_left, shift + i
+        if body[c, CLUMPED] != 0.0:
+            continue
+        m, alpha = body[c, MASS], body[c, ALPHA]
+        gravity, driven, lattice, local = 0.0, 0.0, 0.0, 0.0
+        for axis in range(2):
+            v, f, kick = hot[i, VX + axis], force[r, axis], body[c, KICK_X + axis]
+            weight = m * (gx if axis == 0 else gy)
+            if kick == 0.0:  # fixed: it keeps its velocity because something pushes against all forces
+                gravity += weight * v
+                driven -= (f + weight) * v
+                continue
+            drag = eta * v
+            net = f + weight - drag
+            kept = laws.damped(net, v, alpha)
+            mean = v + to_mean * (kept * kick)
+            gravity += weight * mean
+            lattice += drag * mean
+            local += (net - kept) * mean
+        w, f, kick = hot[i, SPIN], force[r, 2], body[c, KICK_SPIN]
+        if kick == 0.0:
+            driven -= f * w
+        else:
+            kept = laws.damped(f, w, alpha)
+            local += (f - kept) * (w + to_mean * (kept * kick))
+        _book(bins, GRAVITY, gravity * span)
+        _book(bins, DRIVEN, driven * span)
+        _book(bins, LATTICE, lattice * span)
+        _book(bins, LOCAL, local * span)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kinetic(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, whole_step, stored):
+    """Kinetic energy of the owned particles of block t at the whole step, or at the half step before it; nothing of
+    members of clumps."""
+    shift = foff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        c, r = i - n_left, shift + i
+        if body[c, CLUMPED] != 0.0:
+            continue
+        m, alpha = body[c, MASS], body[c, ALPHA]
+        vx, vy, w = hot[i, VX], hot[i, VY], hot[i, SPIN]
+        next_vx, next_vy, next_w = vx, vy, w
+        if whole_step:
+            next_vx += laws.damped(force[r, 0] + m * gx - eta * vx, vx, alpha) * body[c, KICK_X]
+            next_vy += laws.damped(force[r, 1] + m * gy - eta * vy, vy, alpha) * body[c, KICK_Y]
+            next_w += laws.damped(force[r, 2], w, alpha) * body[c, KICK_SPIN]
+        _book(stored, TRANSLATION, 0.5 * m * (vx * next_vx + vy * next_vy))
+        _book(stored, ROTATION, 0.5 * body[c, INERTIA] * w * next_w)
+
+
+# ---- pairs ---------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, error_model="numpy")
+def _springs(kind, u, two_rt, length, law, bond, u_made, spheres):
+    """Of a pair with a bond of this kind (0: none) at overlap u: (Fn, ks, energy of the normal force); zeros apart."""
+    if u >= 0.0:
+        fn, ks = laws.contact(law[MODEL], law[A], law[B], two_rt, u)
+        return fn, ks, laws.normal_energy(law[MODEL], fn, u)
+    if kind == 0:
+        return 0.0, 0.0, 0.0
+    if kind == laws.ELASTIC_BOND:
+        fn, ks = laws.elastic_bond(bond[E_MOD], bond[G_MOD], laws.bond_area(two_rt, spheres), length, u)
+    else:
+        fn, ks = laws.contact_bond(law[MODEL], law[A], law[B], two_rt, u_made, u)
+    return fn, ks, laws.normal_energy(laws.LINEAR, fn, u)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pair_losses(
+    t, hot, ihot, cut, lo, poff, ptr, partner, fs, bond, u_made, fs_before, bond_before, pairs, bonds, n_mat, dt,
+    spheres, bins,
+):  # fmt: skip
+    """What the pairs of block t lost in the step whose forces have just been computed.
+
+    fs_before, bond_before: shear forces and bonds of the slots before that. The work done on the spring of a pair in
+    the step is (Fs before + Fs now)/2 ds, the trapezium that belongs to work with mean velocities. Of it are stored
+    Fs^2/(2 ks) now less before; the rest is booked:
+
+    - slip: (Fs before + Fs now)/2 times the part of ds that did not strain the spring, to FRICTION, or to BONDS in the
+      step in which a bond breaks, together with the energy of its normal force;
+    - STIFFNESS: Fs^2/2 (1/ks before - 1/ks now), Fs that before the step: what an incremental law loses when the spring
+      stiffens with the overlap, and gains when it softens;
+    - OPENED: Fs^2/(2 ks) and the work of the step, of a contact that opens.
+    """
+    p = poff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            before, now, tied = fs_before[k], fs[k], bond_before[k]
+            if before == 0.0 and now == 0.0 and tied == bond[k]:
+                continue
+            j = partner[k]
+            dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
+            dvx, dvy = hot[j, VX] - hot[i, VX], hot[j, VY] - hot[i, VY]
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            d2 = dx * dx + dy * dy
+            d = math.sqrt(d2)
+            inverse = 1.0 / d
+            nx = dx * inverse if d != 0.0 else 1.0
+            ny = dy * inverse if d != 0.0 else 0.0
+            reach = ri + rj
+            u = reach - d
+            two_rt = 4.0 * ri * rj / reach
+            arm_i, arm_j = ri - 0.5 * u, rj - 0.5 * u
+            sliding = nx * dvy - ny * dvx - hot[i, SPIN] * arm_i - hot[j, SPIN] * arm_j
+            law = pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
+            kind = np.int64(bonds[tied, KIND])
+            u_before = reach - math.sqrt((dx - dvx * dt) ** 2 + (dy - dvy * dt) ** 2)
+            _, ks_before, _ = _springs(kind, u_before, two_rt, reach, law, bonds[tied], u_made[k], spheres)
+            if kind == 0 and d2 > reach * reach:
+                _book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
+                continue
+            fn, ks, energy = _springs(kind, u, two_rt, reach, law, bonds[tied], u_made[k], spheres)
+            if kind == 0 or bond[k] == 0:  # a bond that holds does not slip
+                slip = (before + ks * sliding * dt - now) / ks if ks > 0.0 else sliding * dt
+                loss = 0.5 * (before + now) * slip
+                if kind != 0 and u < 0.0:  # strained up to now; its force has not pulled in the rest of the last step
+                    loss += energy - 0.5 * fn * (u - u_before)
+                _book(bins, FRICTION if kind == 0 else BONDS, loss)
+            _book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pair_energy(
+    t, hot, ihot, cut, lo, poff, ptr, partner, fs, bond, u_made, pairs, bonds, n_mat, spheres, stored
+):  # fmt: skip
+    """Elastic energy of the pairs of block t: NORMAL and SHEAR where they touch, BONDED where a bond is open."""
+    p = poff[t] - lo[t]
+    for i in range(cut[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            reach = ri + rj
+            d2 = dx * dx + dy * dy
+            kind = np.int64(bonds[bond[k], KIND])
+            if kind == 0 and d2 > reach * reach:
+                continue
+            u = reach - math.sqrt(d2)
+            law = pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
+            _, ks, energy = _springs(kind, u, 4.0 * ri * rj / reach, reach, law, bonds[bond[k]], u_made[k], spheres)
+            shear = laws.shear_energy(fs[k], ks)
+            if u >= 0.0:
+                _book(stored, NORMAL, energy)
+                _book(stored, SHEAR, shear)
+            else:
+                _book(stored, BONDED, energy + shear)
+
+
+# ---- walls ---------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _last_slot(slot_row, first):
+    """One past the last slot of the particle of slot `first`."""
+    last = first + 1
+    while last < len(slot_row) and slot_row[last] == slot_row[first]:
+        last += 1
+    return last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wall_work(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table, n_mat, span, bins):
+    """Work that moving walls do in `span` [s] with the present forces: that on the particle times the wall's speed."""
+    first = 0
+    while first < len(slot_row):
+        last = _last_slot(slot_row, first)
+        for k in range(first, last):
+            wall = walls[slot_wall[k]]
+            if wall[WVX] == 0.0 and wall[WVY] == 0.0:
+                continue
+            where, _, nx, ny, _, fn, _, _ = wall_kernels.contact(
+                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
+            )
+            if where != NONE:
+                s = slot_fs[k]
+                _book(bins, WALLS, ((s * -ny - fn * nx) * wall[WVX] + (s * nx - fn * ny) * wall[WVY]) * span)
+        first = last
+
+
+@njit(cache=True, error_model="numpy")
+def _jump(where, u, way, law, two_r, was, u_before, way_before):
+    """Normal energy that is lost because a wall contact is another one than before the step: on a face, at an end, or
+    dropped there in favour of another wall's, and not because it began or opened. way, way_before: what the motion of
+    the step adds to the overlaps now and before."""
+    if was == where or (was == NONE and u <= way) or (where == NONE and u_before + way_before <= 0.0):
+        return 0.0
+    loss = 0.0
+    if was != NONE:
+        fn, _ = laws.contact(law[MODEL], law[A], law[B], two_r, u_before)
+        loss += laws.normal_energy(law[MODEL], fn, u_before) + 0.5 * fn * way_before
+    if where != NONE:
+        fn, _ = laws.contact(law[MODEL], law[A], law[B], two_r, u)
+        loss -= laws.normal_energy(law[MODEL], fn, u) - 0.5 * fn * way
+    return loss
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wall_losses(
+    hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, fs_before, side_before, laws_table, n_mat, dt, bins
+):  # fmt: skip
+    """The same as pair_losses for the contacts with walls; fs_before and side_before: histories before the forces."""
+    before_walls = walls.copy()
+    for w in range(len(walls)):
+        before_walls[w, P1X] -= walls[w, WVX] * dt
+        before_walls[w, P1Y] -= walls[w, WVY] * dt
+        before_walls[w, P2X] -= walls[w, WVX] * dt
+        before_walls[w, P2Y] -= walls[w, WVY] * dt
+    first = 0
+    while first < len(slot_row):
+        last = _last_slot(slot_row, first)
+        i = slot_row[first]
+        x, y, r = hot[i, X], hot[i, Y], hot[i, RADIUS]
+        for k in range(first, last):
+            before, now, wall = fs_before[k], slot_fs[k], walls[slot_wall[k]]
+            vx, vy = hot[i, VX] - wall[WVX], hot[i, VY] - wall[WVY]
+            law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
+            was, _, mx, my, u_before = wall_kernels.meeting(
+                k, first, last, x - hot[i, VX] * dt, y - hot[i, VY] * dt, r, before_walls, slot_wall, side_before
+            )
+            where, _, nx, ny, u = wall_kernels.meeting(k, first, last, x, y, r, walls, slot_wall, side_before)
+            if was == NONE and where == NONE:
+                continue
+            way, way_before = (nx * vx + ny * vy) * dt, (mx * vx + my * vy) * dt
+            _book(bins, OPENED, _jump(where, u, way, law, 2.0 * r, was, u_before, way_before))
+            if before == 0.0 and now == 0.0:
+                continue
+            ks_before = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u_before)[1] if was != NONE else 0.0
+            if where == NONE:
+                sliding = my * vx - mx * vy - hot[i, SPIN] * r
+                _book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
+                continue
+            _, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
+            sliding = ny * vx - nx * vy - hot[i, SPIN] * (r - 0.5 * u)
+            slip = (before + ks * sliding * dt - now) / ks if ks > 0.0 else sliding * dt
+            _book(bins, FRICTION, 0.5 * (before + now) * slip)
+            _book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
+        first = last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wall_energy(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table, n_mat, stored):
+    """Elastic energy of the contacts with walls."""
+    first = 0
+    while first < len(slot_row):
+        last = _last_slot(slot_row, first)
+        for k in range(first, last):
+            where, _, _, _, u, fn, ks, _ = wall_kernels.contact(
+                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
+            )
+            if where != NONE:
+                law = laws_table[slot_wall[k] * n_mat + ihot[slot_row[k], MATERIAL]]
+                _book(stored, NORMAL, laws.normal_energy(law[MODEL], fn, u))
+                _book(stored, SHEAR, laws.shear_energy(slot_fs[k], ks))
+        first = last

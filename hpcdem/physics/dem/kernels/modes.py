@@ -1,0 +1,118 @@
+"""The stiffness of the present contacts and bonds as a linear map, for the highest frequency of the model.
+
+A small motion (ux, uy, turn) per particle strains each contact and bond along n and along t: the normal spring by
+(u_b - u_a) . n, the shear spring by (u_b - u_a) . t - turn_a la - turn_b lb (docs/physics.md, Contacts). With their
+tangent stiffnesses the energy is u K u / 2. What turning of n does to the forces there are is left out: its stiffness
+is Fn / d, small against dFn/dU as overlaps are small. Nothing of the state changes, and no matrix is made.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hpcdem.core.fields import GID, MATERIAL, RADIUS, X, Y
+from hpcdem.numerics.rng import uniform
+from hpcdem.physics.dem.kernels import laws
+from hpcdem.physics.dem.kernels import walls as wall_kernels
+from hpcdem.physics.dem.kernels.contacts import E_MOD, G_MOD, KIND, MODEL, MU, A, B
+from hpcdem.physics.dem.kernels.motion import INERTIA, KICK_X, MASS
+from hpcdem.physics.dem.kernels.walls import NONE
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def begin(ihot, n_left, body, scale, out):
+    """scale (n_own, 3) f8: 1/sqrt(m), 1/sqrt(I), 0 where a direction is fixed and for members of clumps; out (n_own,
+    3): random numbers of the ids, zero there."""
+    for c in range(len(body)):
+        for axis in range(3):
+            inertia = body[c, INERTIA if axis == 2 else MASS]
+            free = body[c, KICK_X + axis] != 0.0
+            scale[c, axis] = 1.0 / math.sqrt(inertia) if free else 0.0
+            out[c, axis] = uniform(11, axis, ihot[n_left + c, GID]) - 0.5 if free else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _spring(force, i, j, nx, ny, kn, ks, arm_i, arm_j, u, at_i, at_j):
+    """Add the forces of a pair on rows at_i and at_j of `force`, from the motions u of i and j."""
+    dx, dy = u[j, 0] - u[i, 0], u[j, 1] - u[i, 1]
+    fn = kn * (nx * dx + ny * dy)
+    fs = ks * (nx * dy - ny * dx - u[i, 2] * arm_i - u[j, 2] * arm_j)
+    force[at_i, 0] -= fn * nx - fs * ny
+    force[at_i, 1] -= fn * ny + fs * nx
+    force[at_i, 2] -= fs * arm_i
+    force[at_j, 0] += fn * nx - fs * ny
+    force[at_j, 1] += fn * ny + fs * nx
+    force[at_j, 2] -= fs * arm_j
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pairs(
+    t, hot, ihot, cut, lo, hi, poff, foff, ptr, partner, bond, u_made, pair_laws, bonds, n_mat, spheres, u, force
+):  # fmt: skip
+    """K u of the pairs of block t, into its rows of force (k, 3) f8, as in the force loop: the same terms in the same
+    order for each owned particle on any number of blocks and ranks. u (n, 3) f8 per storage row.
+
+    A contact without friction has no shear spring: it slips.
+    """
+    shift, p = foff[t] - lo[t], poff[t] - lo[t]
+    for r in range(foff[t], foff[t] + hi[t] - lo[t]):
+        force[r, 0] = force[r, 1] = force[r, 2] = 0.0
+    for i in range(lo[t], cut[t + 1]):
+        for k in range(ptr[p + i], ptr[p + i + 1]):
+            j = partner[k]
+            dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            reach = ri + rj
+            d2 = dx * dx + dy * dy
+            kind = np.int64(bonds[bond[k], KIND])
+            if kind == 0 and d2 > reach * reach:
+                continue
+            d = math.sqrt(d2)
+            nx, ny = (dx / d, dy / d) if d != 0.0 else (1.0, 0.0)
+            overlap, two_rt = reach - d, 4.0 * ri * rj / reach
+            law = pair_laws[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
+            if overlap >= 0.0:
+                kn = laws.tangent_normal_stiffness(law[MODEL], law[A], two_rt, overlap)
+                _, ks = laws.contact(law[MODEL], law[A], law[B], two_rt, overlap)
+                if kind == 0 and law[MU] == 0.0:
+                    ks = 0.0
+            elif kind == laws.ELASTIC_BOND:
+                fn, ks = laws.elastic_bond(
+                    bonds[bond[k], E_MOD], bonds[bond[k], G_MOD], laws.bond_area(two_rt, spheres), reach, overlap
+                )
+                kn = fn / overlap
+            else:
+                fn, ks = laws.contact_bond(law[MODEL], law[A], law[B], two_rt, u_made[k], overlap)
+                kn = fn / overlap
+            arm = 0.5 * overlap
+            _spring(force, i, j, nx, ny, kn, ks, ri - arm, rj - arm, u, shift + i, shift + j)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def walls(hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat, n_left, u, out):
+    """Add K u of the contacts with walls to the owned particles, out (n_own, 3) f8."""
+    first = 0
+    while first < len(slot_row):
+        last = first + 1
+        while last < len(slot_row) and slot_row[last] == slot_row[first]:
+            last += 1
+        i = slot_row[first]
+        c = i - n_left
+        for k in range(first, last):
+            where, _, nx, ny, overlap, _, ks, mu = wall_kernels.contact(
+                k, first, last, hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat
+            )
+            if where == NONE:
+                continue
+            law = wall_laws[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
+            arm = hot[i, RADIUS] - 0.5 * overlap
+            fn = laws.tangent_normal_stiffness(law[MODEL], law[A], 2.0 * hot[i, RADIUS], overlap)
+            fn *= nx * u[i, 0] + ny * u[i, 1]
+            fs = (ks if mu > 0.0 else 0.0) * (nx * u[i, 1] - ny * u[i, 0] + u[i, 2] * arm)
+            out[c, 0] += fn * nx - fs * ny
+            out[c, 1] += fn * ny + fs * nx
+            out[c, 2] += fs * arm
+        first = last

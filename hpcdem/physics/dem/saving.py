@@ -1,0 +1,297 @@
+"""The whole state to a file and back, bit for bit, on any number of ranks and threads."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.clock import Clock
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.fields import (
+    AREA,
+    CLUMP,
+    CLUMP_ANGLE,
+    CLUMP_SPIN,
+    CLUMP_VX,
+    CLUMP_VY,
+    CLUMP_WIDTH,
+    CLUMP_X,
+    CLUMP_Y,
+    FIELDS,
+    FX,
+    MEMBERS,
+    MOMENT,
+    OFFSET_X,
+    OFFSET_Y,
+    TORQUE,
+)
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import to_slabs
+from hpcdem.physics.dem.budget import Budget
+from hpcdem.physics.dem.clumps import Clumps
+from hpcdem.physics.dem.kernels.contacts import LONGEST2
+from hpcdem.physics.dem.kernels.fast import Fast
+from hpcdem.physics.dem.kernels.neighbours import Histories
+from hpcdem.physics.dem.particles import free_rows
+from hpcdem.physics.dem.settings import Settings
+from hpcdem.physics.dem.simulation import Lattice, Simulation
+from hpcdem.physics.dem.walls import Walls
+from hpcdem.runtime.checkpoints import newest_first
+
+
+def save(sim: Simulation, path: Path | str) -> None:
+    """SAV: write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    began = time.perf_counter()
+    with sim.timers("checkpoint"):
+        checkpoint.write(path, state_of(sim), tables_of(sim), sim.comm)
+    if sim.stop is not None:
+        sim.stop.saved(time.perf_counter() - began)
+
+
+def state_of(sim: Simulation) -> dict[str, Any]:
+    """Everything that is not a per-particle table, as JSON values (floats survive JSON bit for bit)."""
+    closed = sim.closed
+    longest2 = np.array([sim.lists.longest_bond2() if closed else sim._longest2])
+    breaks = sim.breaks.copy()
+    if closed:
+        breaks = breaks + sim.uncollected_breaks()
+    walls = {name: getattr(sim.walls, name).tolist() for name in Walls.COLUMNS}
+    return {
+        "clock": dataclasses.asdict(sim.clock),
+        "settings": dataclasses.asdict(sim.settings),
+        "lattice": dataclasses.asdict(sim.lattice),
+        "fast": sim.fast.state(),
+        "closed": closed,
+        "longest2": float(sim.comm.max_into(longest2)[0]),
+        "walls": walls,
+        "materials": sim.materials.as_floats().tolist(),
+        "bond_types": sim.bond_types.as_floats().tolist(),
+        "groups": sim.groups,
+        "next_gid": sim.next_gid,
+        "makers": sim.makers,
+        "streams": sim.streams,
+        "breaks": sim.comm.sum_into(breaks).tolist(),
+        "bonds": sim.bonds_left(),
+        "clumps": {"number": sim.clumps.number, "reach": sim.clumps.reach},
+        "lost": sim.lost,
+        "rows": sim.rows,
+        "energy": sim.energy.state(sim) if sim.energy is not None else None,
+        "rebuilds": sim.rebuilds,
+        "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
+        "history_origins": {str(k): list(v) for k, v in sim.history_origins.items()},
+        "progress": sim.progress,
+        "position": sim.position,
+        "script": sim.script,
+        "plots": sim.plots,
+        "drawing": sim.drawing,
+    }
+
+
+def tables_of(sim: Simulation) -> dict[str, Table]:
+    """The per-particle tables of the state, as slabs. Collective."""
+    p = sim.particles
+    columns = {name: p[name].copy() for name in FIELDS}
+    if sim.closed:
+        force = sim.lists.owned_forces()
+        for k, name in enumerate(("fx", "fy", "torque")):
+            columns[name] = force[:, k].copy()
+        hist, origin = sim.lists.histories(p.ihot), sim.origin
+    else:
+        hist, origin = sim.hist, p.positions()
+    columns["x0"], columns["y0"] = origin[:, 0].copy(), origin[:, 1].copy()
+    owner = np.repeat(p["gid"], hist.counts())
+    once, walls = hist.partner > owner, hist.partner < 0
+    pairs = {
+        "gid": owner[once], "partner": hist.partner[once], "fs": hist.fs[once], "extra": hist.extra[once],
+        "bond": hist.bond[once].astype(np.int64),
+    }  # fmt: skip
+    wall_contacts = {
+        "gid": owner[walls], "wall": -1 - hist.partner[walls], "fs": hist.fs[walls], "extra": hist.extra[walls],
+    }  # fmt: skip
+    return {
+        "particles": to_slabs(sim.comm, ("gid",), columns),
+        # A pair whose partners live on two ranks is remembered by both; the lower gid's owner writes it.
+        "pairs": to_slabs(sim.comm, ("gid", "partner"), pairs),
+        "wall_contacts": to_slabs(sim.comm, ("gid", "wall"), wall_contacts),
+        **_clump_tables(sim),
+    }
+
+
+CLUMP_STATE = {
+    "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
+    "inertia": MOMENT,
+}  # fmt: skip
+"""Columns of the table `clumps`, which its first member's owner writes, besides id and number of members."""
+
+
+def _clump_tables(sim: Simulation) -> dict[str, Table]:
+    """Each clump once, and the places of their members in them."""
+    rows = sim.clumps.rows(sim.particles)
+    if rows is None:
+        return {}
+    gid, clump, size = sim.particles["gid"], sim.particles.clump, rows.view(np.int64)[:, MEMBERS]
+    first, member = clump == gid, clump >= 0
+    clumps = {"id": clump[first], **{name: rows[first, k] for name, k in CLUMP_STATE.items()}, "members": size[first]}
+    members = {
+        "gid": gid[member], "clump": clump[member], "dx": rows[member, OFFSET_X], "dy": rows[member, OFFSET_Y],
+    }  # fmt: skip
+    return {"clumps": to_slabs(sim.comm, ("id",), clumps), "clump_members": to_slabs(sim.comm, ("gid",), members)}
+
+
+def _take_clumps(sim: Simulation, tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+    """The rows of clumps, on this rank, of the particles it has."""
+    p = sim.particles
+    p.rigid = free_rows(len(p))
+    if tables is None:
+        return
+    clumps, members = tables["clumps"], tables["clump_members"]
+    at = np.searchsorted(p["gid"], members["gid"])
+    of = np.searchsorted(clumps["id"], members["clump"])
+    rows = np.zeros((len(at), CLUMP_WIDTH))
+    for name, k in CLUMP_STATE.items():
+        rows[:, k] = clumps[name][of]
+    rows[:, OFFSET_X], rows[:, OFFSET_Y] = members["dx"], members["dy"]
+    numbers = rows.view(np.int64)
+    numbers[:, CLUMP], numbers[:, MEMBERS] = members["clump"], clumps["members"][of]
+    p.rigid[at] = rows
+
+
+def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
+    """Take the state of a file written by `save`, on any number of ranks and threads. Collective.
+
+    Returns where the run that saved was: "script" (its text), "position" (index of the statement), "progress" (of the
+    CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is
+    missing, foreign or damaged; the simulation is then as it was.
+    """
+    found = None
+    error = None
+    if sim.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+            if "kind" in found[0]:
+                raise HpcdemError(f"{path} is a checkpoint, but not one of particles: a PCDC script can restore it")
+        except HpcdemError as problem:
+            found, error = None, str(problem)
+    try:
+        sim.comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    state = sim.comm.bcast(None if found is None else json.dumps(found[0]))
+    state = json.loads(state)
+    apply_state(sim, state, found[1] if found is not None else None)
+    return {name: state[name] for name in ("script", "position", "progress")}
+
+
+def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | None:
+    """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. Collective.
+
+    The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
+    earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
+    the log and the one before it is tried.
+    """
+    found, damaged = newest_first(folders) if sim.comm.rank == 0 else ([], [])
+    for error in damaged if sim.log is not None else []:
+        sim.log.warn(f"{error}; it is passed over")
+    for path in sim.comm.bcast(found):
+        try:
+            state = restore(sim, path)
+        except CommandError as error:
+            if sim.log is not None:
+                sim.log.warn(f"{error}; trying the checkpoint before it")
+            continue
+        if sim.log is not None:
+            sim.log.info(f"going on from {path}, step {sim.clock.step}")
+        sim.resumed = True
+        return {**state, "path": path}
+    if sim.log is not None:
+        sim.log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
+    return None
+
+
+def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
+    """Take a state that was read; tables: on rank 0, else None. Collective."""
+    sim.clear()
+    sim.clock = Clock(**state["clock"])
+    sim.settings = Settings(**state["settings"])
+    sim.lattice = Lattice(**state["lattice"])
+    sim.fast = Fast.restored(state.get("fast", []))
+    sim.walls.take_columns(state["walls"])
+    for name in ("materials", "bond_types"):
+        getattr(sim, name).take_floats(np.array(state[name], dtype=np.float64))
+    for name in ("groups", "next_gid", "streams"):
+        setattr(sim, name, state[name])
+    sim.history_wishes = {int(k): (int(v[0]), str(v[1])) for k, v in state["history_wishes"].items()}
+    sim.makers = [(int(first), int(line)) for first, line in state.get("makers", [])]
+    origins = state.get("history_origins", {})
+    sim.history_origins = {int(k): (int(v[0]), float(v[1])) for k, v in origins.items()}
+    sim.plots = [(int(y), int(x)) for y, x in state["plots"]]
+    if state.get("drawing") is not None:
+        sim.drawing = int(state["drawing"][0]), tuple(state["drawing"][1])
+    sim.bonds = state["bonds"]
+    sim.lost = state.get("lost", 0)
+    sim.rows = [(int(first), int(end)) for first, end in state.get("rows", [])]
+    if state.get("energy") is not None:
+        sim.energy = Budget.restored(state["energy"], sim.comm.rank == 0)
+    sim._longest2 = state["longest2"]
+    sim.restart_step = sim.clock.step
+    if sim.comm.rank == 0:
+        sim.breaks[:] = state["breaks"]
+    origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)
+    sim.clumps = Clumps(**state.get("clumps", {}))
+    if sim.clumps:
+        _take_clumps(sim, tables)
+    if state["closed"]:
+        _close_as_it_was(sim, state, origin)
+    sim.rebuilds = state["rebuilds"]
+
+
+def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -> np.ndarray:
+    """All particles and histories, on this rank; the first close shares them out. Returns their positions at the last
+    rebuild (n, 2) [m]."""
+    columns = dict(tables["particles"])
+    sim.particles.append(**{name: columns[name] for name in FIELDS})
+    pairs, walls = tables["pairs"], tables["wall_contacts"]
+    none = np.zeros(len(walls["gid"]), np.int64)
+    owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
+    partner = np.concatenate([pairs["partner"], pairs["gid"], -1 - walls["wall"]])
+    fs = np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]])
+    extra = np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]])
+    bond = np.concatenate([pairs["bond"], pairs["bond"], none]).astype(np.int32)
+    gid = columns["gid"]
+    order = np.argsort(owner, kind="stable")
+    ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
+    sim.hist = Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order])
+    return np.column_stack([columns["x0"], columns["y0"]])
+
+
+def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray) -> None:
+    """Lists as they were when the state was saved: built from the positions and walls of that rebuild, then the present
+    positions put in. Order, ownership and lists depend on the former alone."""
+    p, walls = sim.particles, sim.walls
+    saved_lattice = dataclasses.replace(sim.lattice)
+    travel = walls.travel.copy()
+    now = walls.p1.copy(), walls.p2.copy()
+    gid, forces = p["gid"].copy(), p.cold[:, FX : TORQUE + 1].copy()
+    # The present positions travel with their particles in columns that the close does not read.
+    p.cold[:, FX : FX + 2] = p.positions()
+    p["x"][:], p["y"][:] = origin.T
+    walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
+    sim._close(frozen=True)
+    walls.p1, walls.p2, walls.travel = now[0], now[1], travel
+    sim.lattice = saved_lattice
+    p["x"][:], p["y"][:] = p.cold[:, FX], p.cold[:, FX + 1]
+    all_gid, all_forces = sim.comm.bcast((gid, forces))
+    sim.lists.set_owned_forces(all_forces[np.searchsorted(all_gid, p["gid"])])
+    if sim.clumps:
+        sim.clumps.sum_forces(p, sim.halo, sim.lists)
+    sim.lists.tally[:, LONGEST2] = state["longest2"]
+    sim._longest2 = state["longest2"]
+    sim.halo.refresh()
+    sim.tables_changed()
+    sim.refresh_tables()

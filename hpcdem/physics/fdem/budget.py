@@ -1,0 +1,183 @@
+"""The energy budget of a model of blocks: what is stored, what was done and lost, and by how much it does not add up.
+
+Work is booked per element, in columns that travel with it; sums over the model are exact, so neither ranks, threads nor
+a restart change a bit of them. Commands between two steps interrupt the account: what is stored before and after them
+is compared, and the difference booked as theirs.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.numerics.exact_sum import exact_sum, from_integer
+from hpcdem.physics.fdem.kernels import energy
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.looking import Looking
+
+STORED = ("kinetic", "strain", "joints")
+WORK = ("joints", "contact", "viscous", "gravity", "outside")
+"""Columns of energy.WORK by name."""
+
+
+class Budget:
+    """The account of one model. accounts: work of each kind up to the last interruption [J/m]; commands: changes by
+    commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
+    of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer.
+
+    running: steps are being booked; otherwise the account stands at a whole step.
+    """
+
+    def __init__(self) -> None:
+        self.accounts = dict.fromkeys(WORK, 0.0)
+        self.commands = dict.fromkeys(STORED, 0.0)
+        self.start: dict[str, float] | None = None
+        self.left = dict.fromkeys(STORED, 0.0)
+        self.running = False
+        self.discs = 0
+        self._before = np.empty((0, 0))
+
+    # ---- called by the step ----------------------------------------------------------------------------------------
+
+    def before_forces(self, sim: Looking) -> None:
+        """A step begins: take up the account again after an interruption; keep the velocities. Collective."""
+        if not self.running:
+            self._begin(sim)
+        with sim.timers("energy"):
+            self._before = sim.v.copy()
+
+    def after_forces(self, sim: Looking) -> None:
+        """Velocities are new, positions still old: book the work of this moment's forces."""
+        local, pairs = sim.local, sim.local.pairs
+        with sim.timers("energy"):
+            self._book(
+                sim, self._before, sim.v, 0.5, 0.5, local.of_joints, pairs.pushed, local.felt, local.outside,
+                sim.cold["work"],
+            )  # fmt: skip
+
+    # ---- interruptions ---------------------------------------------------------------------------------------------
+
+    def _begin(self, sim: Looking) -> None:
+        stored, half = self._read(sim)
+        if self.start is None:
+            self.start = stored
+        else:
+            for name in STORED:
+                self.commands[name] += stored[name] - self.left[name]
+        for name in WORK:
+            self.accounts[name] -= half[name]
+        sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
+        self.running = True
+
+    def pause(self, sim: Looking) -> None:
+        """A command is about to change the model: bring the account to the whole step. Collective."""
+        if not self.running:
+            return
+        self.left, half = self._read(sim)
+        done = self._done(sim)
+        for name in WORK:
+            self.accounts[name] += done[name] + half[name]
+        self.running = False
+        del sim.cold["work"]
+
+    # ---- readings --------------------------------------------------------------------------------------------------
+
+    def reading(self, sim: Looking) -> dict[str, float]:
+        """The budget now, see `Looking.energies`. Collective."""
+        stored, half = self._read(sim) if self.running else (dict(self.left), dict.fromkeys(WORK, 0.0))
+        if self.start is None:
+            stored, _ = self._read(sim)
+            start = stored
+        else:
+            start = self.start
+        done = self._done(sim) if self.running else dict.fromkeys(WORK, 0.0)
+        work = {name: self.accounts[name] + done[name] + half[name] for name in WORK}
+        change = sum(stored.values()) - sum(start.values())
+        by_commands = sum(self.commands.values())
+        of_discs = self._of_discs(sim)
+        joints_lost = -work["joints"] - (stored["joints"] - start["joints"] - self.commands["joints"])
+        found = {
+            "kinetic": stored["kinetic"],
+            "strain": stored["strain"],
+            "joints": stored["joints"],
+            "joints_lost": joints_lost,
+            "contact": -work["contact"],
+            "viscous_lost": -work["viscous"],
+            "work_gravity": work["gravity"],
+            "work_outside": work["outside"] - of_discs,
+            "work_discs": of_discs,
+            "commands": by_commands,
+        }
+        given = work["gravity"] + work["outside"] + by_commands
+        taken = joints_lost - work["contact"] - work["viscous"]
+        found["closing"] = change + taken - given
+        flows = [joints_lost, *(work[name] for name in WORK[1:]), by_commands]
+        flows += [sum(map(abs, part.values())) for part in (stored, start)]
+        largest = max(map(abs, flows))
+        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
+        return found
+
+    def add_from_discs(self, work: int) -> None:
+        """Say how much of the work from outside discs did, this rank's share, as an integer of
+        exact_sum.as_integer."""
+        self.discs += work
+
+    def _of_discs(self, sim: Looking) -> float:
+        return from_integer(sum(sim.comm.allgather(self.discs)))
+
+    def _done(self, sim: Looking) -> dict[str, float]:
+        """Work booked in the columns of the elements, summed over the model."""
+        columns = sim.cold["work"]
+        return {name: exact_sum(columns[:, k], sim.comm) for k, name in enumerate(WORK)}
+
+    def _read(self, sim: Looking) -> tuple[dict[str, float], dict[str, float]]:
+        """What is stored at the present step, and the first half of the work of this moment's forces."""
+        seen, local = sim.evaluate(), sim.local
+        with sim.timers("energy"):
+            kinetic = np.empty(sim.n_own)
+            energy.kinetic(
+                sim.n_left, sim.n_own, sim.the_mesh().cells, sim.number, sim.v, seen.v_next, local.mass, kinetic
+            )
+            _, strain = local.stresses()
+            in_joints = local.stored_in_joints()
+            half = np.zeros((sim.n_own, energy.WORK))
+            self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
+            stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
+            return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}
+
+    @staticmethod
+    def _book(
+        sim: Looking, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray,
+        pushed: np.ndarray, felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
+    ) -> None:  # fmt: skip
+        local, o, dt = sim.local, sim.options, sim.clock.dt
+        energy.book(
+            sim.n_left, sim.n_own, local.triangle_rows[: local.count], local.quad_rows, local.c, local.q, sim.x, before,
+            after, a, b, of_joints, local.true_mass, o.gx, o.gy, dt, work,
+        )  # fmt: skip
+        pairs = local.pairs
+        energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)
+        energy.book_nodes(
+            local.node_begin, local.node_place, felt, outside, before, after, a, b, dt, sim.n_left, sim.n_own,
+            sim.v.shape[1], work,
+        )  # fmt: skip
+
+    # ---- state on disk ---------------------------------------------------------------------------------------------
+
+    def state(self, sim: Looking) -> dict[str, Any]:
+        """As JSON values; the columns of the elements are saved with them. Collective."""
+        return {
+            "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,
+            "running": self.running, "discs": hex(sum(sim.comm.allgather(self.discs))),
+        }  # fmt: skip
+
+    @staticmethod
+    def restored(state: dict[str, Any], first: bool) -> Budget:
+        """Inverse of `state`; first: this rank takes the share of all ranks."""
+        made = Budget()
+        made.discs = int(state.get("discs", "0x0"), 16) if first else 0
+        made.accounts, made.commands = dict(state["accounts"]), dict(state["commands"])
+        made.start, made.left, made.running = state["start"], state["left"], state["running"]
+        return made

@@ -1,0 +1,161 @@
+"""Groups of elements, nodes, faces and joints, and ranges that choose among them.
+
+A group belongs to a set; an object is in one group of each set at most. Objects are numbered for the whole model
+(`connectivity`): a group is an ascending array of numbers, and knows neither ranks nor how many objects there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+
+ELEMENT, NODE, FACE, JOINT = "element", "node", "element-face", "face-joint"
+KINDS = (ELEMENT, NODE, FACE, JOINT)
+DEFAULT = "default"
+"""The set of groups that name none."""
+
+
+class Groups:
+    """Groups of one kind of object: set name -> group name -> ascending numbers."""
+
+    def __init__(self, kind: str, groups: Mapping[str, Mapping[str, np.ndarray]] | None = None) -> None:
+        self.kind = kind
+        self.sets: dict[str, dict[str, np.ndarray]] = {}
+        for set_name, of in (groups or {}).items():
+            for name, numbers in of.items():
+                self.assign(numbers, name, set_name)
+
+    def assign(self, numbers: Iterable[int], group: str, set_name: str = DEFAULT) -> None:
+        """Put objects into a group; they leave the one of the set that they were in."""
+        new = np.unique(np.asarray(numbers, np.int64))
+        groups = self.sets.setdefault(set_name, {})
+        for other, members in groups.items():
+            if other != group:
+                groups[other] = np.setdiff1d(members, new, assume_unique=True)
+        groups[group] = np.union1d(groups.get(group, np.empty(0, np.int64)), new)
+
+    def members(self, group: str, set_name: str = DEFAULT) -> np.ndarray:
+        """Numbers of a group. CommandError if there is no such set or group, with those there are."""
+        groups = self.of_set(set_name)
+        if group not in groups:
+            elsewhere = [s for s, of in self.sets.items() if group in of]
+            raise CommandError(
+                f"set '{set_name}' has no group '{group}' of {self.kind}s; it has {_listed(groups)}"
+                + (f". There is a group '{group}' in set {_listed(elsewhere)}" if elsewhere else "")
+            )
+        return groups[group]
+
+    def of_set(self, set_name: str) -> dict[str, np.ndarray]:
+        """The groups of a set. CommandError if there is none."""
+        if set_name not in self.sets:
+            raise CommandError(f"there is no set '{set_name}' of {self.kind}s; there is {_listed(self.sets)}")
+        return self.sets[set_name]
+
+    def state(self) -> dict[str, dict[str, list[list[int]]]]:
+        """As JSON values: every group as runs [first, last] of numbers."""
+        return {s: {name: _runs(numbers) for name, numbers in of.items()} for s, of in self.sets.items()}
+
+    @staticmethod
+    def restored(kind: str, state: Mapping[str, Mapping[str, Sequence[Sequence[int]]]]) -> Groups:
+        """Inverse of `state`."""
+        made = Groups(kind)
+        for set_name, of in state.items():
+            for name, runs in of.items():
+                parts = [np.arange(first, last + 1, dtype=np.int64) for first, last in runs]
+                made.sets.setdefault(set_name, {})[name] = np.concatenate([np.empty(0, np.int64), *parts])
+        return made
+
+
+def _runs(numbers: np.ndarray) -> list[list[int]]:
+    if not len(numbers):
+        return []
+    ends = np.flatnonzero(np.diff(numbers) != 1)
+    first, last = np.concatenate([[0], ends + 1]), np.concatenate([ends, [len(numbers) - 1]])
+    return np.column_stack([numbers[first], numbers[last]]).tolist()
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names) or "none so far"
+
+
+# ---- ranges --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class InGroup:
+    """Members of a group."""
+
+    group: str
+    set_name: str = DEFAULT
+
+
+@dataclass(frozen=True)
+class InSet:
+    """Members of any group of a set."""
+
+    set_name: str
+
+
+@dataclass(frozen=True)
+class Ids:
+    """Numbers from first to last."""
+
+    first: int
+    last: int
+
+
+@dataclass(frozen=True)
+class Span:
+    """From low to high along an axis, 0: x, 1: y, in the mesh. Elements: their centre; faces and joints: both ends."""
+
+    axis: int
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class OnLayer:
+    """On the lines of a geometry layer; elements: inside of it."""
+
+    layer: str
+
+
+@dataclass(frozen=True)
+class OnBoundary:
+    """On a surface of the model."""
+
+
+@dataclass(frozen=True)
+class OfElements:
+    """Faces, joints and nodes of the elements of a group; joints: both elements are in it."""
+
+    group: str
+    set_name: str = DEFAULT
+
+
+@dataclass(frozen=True)
+class Between:
+    """Joints with an element in each of two groups."""
+
+    one: str
+    other: str
+    set_name: str = DEFAULT
+
+
+@dataclass(frozen=True)
+class OnCrack:
+    """Joints on a crack of the mesh."""
+
+
+@dataclass(frozen=True)
+class Present:
+    """Other terms of the range look at where things are now, not at where they are in the mesh."""
+
+
+Term = InGroup | InSet | Ids | Span | OnLayer | OnBoundary | OfElements | Between | OnCrack | Present
+Range = tuple[Term, ...]
+"""All terms must hold."""

@@ -1,0 +1,633 @@
+"""Forces of elements and joints, and the kick they give: the loop that takes most of the time of an intact body.
+
+A triangle computes the forces on its own corners: from its stress, from the joints on its three edges (the partner
+does the same on its side, with the same numbers: see joints.py), and takes those of contacts as they come. Nothing is
+sent to a neighbour, so neither threads nor ranks meet. Triangles go through in blocks of `BLOCK`:
+
+1. rows of triangle and partners' edges are turned into lanes (numerics/lanes.py);
+2. stress and joints before their peak are plain loops over lanes, which become vector instructions;
+3. joints behind their peak, of which each block has a list, overwrite their lanes one by one;
+4. contact forces are added, and corners that move by themselves are kicked: v += f dt / m. For the others the forces
+   are stored; nodes.py adds them up.
+
+Row layouts: x (n, 8): the three corners and the first one again, so that any edge is four numbers in a row; v (n, 6).
+With quads in the mesh x and v are (n, 12): up to four corners, then the first two again. Forces (n, 8).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
+from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels.joints import INTACT, KINETIC, MEMORY, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
+
+BLOCK = 64
+"""Triangles worked on together: their lanes stay in the first-level cache."""
+
+# Columns of the table of triangles (n, 12): inverse of the reference matrix [X2 - X1, X3 - X1], Lame's lambda, 2 mu,
+# viscosity [Pa s], mass of a corner [kg/m] (for gravity), and dt / m of the three corners, 0 where nodes.py moves it.
+INVERSE, LAMBDA, TWO_MU, ETA, WEIGHT, KICK = 0, 4, 5, 6, 7, 8
+TRIANGLE = 12
+# Columns of the table of quads (n, 32): the inverses of their four triangles (`PARTS`), areas of these, lambda, 2 mu,
+# viscosity, masses of the four corners.
+Q_INVERSE, Q_AREA, Q_LAMBDA, Q_TWO_MU, Q_ETA, Q_WEIGHT = 0, 16, 20, 21, 22, 23
+QUAD = 32
+PARTS = np.array([[0, 1, 2], [0, 2, 3], [1, 2, 3], [1, 3, 0]])
+"""Two overlays of two triangles each."""
+
+FORCE = 8
+
+# What a pass leaves behind per thread (int64): joints that broke, joints that passed their peak.
+NEW_BROKEN, NEW_YIELDED = 0, 1
+TALLY = 8
+
+(
+    X1, Y1, X2, Y2, X3, Y3, _, _, VX1, VY1, VX2, VY2, VX3, VY3, _, _, CA, CB, CC, CD, LAM, MU2, VISC, MASS,
+    K1, K2, K3, _, PX, PY, QX, QY, KOP, TENSILE, OVERLAY, TAN_PHI, COHESION, HALF_SHEAR, _, _,
+    FX1, FY1, FX2, FY2, FX3, FY3, S11, S22, S12, S33,
+) = (lane(k) for k in range(50))  # fmt: skip
+EDGE_FORCE = 50
+"""First lane of the joint forces: (fx, fy) on the first and the last corner of each of the three edges."""
+LEFT0, LEFT1, LEFT2 = (lane(62 + k) for k in range(3))
+LANES = 65
+_FAX = tuple(lane(EDGE_FORCE + 4 * k) for k in range(3))
+A0, A1, A2 = _FAX
+_1, _2, _3, _FOUR, _SIX, _EIGHT, _TWELVE = U(1), U(2), U(3), U(4), U(6), U(8), U(12)
+_NEXT = lane(1)
+_B = lane(2)
+"""From the force on the first corner of an edge to that on its last."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather(n, first, rows, wide, x, v, c, s0, stressed, lanes):
+    """Rows of the triangles first : first + n into lanes, in groups of four (rows is long enough)."""
+    wx, wv = U(12 if wide else 8), U(12 if wide else 6)
+    for e in range(U(0), U(n), _FOUR):
+        i = U(first) + e
+        r0, r1, r2, r3 = U(rows[i]), U(rows[i + _1]), U(rows[i + _2]), U(rows[i + _3])
+        at = (r0 * wx, r1 * wx, r2 * wx, r3 * wx)
+        four_columns(lanes, X1 + e, x, at)
+        two_columns(lanes, X3 + e, x, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
+        at = (r0 * wv, r1 * wv, r2 * wv, r3 * wv)
+        four_columns(lanes, VX1 + e, v, at)
+        two_columns(lanes, VX3 + e, v, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
+        q0 = i * _TWELVE
+        q1, q2, q3 = q0 + _TWELVE, q0 + U(24), q0 + U(36)
+        four_columns(lanes, CA + e, c, (q0, q1, q2, q3))
+        four_columns(lanes, LAM + e, c, (q0 + _FOUR, q1 + _FOUR, q2 + _FOUR, q3 + _FOUR))
+        four_columns(lanes, K1 + e, c, (q0 + _EIGHT, q1 + _EIGHT, q2 + _EIGHT, q3 + _EIGHT))
+        if stressed:
+            q0 = i * _FOUR
+            four_columns(lanes, S11 + e, s0, (q0, q0 + _FOUR, q0 + _EIGHT, q0 + _TWELVE))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather_edge(n, first, k, x, partner, law, table, lanes):
+    """The partners' edges and the laws of edge k."""
+    for e in range(U(0), U(n), _FOUR):
+        q0 = (U(first) + e) * _3 + U(k)
+        q1, q2, q3 = q0 + _3, q0 + _SIX, q0 + U(9)
+        four_columns(lanes, PX + e, x, (U(partner[q0]), U(partner[q1]), U(partner[q2]), U(partner[q3])))
+        w0, w1, w2, w3 = U(law[q0]) * _EIGHT, U(law[q1]) * _EIGHT, U(law[q2]) * _EIGHT, U(law[q3]) * _EIGHT
+        four_columns(lanes, KOP + e, table, (w0, w1, w2, w3))
+        four_columns(lanes, COHESION + e, table, (w0 + _FOUR, w1 + _FOUR, w2 + _FOUR, w3 + _FOUR))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stress(n, small, lanes):
+    """Corner forces from the stress, viscous part included: f_l = sigma n s / 2, n s of the face opposite to l."""
+    for e in range(U(n)):
+        x1, y1 = lanes[X1 + e], lanes[Y1 + e]
+        ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
+        a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
+        f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
+        cs, sn = laws.rotation(f11, f12, f21, f22)
+        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
+        e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+        vx1, vy1 = lanes[VX1 + e], lanes[VY1 + e]
+        dux, duy, dwx, dwy = lanes[VX2 + e] - vx1, lanes[VY2 + e] - vy1, lanes[VX3 + e] - vx1, lanes[VY3 + e] - vy1
+        g11, g12, g21, g22 = dux * a + dwx * c, dux * b + dwx * d, duy * a + dwy * c, duy * b + dwy * d
+        p, m, eta = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e], lanes[VISC + e]
+        s11 = lanes[S11 + e] + (p + m * e11) + eta * (cs * g11 + sn * g21)
+        s22 = lanes[S22 + e] + (p + m * e22) + eta * (cs * g22 - sn * g12)
+        s12 = lanes[S12 + e] + m * e12 + 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
+        xx, yy, xy = laws.turned(s11, s22, s12, cs, sn)
+        if small:
+            inverse = 1.0 / (a * d - b * c)
+            ux, wx, uy, wy = d * inverse, -b * inverse, -c * inverse, a * inverse
+        fx1, fy1 = 0.5 * (xx * (wy - uy) - xy * (wx - ux)), 0.5 * (xy * (wy - uy) - yy * (wx - ux))
+        fx2, fy2 = 0.5 * (xy * wx - xx * wy), 0.5 * (yy * wx - xy * wy)
+        lanes[FX1 + e], lanes[FY1 + e], lanes[FX2 + e], lanes[FY2 + e] = fx1, fy1, fx2, fy2
+        lanes[FX3 + e], lanes[FY3 + e] = -fx1 - fx2, -fy1 - fy2
+
+
+def _edge_loop(k):
+    """The loop over the joints on edge k. One function each: distances between lanes must be constants."""
+    xa, ya, xb, yb = ((X1, Y1, X2, Y2), (X2, Y2, X3, Y3), (X3, Y3, X1, Y1))[k]
+    out, left_of = _FAX[k], (LEFT0, LEFT1, LEFT2)[k]
+    near, far = joints.NEAR, joints.FAR
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def loop(n, lanes):
+        for e in range(U(n)):
+            tx, ty, h2, oa, sa, ob, sb = joints.openings(
+                lanes[xa + e], lanes[ya + e], lanes[xb + e], lanes[yb + e],
+                lanes[PX + e], lanes[PY + e], lanes[QX + e], lanes[QY + e],
+            )  # fmt: skip
+            inverse = 1.0 / (h2 + laws.TINY)  # an edge without partner is compared with itself: length 0
+            oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
+            kop, tensile, overlay = lanes[KOP + e], lanes[TENSILE + e], lanes[OVERLAY + e]
+            tan_phi, cohesion, half_shear = lanes[TAN_PHI + e], lanes[COHESION + e], lanes[HALF_SHEAR + e]
+            s0, t0, left0 = laws.intact_point(
+                near * oa + far * ob, near * sa + far * sb, kop, tensile, overlay, tan_phi, cohesion, half_shear
+            )
+            s1, t1, left1 = laws.intact_point(
+                0.5 * (oa + ob), 0.5 * (sa + sb), kop, tensile, overlay, tan_phi, cohesion, half_shear
+            )
+            s2, t2, left2 = laws.intact_point(
+                far * oa + near * ob, far * sa + near * sb, kop, tensile, overlay, tan_phi, cohesion, half_shear
+            )
+            fax, fay, fbx, fby = joints.end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
+            lanes[out + e], lanes[out + _NEXT + e] = fax, fay
+            lanes[out + _B + e], lanes[out + _B + _NEXT + e] = fbx, fby
+            left = left0 if left0 < left1 else left1
+            lanes[left_of + e] = left if left < left2 else left2
+
+    return loop
+
+
+_edge_loop_0, _edge_loop_1, _edge_loop_2 = _edge_loop(0), _edge_loop(1), _edge_loop(2)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _any_past_peak(n, lanes):
+    """Negative if a joint of the block has passed its peak."""
+    bits = lanes.view(np.int64)
+    found = np.int64(0)
+    for e in range(U(n)):
+        found |= bits[LEFT0 + e] | bits[LEFT1 + e] | bits[LEFT2 + e]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sum(n, gx, gy, lanes):
+    """Stress, gravity and joints of each corner; edge k begins at corner k and ends at the next one."""
+    for e in range(U(n)):
+        wx, wy = lanes[MASS + e] * gx, lanes[MASS + e] * gy
+        lanes[FX1 + e] = (lanes[FX1 + e] + wx) + (lanes[A0 + e] + lanes[A2 + _B + e])
+        lanes[FY1 + e] = (lanes[FY1 + e] + wy) + (lanes[A0 + _NEXT + e] + lanes[A2 + _B + _NEXT + e])
+        lanes[FX2 + e] = (lanes[FX2 + e] + wx) + (lanes[A1 + e] + lanes[A0 + _B + e])
+        lanes[FY2 + e] = (lanes[FY2 + e] + wy) + (lanes[A1 + _NEXT + e] + lanes[A0 + _B + _NEXT + e])
+        lanes[FX3 + e] = (lanes[FX3 + e] + wx) + (lanes[A2 + e] + lanes[A1 + _B + e])
+        lanes[FY3 + e] = (lanes[FY3 + e] + wy) + (lanes[A2 + _NEXT + e] + lanes[A1 + _B + _NEXT + e])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _kick(n, alpha, lanes):
+    for e in range(U(n)):
+        vx1, vy1, vx2, vy2 = lanes[VX1 + e], lanes[VY1 + e], lanes[VX2 + e], lanes[VY2 + e]
+        vx3, vy3, k1, k2, k3 = lanes[VX3 + e], lanes[VY3 + e], lanes[K1 + e], lanes[K2 + e], lanes[K3 + e]
+        lanes[VX1 + e] = vx1 + k1 * laws.damped(lanes[FX1 + e], vx1, alpha)
+        lanes[VY1 + e] = vy1 + k1 * laws.damped(lanes[FY1 + e], vy1, alpha)
+        lanes[VX2 + e] = vx2 + k2 * laws.damped(lanes[FX2 + e], vx2, alpha)
+        lanes[VY2 + e] = vy2 + k2 * laws.damped(lanes[FY2 + e], vy2, alpha)
+        lanes[VX3 + e] = vx3 + k3 * laws.damped(lanes[FX3 + e], vx3, alpha)
+        lanes[VY3 + e] = vy3 + k3 * laws.damped(lanes[FY3 + e], vy3, alpha)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put_velocities(n, first, rows, wide, v, lanes):
+    wv = U(12 if wide else 6)
+    whole = U(n // 4 * 4)
+    for e in range(U(0), whole, _FOUR):
+        i = U(first) + e
+        r0, r1, r2, r3 = U(rows[i]), U(rows[i + _1]), U(rows[i + _2]), U(rows[i + _3])
+        at = (r0 * wv, r1 * wv, r2 * wv, r3 * wv)
+        put_four_columns(v, at, lanes, VX1 + e)
+        at = (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
+        put_two_columns(v, at, lanes, VX3 + e)
+        if wide:
+            at = (at[0] + _2, at[1] + _2, at[2] + _2, at[3] + _2)
+            put_four_columns(v, at, lanes, VX1 + e)
+    for e in range(whole, U(n)):
+        at = U(rows[U(first) + e]) * wv
+        for c in range(U(6)):
+            v[at + c] = lanes[VX1 + c * U(CAPACITY) + e]
+        if wide:
+            for c in range(U(4)):
+                v[at + _SIX + c] = lanes[VX1 + c * U(CAPACITY) + e]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _kinetic(e, lanes):
+    """Kinetic energy [J/m] of a triangle at the half step before."""
+    v2 = 0.0
+    for c in (VX1, VY1, VX2, VY2, VX3, VY3):
+        v2 += lanes[c + U(e)] ** 2
+    return 0.5 * lanes[MASS + U(e)] * v2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow, table, beyond, step, lanes, tally):
+    """Joints behind their peak: those on the list of block b, and those that get there now."""
+    if _any_past_peak(n, lanes) < 0:
+        for e in range(n):
+            for k in range(3):
+                slot = 3 * (first + e) + k
+                if law[slot] != 0 and lanes[(LEFT0, LEFT1, LEFT2)[k] + U(e)] < 0.0:
+                    law[slot], state[slot] = 0, YIELDED
+                    follow[slot], head[b] = head[b], slot
+                    for m in range(MEMORY):
+                        memory[slot, m] = 0.0
+                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
+                    tally[NEW_YIELDED] += 1
+    slot = head[b]
+    while slot >= 0:
+        e, k = slot // 3 - first, slot % 3
+        xa = (X1, X2, X3)[k] + U(e)
+        xb = (X2, X3, X1)[k] + U(e)
+        out = (A0, A1, A2)[k] + U(e)
+        p = partner[slot]
+        row = kind[slot]
+        fax, fay, fbx, fby, now = joints.yielded_edge(
+            lanes[xa], lanes[xa + _NEXT], lanes[xb], lanes[xb + _NEXT], x[p], x[p + 1], x[p + 2], x[p + 3],
+            table, beyond, row, memory, slot, state[slot],
+        )  # fmt: skip
+        lanes[out], lanes[out + _NEXT], lanes[out + _B], lanes[out + _B + _NEXT] = fax, fay, fbx, fby
+        if now != state[slot]:
+            state[slot] = now
+            memory[slot, STEP], memory[slot, KINETIC] = step, _kinetic(e, lanes)
+            tally[NEW_BROKEN] += 1
+        slot = follow[slot]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_contacts(b, contact_begin, contact_lane, contact_slot, pushed, lanes):
+    for m in range(contact_begin[b], contact_begin[b + 1]):
+        e, slot = contact_lane[m], contact_slot[m]
+        for c in range(6):
+            lanes[FX1 + U(c * CAPACITY + e)] += pushed[slot, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _store(n, first, rows, special, force, lanes):
+    """Forces of triangles whose corners nodes.py moves."""
+    for e in range(n):
+        if special[first + e]:
+            for c in range(6):
+                force[rows[first + e], c] = lanes[FX1 + U(c * CAPACITY + e)]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _store_joints(n, first, rows, force, lanes):
+    """Sum of the joint forces on each corner, for the energy budget."""
+    for e in range(U(n)):
+        r = U(rows[first + np.int64(e)])
+        for c in range(U(2)):
+            way = c * U(CAPACITY) + e
+            force[r, c] = lanes[A0 + way] + lanes[A2 + _B + way]
+            force[r, c + _2] = lanes[A1 + way] + lanes[A0 + _B + way]
+            force[r, c + _FOUR] = lanes[A2 + way] + lanes[A1 + _B + way]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _triangles(
+    t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head, follow,
+    table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
+    of_joints, keep_joints, gx, gy, alpha, step, tally,
+):  # fmt: skip
+    lanes = np.zeros(LANES * CAPACITY)
+    x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
+    flat_table = table.reshape(table.size)
+    blocks = len(head)
+    for b in range(blocks * t // threads, blocks * (t + 1) // threads):
+        first = b * BLOCK
+        n = min(BLOCK, count - first)
+        _gather(n, first, rows, wide, x, v, c, s0, stressed, lanes)
+        _stress(n, small, lanes)
+        _gather_edge(n, first, 0, x, partner, law, flat_table, lanes)
+        _edge_loop_0(n, lanes)
+        _gather_edge(n, first, 1, x, partner, law, flat_table, lanes)
+        _edge_loop_1(n, lanes)
+        _gather_edge(n, first, 2, x, partner, law, flat_table, lanes)
+        _edge_loop_2(n, lanes)
+        if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
+            _slow_joints(
+                b, n, first, x, partner, law, kind, state, memory, head, follow, table, beyond, step, lanes, tally[t]
+            )
+        if keep_joints:
+            _store_joints(n, first, rows, of_joints, lanes)
+        _sum(n, gx, gy, lanes)
+        _add_contacts(b, contact_begin, contact_lane, contact_slot, pushed, lanes)
+        if some_special[b]:
+            _store(n, first, rows, special, force, lanes)
+        _kick(n, alpha, lanes)
+        _put_velocities(n, first, rows, wide, v, lanes)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangles(threads, *args):
+    """Forces on the corners of all owned triangles at the present positions; corners that move by themselves are
+    kicked, forces on the others are stored. Joint histories move on.
+
+    count: triangles, in storage order; rows (count + 3,) i4: their storage rows; wide: x and v are (n, 12); c
+    (count, 12), see `TRIANGLE`; s0 (count, 4) [Pa]: initial stress xx, yy, xy, zz, read if `stressed`; small: small
+    strains; partner (3 count,) i4: where in x the partner's edge begins, law (3 count,) i4: row of the table of joint
+    laws as long as the joint is before its peak, else 0; kind: that row whatever its state; state, memory: see
+    joints.py; head (blocks,), follow (3 count,) i4: lists of joints behind their peak; contact_*: which contact forces
+    `pushed` (k, 8) fall on which lane of which block; special (count,), some_special (blocks,) bool; force, of_joints
+    (n, 8) [N/m]; alpha: local damping; tally (threads, 8) i8.
+    """
+    for t in range(threads):
+        _triangles(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def triangles_threaded(
+    threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head, follow,
+    table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
+    of_joints, keep_joints, gx, gy, alpha, step, tally,
+):  # fmt: skip
+    """The same on several threads."""
+    for t in prange(threads):
+        _triangles(
+            t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head,
+            follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
+            of_joints, keep_joints, gx, gy, alpha, step, tally,
+        )  # fmt: skip
+
+
+# ---- quads ---------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_stretch(p, xy, c, small):
+    """Deformation gradient, rotation and strain of triangle p of a quad with the corners xy (8,)."""
+    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+    a, b, cc, d = c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3]
+    ux, uy, wx, wy = xy[j] - xy[i], xy[j + 1] - xy[i + 1], xy[k] - xy[i], xy[k + 1] - xy[i + 1]
+    f11, f12, f21, f22 = ux * a + wx * cc, ux * b + wx * d, uy * a + wy * cc, uy * b + wy * d
+    cs, sn = laws.rotation(f11, f12, f21, f22)
+    if small:
+        cs, sn = 1.0, 0.0
+        inverse = 1.0 / (a * d - b * cc)
+        ux, wx, uy, wy = d * inverse, -b * inverse, -cc * inverse, a * inverse
+    e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+    return ux, uy, wx, wy, cs, sn, e11, e22, e12
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_part(p, ux, uy, wx, wy, cs, sn, s11, s22, s12, force):
+    """Add the forces of triangle p of a quad: half of those of its overlay, which are half of sigma n s each."""
+    xx, yy, xy_ = laws.turned(s11, s22, s12, cs, sn)
+    fx1, fy1 = 0.25 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.25 * (xy_ * (wy - uy) - yy * (wx - ux))
+    fx2, fy2 = 0.25 * (xy_ * wx - xx * wy), 0.25 * (yy * wx - xy_ * wy)
+    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+    force[i] += fx1
+    force[i + 1] += fy1
+    force[j] += fx2
+    force[j + 1] += fy2
+    force[k] -= fx1 + fx2
+    force[k + 1] -= fy1 + fy2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quad_forces(xy, vel, c, s0, small, force):
+    """Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
+
+    xy, vel (8,): corners and their velocities; c (32,): row of the table of quads; s0 (4,) [Pa]. Adds to force (8,).
+    """
+    lame, two_mu, eta = c[Q_LAMBDA], c[Q_TWO_MU], c[Q_ETA]
+    for overlay in range(2):
+        p, q = 2 * overlay, 2 * overlay + 1
+        ux1, uy1, wx1, wy1, cs1, sn1, a11, a22, a12 = _part_stretch(p, xy, c, small)
+        ux2, uy2, wx2, wy2, cs2, sn2, b11, b22, b12 = _part_stretch(q, xy, c, small)
+        one, two = c[Q_AREA + p], c[Q_AREA + q]
+        mean = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
+        pressure = lame * mean
+        shift = 0.5 * (mean - (a11 + a22))
+        s11, s22 = s0[0] + (pressure + two_mu * (a11 + shift)), s0[1] + (pressure + two_mu * (a22 + shift))
+        shift = 0.5 * (mean - (b11 + b22))
+        t11, t22 = s0[0] + (pressure + two_mu * (b11 + shift)), s0[1] + (pressure + two_mu * (b22 + shift))
+        s12, t12 = s0[2] + two_mu * a12, s0[2] + two_mu * b12
+        if eta > 0.0:
+            a11, a22, a12 = _part_rate(p, vel, c, cs1, sn1)
+            b11, b22, b12 = _part_rate(q, vel, c, cs2, sn2)
+            rate = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
+            shift = 0.5 * (rate - (a11 + a22))
+            s11, s22, s12 = s11 + eta * (a11 + shift), s22 + eta * (a22 + shift), s12 + eta * a12
+            shift = 0.5 * (rate - (b11 + b22))
+            t11, t22, t12 = t11 + eta * (b11 + shift), t22 + eta * (b22 + shift), t12 + eta * b12
+        _add_part(p, ux1, uy1, wx1, wy1, cs1, sn1, s11, s22, s12, force)
+        _add_part(q, ux2, uy2, wx2, wy2, cs2, sn2, t11, t22, t12, force)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mean_trace(overlay, xy, c, small):
+    """Mean by area of e11 + e22 over the two triangles of an overlay (0, 1) of a quad."""
+    mean, area = 0.0, 0.0
+    for p in (2 * overlay, 2 * overlay + 1):
+        _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
+        mean += c[Q_AREA + p] * (e11 + e22)
+        area += c[Q_AREA + p]
+    return mean / area
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quad_stress(xy, c, s0, small, stress):
+    """Mean stress (4,) xx, yy, xy, zz [Pa] of a quad over its four triangles by area, without the viscous part."""
+    stress[:] = 0.0
+    areas = 0.0
+    for overlay in range(2):
+        mean = _mean_trace(overlay, xy, c, small)
+        for p in (2 * overlay, 2 * overlay + 1):
+            _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            shift, m = 0.5 * (mean - (e11 + e22)), c[Q_TWO_MU]
+            s11 = s0[0] + (c[Q_LAMBDA] * mean + m * (e11 + shift))
+            s22 = s0[1] + (c[Q_LAMBDA] * mean + m * (e22 + shift))
+            xx, yy, xy_ = laws.turned(s11, s22, s0[2] + m * e12, cs, sn)
+            share = c[Q_AREA + p]
+            areas += share
+            stress[0] += share * xx
+            stress[1] += share * yy
+            stress[2] += share * xy_
+            stress[3] += share * (s0[3] + c[Q_LAMBDA] * mean)
+    for q in range(4):
+        stress[q] /= areas
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quad_energy(xy, c, s0, small):
+    """Elastic energy [J/m] of a quad: the mean of its two overlays."""
+    total = 0.0
+    for overlay in range(2):
+        mean = _mean_trace(overlay, xy, c, small)
+        for p in (2 * overlay, 2 * overlay + 1):
+            _, _, _, _, _, _, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            shift = 0.5 * (mean - (e11 + e22))
+            density = _energy(e11 + shift, e22 + shift, e12, c[Q_LAMBDA], c[Q_TWO_MU], s0)
+            total += 0.5 * c[Q_AREA + p] * density
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _energy(e11, e22, e12, lam, two_mu, s0):
+    """Elastic energy per volume [J/m3]: (sigma0 + sigma / 2) : epsilon."""
+    trace = e11 + e22
+    elastic = 0.5 * (lam * trace * trace + two_mu * (e11 * e11 + e22 * e22 + 2.0 * e12 * e12))
+    return elastic + s0[0] * e11 + s0[1] * e22 + 2.0 * s0[2] * e12
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_rate(p, vel, c, cs, sn):
+    """Strain rate of triangle p in its turned frame."""
+    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+    a, b, cc, d = c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3]
+    ux, uy, wx, wy = vel[j] - vel[i], vel[j + 1] - vel[i + 1], vel[k] - vel[i], vel[k + 1] - vel[i + 1]
+    g11, g12, g21, g22 = ux * a + wx * cc, ux * b + wx * d, uy * a + wy * cc, uy * b + wy * d
+    return cs * g11 + sn * g21, cs * g22 - sn * g12, 0.5 * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _quad_kinetic(c, vel):
+    """The same of a quad."""
+    v2 = 0.0
+    for m in range(4):
+        v2 += c[Q_WEIGHT + m] * (vel[2 * m] ** 2 + vel[2 * m + 1] ** 2)
+    return 0.5 * v2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _quads(
+    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+):  # fmt: skip
+    flat = x.reshape(x.size)
+    nothing = np.zeros(4)
+    own, bound = np.empty(FORCE), np.empty(FORCE)
+    for i in range(count * t // threads, count * (t + 1) // threads):
+        r = rows[i]
+        xy, vel = x[r], v[r]
+        own[:], bound[:] = 0.0, 0.0
+        quad_forces(xy, vel, c[i], s0[i] if stressed else nothing, small, own)
+        for k in range(4):
+            slot = base + 4 * i + k
+            if state[slot] == NONE:
+                continue
+            p, row, to = partner[slot], kind[slot], 2 * ((k + 1) % 4)
+            ax, ay, bx, by = xy[2 * k], xy[2 * k + 1], xy[2 * k + 2], xy[2 * k + 3]
+            px, py, qx, qy = flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
+            if state[slot] == INTACT:
+                left = joints.past_peak(ax, ay, bx, by, px, py, qx, qy, table[row])
+                if left < 0.0:
+                    state[slot] = YIELDED
+                    memory[slot] = 0.0
+                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _quad_kinetic(c[i], vel)
+                    tally[t, NEW_YIELDED] += 1
+            before = state[slot]
+            fax, fay, fbx, fby, now = joints.yielded_edge(
+                ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, before
+            )
+            if before == INTACT:
+                memory[slot] = 0.0
+            elif now != before:
+                state[slot] = now
+                memory[slot, STEP], memory[slot, KINETIC] = step, _quad_kinetic(c[i], vel)
+                tally[t, NEW_BROKEN] += 1
+            bound[2 * k] += fax
+            bound[2 * k + 1] += fay
+            bound[to] += fbx
+            bound[to + 1] += fby
+        slot = slot_of[i]
+        for m in range(FORCE):
+            pull = c[i, Q_WEIGHT + m // 2] * (gx if m % 2 == 0 else gy)
+            push = pushed[slot, m] if slot >= 0 else 0.0
+            force[r, m] = ((own[m] + pull) + bound[m]) + push
+            if keep_joints:
+                of_joints[r, m] = bound[m]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quads(threads, *args):
+    """Forces on the corners of all owned quads, stored. Arguments as for `triangles`; c (count, 32), see `QUAD`; the
+    slots of the quads' edges follow those of the triangles from `base` on, four each; slot_of (count,) i4: row of
+    `pushed`, or -1."""
+    for t in range(threads):
+        _quads(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def quads_threaded(
+    threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+):  # fmt: skip
+    """The same on several threads."""
+    for t in prange(threads):
+        _quads(
+            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+            slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+        )  # fmt: skip
+
+
+# ---- motion --------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _drift(t, threads, first, last, x, v, dt):
+    wide = x.shape[1] == 12
+    n = last - first
+    for r in range(U(first + n * t // threads), U(first + n * (t + 1) // threads)):
+        if wide:
+            for c in range(12):
+                x[r, c] += v[r, c] * dt
+        else:
+            x1, y1 = x[r, 0] + v[r, 0] * dt, x[r, 1] + v[r, 1] * dt
+            x[r, 0], x[r, 1] = x1, y1
+            for c in range(2, 6):
+                x[r, c] += v[r, c] * dt
+            x[r, 6], x[r, 7] = x1, y1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def drift(threads, *args):
+    """x += v dt for the storage rows first : last."""
+    for t in range(threads):
+        _drift(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def drift_threaded(threads, first, last, x, v, dt):
+    """The same on several threads."""
+    for t in prange(threads):
+        _drift(t, threads, first, last, x, v, dt)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _triangle_stretch(xy, c, small):
+    """Rotation (cos, sin) and strain (11, 22, 12) of a triangle with the corners xy (6,)."""
+    ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
+    f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
+    f21, f22 = uy * c[0] + wy * c[2], uy * c[1] + wy * c[3]
+    cs, sn = laws.rotation(f11, f12, f21, f22)
+    if small:
+        cs, sn = 1.0, 0.0
+    e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+    return cs, sn, e11, e22, e12
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangle_stress(xy, c, s0, small, stress):
+    """Stress (4,) xx, yy, xy, zz [Pa] of a triangle with the corners xy (6,), without the viscous part."""
+    cs, sn, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    p, m = c[LAMBDA] * (e11 + e22), c[TWO_MU]
+    stress[0], stress[1], stress[2] = laws.turned(s0[0] + (p + m * e11), s0[1] + (p + m * e22), s0[2] + m * e12, cs, sn)
+    stress[3] = s0[3] + p
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def triangle_energy(xy, c, s0, small):
+    """Elastic energy per area [J/m3] of a triangle."""
+    _, _, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    return _energy(e11, e22, e12, c[LAMBDA], c[TWO_MU], s0)

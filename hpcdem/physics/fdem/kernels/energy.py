@@ -1,0 +1,179 @@
+"""Work done by the forces on the corners, and energy stored in joints: passes of the energy budget. They only read.
+
+Work over a step from t_n to t_n+1 is taken with the mean of the forces at both ends, sum (f_n + f_n+1) / 2 . v dt; so
+the forces of one moment are booked with the mean of the velocities before and after (both half steps), and kinetic
+energy at t_n is m v- . v+ / 2. For an undamped linear model the sum with the potential energy is then constant
+(leap-frog).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels.elements import ETA, PARTS, Q_AREA, Q_ETA, _part_rate, _part_stretch
+from hpcdem.physics.fdem.kernels.joints import DAMAGE, FAR, NEAR, OPENED, SLIPPED
+
+# Columns of the work of an element (n_own, 8) [J/m]; the last are for nodes of which it has the lowest corner.
+BY_JOINTS, BY_CONTACT, VISCOUS, GRAVITY, OUTSIDE = range(5)
+WORK = 8
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _viscous_triangle(xy, vel, c, out):
+    """Corner forces (6,) of the viscous stress."""
+    ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
+    f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
+    f21, f22 = uy * c[0] + wy * c[2], uy * c[1] + wy * c[3]
+    cs, sn = laws.rotation(f11, f12, f21, f22)
+    dux, duy, dwx, dwy = vel[2] - vel[0], vel[3] - vel[1], vel[4] - vel[0], vel[5] - vel[1]
+    g11, g12 = dux * c[0] + dwx * c[2], dux * c[1] + dwx * c[3]
+    g21, g22 = duy * c[0] + dwy * c[2], duy * c[1] + dwy * c[3]
+    eta = c[ETA]
+    s12 = 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
+    xx, yy, xy_ = laws.turned(eta * (cs * g11 + sn * g21), eta * (cs * g22 - sn * g12), s12, cs, sn)
+    out[0], out[1] = 0.5 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.5 * (xy_ * (wy - uy) - yy * (wx - ux))
+    out[2], out[3] = 0.5 * (xy_ * wx - xx * wy), 0.5 * (yy * wx - xy_ * wy)
+    out[4], out[5] = -out[0] - out[2], -out[1] - out[3]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _viscous_quad(xy, vel, c, out):
+    """The same for the eight of a quad."""
+    out[:] = 0.0
+    eta = c[Q_ETA]
+    for overlay in range(2):
+        rate, area = 0.0, 0.0
+        for p in (2 * overlay, 2 * overlay + 1):
+            _, _, _, _, cs, sn, _, _, _ = _part_stretch(p, xy, c, False)
+            r11, r22, _ = _part_rate(p, vel, c, cs, sn)
+            rate += c[Q_AREA + p] * (r11 + r22)
+            area += c[Q_AREA + p]
+        rate /= area
+        for p in (2 * overlay, 2 * overlay + 1):
+            ux, uy, wx, wy, cs, sn, _, _, _ = _part_stretch(p, xy, c, False)
+            r11, r22, r12 = _part_rate(p, vel, c, cs, sn)
+            shift = 0.5 * (rate - (r11 + r22))
+            xx, yy, xy_ = laws.turned(eta * (r11 + shift), eta * (r22 + shift), eta * r12, cs, sn)
+            fx1, fy1 = 0.25 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.25 * (xy_ * (wy - uy) - yy * (wx - ux))
+            fx2, fy2 = 0.25 * (xy_ * wx - xx * wy), 0.25 * (yy * wx - xy_ * wy)
+            i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+            out[i] += fx1
+            out[i + 1] += fy1
+            out[j] += fx2
+            out[j + 1] += fy2
+            out[k] -= fx1 + fx2
+            out[k + 1] -= fy1 + fy2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def book(first, n_own, triangle_rows, quad_rows, c, q, x, before, after, a, b, of_joints, mass, gx, gy, dt, work):
+    """Add to work (n_own, 8) what joints, viscosity and gravity did on the owned elements.
+
+    first: storage row of the first owned element; before, after (n, w): velocities before and after the kick, taken
+    with the weights a and b; of_joints (n, 8) [N/m]; mass (n, 4): true masses [kg/m].
+    """
+    force = np.zeros(8)
+    for i in range(len(triangle_rows) + len(quad_rows)):
+        if i < len(triangle_rows):
+            r, n = triangle_rows[i], 3
+            _viscous_triangle(x[r], before[r], c[i], force)
+        else:
+            r, n = quad_rows[i - len(triangle_rows)], 4
+            _viscous_quad(x[r], before[r], q[i - len(triangle_rows)], force)
+        joint = viscous = pull = 0.0
+        for k in range(2 * n):
+            v = a * before[r, k] + b * after[r, k]
+            joint += of_joints[r, k] * v
+            viscous += force[k] * v
+            pull += mass[r, k // 2] * (gx if k % 2 == 0 else gy) * v
+        work[r - first, BY_JOINTS] += joint * dt
+        work[r - first, VISCOUS] += viscous * dt
+        work[r - first, GRAVITY] += pull * dt
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def book_contact(rows, first, corners, pushed, before, after, a, b, dt, work):
+    """Add what contact did on the owned elements in the storage rows `rows`; pushed (k, 8) [N/m]."""
+    for i in range(len(rows)):
+        r = rows[i]
+        done = 0.0
+        for k in range(2 * corners[i]):
+            done += pushed[i, k] * (a * before[r, k] + b * after[r, k])
+        work[r - first, BY_CONTACT] += done * dt
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def book_nodes(begin, place, felt, outside, before, after, a, b, dt, first, n_own, width, work):
+    """Add what was done from outside on nodes whose lowest corner is owned: applied forces and conditions."""
+    before, after = before.reshape(before.size), after.reshape(after.size)
+    for i in range(len(begin) - 1):
+        p = place[begin[i]]
+        r = p // width - first
+        if r < 0 or r >= n_own:
+            continue
+        vx, vy = a * before[p] + b * after[p], a * before[p + 1] + b * after[p + 1]
+        work[r, OUTSIDE] += ((felt[i, 2] + outside[i, 0]) * vx + (felt[i, 3] + outside[i, 1]) * vy) * dt
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kinetic(first, n_own, cells, number, before, after, mass, out):
+    """Kinetic energy (n_own,) [J/m]: m v- . v+ / 2; mass (n, 4) as the motion sees it."""
+    for i in range(n_own):
+        r = first + i
+        n = 4 if cells[number[r], 3] >= 0 else 3
+        total = 0.0
+        for k in range(2 * n):
+            total += mass[r, k // 2] * before[r, k] * after[r, k]
+        out[i] = 0.5 * total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _stored_at_point(o, s, h, law, beyond, memory, g):
+    """Energy per area [J/m2] that a point of a joint gives back when it is unloaded."""
+    sigma, tau, o_u, s_u, damage, _, _ = laws.yielded_point(
+        o, s, h, 1.0 / h, law[0], law[1], law[2], law[3], law[4], beyond[0], beyond[1], beyond[2], beyond[3],
+        memory[OPENED + g], memory[SLIPPED + g], memory[DAMAGE + g],
+    )  # fmt: skip
+    size = abs(s)
+    if o < 0.0 or o_u > 0.0:
+        normal = 0.5 * sigma * o
+    elif law[0] > 0.0:
+        o_p = h / law[0]
+        r = o / o_p
+        normal = laws.softening(damage) * law[1] * o_p * (r * r - r * r * r / 3.0)
+    else:
+        normal = 0.0
+    if s_u > 0.0 or size == 0.0 or tau == 0.0:
+        return normal + 0.5 * tau * s
+    # tau = limit (2 q - q^2), q = s / s_p: int tau ds = limit s_p (q^2 - q^3 / 3)
+    peak = law[4] - (sigma * law[3] if o < 0.0 else 0.0)
+    s_p = h * peak / law[5]
+    q = size / s_p
+    limit = abs(tau) / (q * (2.0 - q))
+    return normal + limit * s_p * (q * q - q * q * q / 3.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stored_in_joints(slots, face, at, kind, state, memory, where, cells, x, table, beyond, first, out):
+    """Half of what each joint stores, added to the element of the slot: out (n_own,) [J/m]."""
+    flat = x.reshape(x.size)
+    for s in range(slots):
+        if state[s] == joints.NONE:
+            continue
+        f, p = face[s], at[s]
+        r, k = where[f // 4], f % 4
+        k2 = (k + 1) % (4 if cells[f // 4, 3] >= 0 else 3)
+        _, _, h2, oa, sa, ob, sb = joints.openings(
+            x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1], flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
+        )
+        h = math.sqrt(h2)
+        oa, sa, ob, sb = oa / h, sa / h, ob / h, sb / h
+        law, more = table[kind[s]], beyond[kind[s]]
+        ends = _stored_at_point(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, law, more, memory[s], 0)
+        ends += _stored_at_point(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, law, more, memory[s], 2)
+        middle = _stored_at_point(0.5 * (oa + ob), 0.5 * (sa + sb), h, law, more, memory[s], 1)
+        out[r - first] += 0.5 * h * (5.0 / 18.0 * ends + 8.0 / 18.0 * middle)

@@ -1,0 +1,292 @@
+"""Linear systems of the static solve: who is unknown, the matrix from pieces, and two solvers.
+
+A *piece* is the stiffness of an element or a joint. `Direct` brings all pieces to rank 0, puts them together in the
+order of their numbers and factorises there (SciPy's SuperLU): what comes out has the same bits on any number of ranks.
+`Petsc` shares the rows out as nodes are owned, for models whose factors are too large for one rank.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+
+MANY = 400_000
+"""Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
+SINGULAR = (
+    "the stiffness matrix is singular: something can move without resistance (a joint without tensile strength that is "
+    "open, or properties that differ by more than 1e15)"
+)
+
+
+@dataclass
+class Pieces:
+    """key (m,): numbers in the mesh, ascending on one rank after the other; node (m, k); stiffness (m, 2 k, 2 k)."""
+
+    key: np.ndarray
+    node: np.ndarray
+    stiffness: np.ndarray
+
+    @staticmethod
+    def joined(parts: list[Pieces]) -> Pieces:
+        """All of one kind, in the order of their numbers."""
+        key = np.concatenate([part.key for part in parts])
+        order = np.argsort(key, kind="stable")
+        node = np.concatenate([part.node for part in parts])[order]
+        return Pieces(key[order], node, np.concatenate([part.stiffness for part in parts])[order])
+
+
+@dataclass
+class Unknowns:
+    """What nodes can do. number (nn, 2): of the unknowns of a node along way[:, :, 0] and way[:, :, 1], -1: none there;
+    given (nn, 2) [m]: prescribed movement."""
+
+    number: np.ndarray
+    way: np.ndarray
+    given: np.ndarray
+    oblique: np.ndarray
+    """(nn,) bool: nodes whose ways are not the axes."""
+
+    @property
+    def count(self) -> int:
+        return int((self.number >= 0).sum())
+
+    def reduced(self, force: np.ndarray) -> np.ndarray:
+        """Forces (nn, 2) on nodes as right-hand side (n,)."""
+        along = np.einsum("nck,nc->nk", self.way, force)
+        out = np.empty(self.count)
+        known = self.number >= 0
+        out[self.number[known]] = along[known]
+        return out
+
+    def moved(self, q: np.ndarray, share: float) -> np.ndarray:
+        """Movements (nn, 2) [m] from the unknowns, and this share of what is prescribed."""
+        along = np.where(self.number >= 0, q[self.number], 0.0) if len(q) else np.zeros(self.number.shape)
+        out = np.where(self.oblique[:, None], np.einsum("nck,nk->nc", self.way, along), along)
+        return out + share * self.given
+
+    def entries(self, pieces: list[Pieces]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Rows, columns and values of the matrix; rows and values of its product with the prescribed movements."""
+        rows, columns, values, of_rows, of_values = [], [], [], [], []
+        some_given = bool(self.given.any())
+        for one in pieces:
+            m, k = one.node.shape
+            stiffness = one.stiffness.reshape(m, k, 2, k, 2)
+            turned = np.flatnonzero(self.oblique[one.node].any(axis=1))
+            number = self.number[one.node].reshape(m, 2 * k)
+            if len(turned):
+                way = self.way[one.node[turned]]
+                half = np.einsum("mkca,mkcjd->mkajd", way, stiffness[turned])
+                stiffness = stiffness.copy()
+                stiffness[turned] = np.einsum("mkajd,mjdb->mkajb", half, way)
+            if some_given:
+                # The columns of prescribed movements count in x and y; only the rows are turned.
+                untouched = one.stiffness.reshape(m, k, 2, k, 2).copy()
+                if len(turned):
+                    untouched[turned] = half
+                product = np.einsum("mkajd,mjd->mka", untouched, self.given[one.node]).reshape(m, 2 * k)
+                of_rows.append(number[number >= 0])
+                of_values.append(product[number >= 0])
+            full = stiffness.reshape(m, 2 * k, 2 * k)
+            keep = (number >= 0)[:, :, None] & (number >= 0)[:, None, :]
+            rows.append(np.broadcast_to(number[:, :, None], keep.shape)[keep])
+            columns.append(np.broadcast_to(number[:, None, :], keep.shape)[keep])
+            values.append(full[keep])
+        nothing = np.empty(0, np.int64)
+        return (
+            np.concatenate([nothing, *rows]),
+            np.concatenate([nothing, *columns]),
+            np.concatenate([np.empty(0), *values]),
+            np.concatenate([nothing, *of_rows]),
+            np.concatenate([np.empty(0), *of_values]),
+        )
+
+
+class Direct:
+    """Factors on rank 0, by SciPy."""
+
+    name = "direct (SciPy)"
+
+    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
+        self.comm, self.unknowns = comm, unknowns
+        self._factors: Any = None
+        self._coupling: Any = np.empty(0)
+
+    def factor(self, pieces: list[Pieces]) -> None:
+        """Take the pieces of this rank. CommandError if the matrix is singular. Collective."""
+        parts = self.comm.gather(pieces) if self.comm.size > 1 else [pieces]
+        error = None
+        if self.comm.rank == 0:
+            error = self._factor([Pieces.joined(list(of)) for of in zip(*parts)])
+        if (error := self.comm.bcast(error)) is not None:
+            raise CommandError(error)
+
+    def _factor(self, pieces: list[Pieces]) -> str | None:
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.linalg import splu
+
+        n = self.unknowns.count
+        rows, columns, values, of_rows, of_values = self.unknowns.entries(pieces)
+        self._coupling = np.bincount(of_rows, of_values, n) if len(of_rows) else np.zeros(n)
+        if not n:
+            return None
+        matrix = coo_matrix((values, (rows.astype(np.int32), columns.astype(np.int32))), (n, n)).tocsc()
+        # Stiffness is nearly symmetric with a large diagonal: no rows need to be exchanged, and the ordering for
+        # symmetric patterns fills in least. Scaling by the diagonal makes stiff joints and soft rock alike.
+        diagonal = matrix.diagonal()
+        if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
+            return SINGULAR
+        self._scale = 1.0 / np.sqrt(diagonal)
+        matrix.data *= np.repeat(self._scale, np.diff(matrix.indptr)) * self._scale[matrix.indices]
+        try:
+            self._factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+        except RuntimeError:
+            return SINGULAR
+        except MemoryError:
+            return f"the factors of {n} unknowns do not fit into memory: take PETSc and more ranks, or relaxation"
+        return None
+
+    def solve(self, force: np.ndarray, share: float) -> np.ndarray:
+        """Movements (nn, 2) [m] that undo the unbalanced forces (nn, 2), with this share of what is prescribed; equal
+        on all ranks. Collective."""
+        moved = None
+        if self.comm.rank == 0:
+            q = self.unknowns.reduced(force) - share * self._coupling
+            if len(q):
+                q = self._scale * self._factors.solve(self._scale * q)
+            moved = self.unknowns.moved(q, share)
+        return self.comm.bcast(moved)
+
+    def close(self) -> None:
+        """Nothing is held outside of Python."""
+
+
+class Petsc:
+    """Rows shared out as nodes are owned: MUMPS if PETSc has it, else GMRES with algebraic multigrid."""
+
+    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
+        """owner (nn,): rank of each node."""
+        from petsc4py import PETSc
+
+        self.comm, self.unknowns, self._petsc = comm, unknowns, PETSc
+        known = unknowns.number >= 0
+        self._owner = np.empty(unknowns.count, np.int64)
+        self._owner[unknowns.number[known]] = np.repeat(owner[:, None], 2, axis=1)[known]
+        # PETSc wants the rows of a rank in one piece.
+        self._mine = np.argsort(self._owner, kind="stable")
+        self._place = np.empty(unknowns.count, np.int64)
+        self._place[self._mine] = np.arange(unknowns.count)
+        ends = np.searchsorted(self._owner[self._mine], np.arange(comm.size + 1))
+        self._first, self._end = int(ends[comm.rank]), int(ends[comm.rank + 1])
+        self._on = PETSc.COMM_SELF if comm.mpi is None else comm.mpi
+        self._matrix: Any = None
+        self._ksp: Any = None
+        self._coupling: Any = np.empty(0)
+        self._mumps = _mumps_there(PETSc)
+        self.name = "PETSc (MUMPS)" if self._mumps else "PETSc (GMRES, multigrid)"
+
+    def factor(self, pieces: list[Pieces]) -> None:
+        """Take the pieces of this rank. CommandError if the matrix is singular. Collective."""
+        from scipy.sparse import coo_matrix
+
+        self.close()
+        rows, columns, values, of_rows, of_values = self.unknowns.entries([Pieces.joined([one]) for one in pieces])
+        table = np.column_stack([self._place[rows].astype(float), self._place[columns].astype(float), values])
+        product = np.column_stack([self._place[of_rows].astype(float), np.full(len(of_rows), -1.0), of_values])
+        table = np.concatenate([table, product])
+        if self.comm.size > 1:
+            to = self._owner[np.concatenate([rows, of_rows])]
+            order = np.argsort(to, kind="stable")
+            cuts = np.searchsorted(to[order], np.arange(1, self.comm.size))
+            table = np.concatenate(self.comm.alltoallv(np.split(table[order], cuts)))
+        mine, n = self._end - self._first, self.unknowns.count
+        of_given = table[:, 1] < 0.0
+        self._coupling = np.bincount(table[of_given, 0].astype(np.int64) - self._first, table[of_given, 2], mine)
+        table = table[~of_given]
+        place = (table[:, 0].astype(np.int64) - self._first, table[:, 1].astype(np.int64))
+        local = coo_matrix((table[:, 2], place), (mine, n)).tocsr()
+        local.sort_indices()
+        kind = self._petsc.IntType
+        self._matrix = self._petsc.Mat().createAIJ(
+            ((mine, n), (mine, n)),
+            csr=(local.indptr.astype(kind), local.indices.astype(kind), local.data),
+            comm=self._on,
+        )
+        self._ksp = ksp = self._petsc.KSP().create(self._on)
+        ksp.setOperators(self._matrix)
+        pc = ksp.getPC()
+        if self._mumps:
+            ksp.setType("preonly")
+            pc.setType("lu")
+            pc.setFactorSolverType("mumps")
+        else:
+            ksp.setType("gmres")
+            ksp.setGMRESRestart(100)
+            ksp.setTolerances(rtol=1e-10, max_it=2000)
+            pc.setType("gamg")
+            self._matrix.setNearNullSpace(self._rigid())
+        try:
+            ksp.setUp()
+            failed = False
+        except self._petsc.Error:
+            failed = True
+        if self.comm.any(failed):
+            raise CommandError(SINGULAR)
+
+    def _rigid(self) -> Any:
+        """Near null space: both translations. (Multigrid for elasticity needs to know them.)"""
+        vectors: list[Any] = []
+        for axis in range(2):
+            unit = np.zeros(self.unknowns.given.shape)
+            unit[:, axis] = 1.0
+            vector = self._matrix.createVecRight()
+            vector.setArray(self.unknowns.reduced(unit)[self._mine][self._first : self._end])
+            for other in vectors:
+                vector.axpy(-vector.dot(other), other)
+            if vector.norm() > 0.0:
+                vector.normalize()
+                vectors.append(vector)
+        return self._petsc.NullSpace().create(vectors=vectors, comm=self._on)
+
+    def solve(self, force: np.ndarray, share: float) -> np.ndarray:
+        """Movements (nn, 2) [m] that undo the unbalanced forces (nn, 2), with this share of what is prescribed; equal
+        on all ranks. Collective."""
+        right, found = self._matrix.createVecLeft(), self._matrix.createVecRight()
+        mine = self.unknowns.reduced(force)[self._mine][self._first : self._end] - share * self._coupling
+        right.setArray(mine)
+        self._ksp.solve(right, found)
+        failed = self._ksp.getConvergedReason() < 0
+        parts = self.comm.allgather(found.getArray().copy()) if self.comm.size > 1 else [found.getArray().copy()]
+        right.destroy()
+        found.destroy()
+        if self.comm.any(failed):
+            raise CommandError(f"{self.name} found no solution (reason {self._ksp.getConvergedReason()}); {SINGULAR}")
+        q = np.empty(self.unknowns.count)
+        q[self._mine] = np.concatenate(parts)
+        return self.unknowns.moved(q, share)
+
+    def close(self) -> None:
+        """Give back what PETSc holds."""
+        for held in (self._ksp, self._matrix):
+            if held is not None:
+                held.destroy()
+        self._ksp = self._matrix = None
+
+
+def _mumps_there(petsc: Any) -> bool:
+    return bool(petsc.Sys.hasExternalPackage("mumps"))
+
+
+def petsc_there() -> bool:
+    """petsc4py can be used on this rank. It must not take signals: the run answers them. Not collective."""
+    try:
+        import petsc4py
+
+        petsc4py.init(["hpcdem", "-no_signal_handler"])
+        from petsc4py import PETSc
+    except (ImportError, OSError):
+        return False
+    return bool(np.dtype(PETSc.ScalarType) == np.float64)

@@ -1,0 +1,635 @@
+"""The tables of the kernels for the elements that a rank holds, made at each rebuild, and the calls of the kernels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.core.errors import PhysicsError
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import build, connectivity
+from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits
+from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, MEMORY, NONE
+from hpcdem.physics.fdem.memories import FIRST, KEY, WORDS, Memories, joint_rows
+from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
+from hpcdem.physics.fdem.properties import Rows
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Core
+
+ALPHA = 0.8
+"""Local damping of the static mode."""
+
+
+def joint_tables(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    """The tables of joint laws (rows, 8) and (rows, 4) of joints.py; row 0 is no joint."""
+    names = (
+        "tensile_strength",
+        "cohesion",
+        "friction",
+        "penalty_normal",
+        "penalty_overlay",
+        "penalty_shear",
+        "gf1",
+        "gf2",
+    )
+    tensile, cohesion, friction, opening, overlay, shear, gf1, gf2 = (np.array(rows.column(n)) for n in names)
+    law, beyond = np.zeros((len(rows), 8)), np.zeros((len(rows), 4))
+    area = laws.SOFTENING_AREA
+    with np.errstate(divide="ignore", invalid="ignore"):
+        law[:, joints.KOP] = np.where(tensile > 0.0, opening / (2.0 * tensile), 0.0)
+        beyond[:, joints.PER_KOP] = np.where(tensile > 0.0, 2.0 * tensile / opening, 0.0)
+        beyond[:, joints.PER_O_T] = np.where(tensile > 0.0, area * tensile / gf1, 0.0)
+        beyond[:, joints.PER_S_T] = np.where(cohesion > 0.0, area * cohesion / gf2, 0.0)
+        beyond[:, joints.PER_HALF_SHEAR] = np.where(shear > 0.0, 2.0 / shear, 0.0)
+    law[:, joints.TENSILE], law[:, joints.OVERLAY], law[:, joints.COHESION] = tensile, overlay, cohesion
+    law[:, joints.TAN_PHI] = np.tan(np.radians(friction))
+    law[:, joints.HALF_SHEAR] = 0.5 * shear
+    return law, beyond
+
+
+def element_table(rows: Rows) -> np.ndarray:
+    """The table of element models (rows, 5) of build.py."""
+    names = ("density", "bulk", "shear", "young", "damp_factor")
+    models = np.ascontiguousarray(np.array([rows.column(name) for name in names]).T)
+    bulk, shear = models[:, 1].copy(), models[:, 2].copy()
+    models[:, build.LAME], models[:, build.MU2] = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+    return models
+
+
+@dataclass
+class Evaluation:
+    """Forces at the present positions, as the next step will see them [N/m].
+
+    force (n, 8): on the corners of the owned elements, in storage order (ghosts too, where nodes are shared); of_joints
+    (n, 8): those of them from joints; pushed: those from contact, by `pairs.rows`; touching (m,), pair_force (m, 12):
+    by pairs; outside, felt: of special nodes, see nodes.py.
+    """
+
+    force: np.ndarray
+    of_joints: np.ndarray
+    pushed: np.ndarray
+    touching: np.ndarray
+    pair_force: np.ndarray
+    outside: np.ndarray
+    felt: np.ndarray
+    v_next: np.ndarray
+    """Velocities after this moment's kick (n, w) [m/s]."""
+
+
+class Local:
+    """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
+
+    passes: how often the forces of a step were computed.
+    """
+
+    def __init__(self, sim: Core) -> None:
+        self.sim = sim
+        mesh, own = sim.the_mesh(), sim.owned
+        quad = mesh.cells[sim.number[own], 3] >= 0
+        rows = np.arange(own.start, own.stop)
+        triangles, self.quad_rows = rows[~quad], rows[quad].astype(np.int32)
+        self.count = len(triangles)
+        self.triangle_of_row = np.full(sim.n_own, -1, np.int64)
+        self.triangle_of_row[~quad] = np.arange(self.count)
+        fill = triangles[-1:] if self.count else np.zeros(1, np.int64)
+        self.triangle_rows = np.concatenate([triangles, np.repeat(fill, 3)]).astype(np.int32)
+        self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
+        self.passes = 0
+        self._make_constants()
+        self._make_joints()
+        sim.memories.put_into_joints(self)
+        self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
+        self._make_loads()
+        self._make_nodes()
+        self._set_masses()
+        self._bind()
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """What contact needs to know of the elements held here, by storage row."""
+        return Shapes(self.sim, self.sim.number)
+
+    @cached_property
+    def kinds(self) -> Kinds:
+        """What tells properties of faces in contact apart."""
+        return Kinds.of(self.sim)
+
+    # ---- tables --------------------------------------------------------------------------------------------------
+
+    def _make_constants(self) -> None:
+        """Reference geometry, moduli, true masses, initial stress."""
+        sim, mesh, count = self.sim, self.sim.reference, self.count
+        models = element_table(sim.element_rows)
+        self.true_mass = np.zeros((len(sim.number), 4))
+        build.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self.true_mass)
+        self.c = np.zeros((count + 3, elements.TRIANGLE))
+        self.q = np.zeros((len(self.quad_rows), elements.QUAD))
+        build.constants(
+            sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic,
+            self.triangle_rows[:count], self.quad_rows, self.true_mass, self.c, self.q,
+        )  # fmt: skip
+        self.c[count:] = self.c[count - 1] if count else 1.0
+        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 4))
+        if sim.stress0 is not None:
+            self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
+            self.quad_s0[:] = sim.initial_stresses(sim.number[self.quad_rows])
+
+    def _make_joints(self) -> None:
+        """Slots of the edges: three per triangle, then four per quad."""
+        sim, count = self.sim, self.count
+        self.slots_of_triangles = 3 * count
+        self.slots = 3 * count + 4 * len(self.quad_rows)
+        padded = self.slots + 9  # lanes are filled four at a time
+        self.slot_face = np.zeros(padded, np.int64)
+        self.slot_at, self.slot_law, self.slot_kind = (np.zeros(padded, np.int32) for _ in range(3))
+        self.slot_state = np.zeros(padded, np.uint8)
+        closed = sim.closed_faces()
+        lost = -1
+        for rows, n, first in ((self.triangle_rows[:count], 3, 0), (self.quad_rows, 4, 3 * count)):
+            found = build.links(
+                sim.number, rows, n, first, sim.x.shape[1], sim.where, sim.partner, closed, sim.joint_row,
+                self.slot_face, self.slot_at, self.slot_law, self.slot_kind, self.slot_state,
+            )  # fmt: skip
+            lost = max(lost, int(found))
+        self._agree_on_lost(lost, "the joint of face")
+        self.slot_memory = np.zeros((padded, MEMORY))
+        self.first_slot = np.empty(sim.n_own, np.int64)
+        self.first_slot[self.triangle_rows[:count] - sim.n_left] = 3 * np.arange(count)
+        self.first_slot[self.quad_rows - sim.n_left] = 3 * count + 4 * np.arange(len(self.quad_rows))
+        blocks = -(-count // elements.BLOCK)
+        self.head, self.follow = np.full(blocks, -1, np.int32), np.full(padded, -1, np.int32)
+        self.joint_table, self.joint_beyond = joint_tables(sim.joint_rows)
+
+    def _agree_on_lost(self, lost: int, what: str) -> None:
+        sim = self.sim
+        found = int(sim.comm.max_into(np.array([lost], np.int64))[0])
+        if found >= 0:
+            raise PhysicsError(
+                f"step {sim.clock.step}: {what} {found} spans more than a column of {sim.lattice.side:g} m; elements "
+                "move too far in a step: the time step is probably too large"
+            )
+
+    def _make_loads(self) -> None:
+        """Tractions on owned faces, and forces that die down."""
+        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
+        number = sim.number[own]
+        cells = mesh.cells[number]
+        faces = 4 * number[:, None] + np.arange(4)
+        i, k = np.nonzero((sim.load_row[faces] > 0) & (cells >= 0))
+        k2 = (k + 1) % connectivity.corner_counts(cells)[i]
+        row = i + own.start
+        self.special: np.ndarray = np.zeros((sim.n_own, 4), dtype=bool)
+        self.special[i, k] = self.special[i, k2] = True
+        self.load_edge = row * sim.x.shape[1] + 2 * k
+        self.load_a, self.load_b = 8 * row + 2 * k, 8 * row + 2 * k2
+        self.load_of = sim.load_row[faces[i, k]].astype(np.int64)
+        parts = [one for one in sim.fading if not sim.has_faded(one)]
+        corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
+        force = np.concatenate([one.force for one in parts] or [np.empty((0, 2))])
+        each = [len(one.corner) for one in parts]
+        at_row = sim.where[corner // 4]
+        at = np.flatnonzero((at_row >= own.start) & (at_row < own.stop))
+        self.special[at_row[at] - own.start, corner[at] % 4] = True
+        self.fading_corner = 8 * at_row[at] + 2 * (corner[at] % 4)
+        self.fading_x, self.fading_y = force[at, 0].copy(), force[at, 1].copy()
+        self.fading_begin = np.repeat(np.array([one.begin for one in parts]), each)[at]
+        self.fading_span = np.repeat(np.array([one.span for one in parts]), each)[at]
+        self.fading_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
+        if sim.surface_loads is not None:
+            self.special |= sim.surface_loads.corners(sim)
+        self.some_applied = sim.surface_loads is not None or sim.comm.any(len(i) > 0 or len(at) > 0)
+
+    def _make_nodes(self) -> None:
+        """Nodes that do not move by themselves: of several corners, with conditions or loads, of quads."""
+        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
+        number = sim.number[own]
+        cells, node = mesh.cells[number], sim.node[number]
+        real = node >= 0
+        self.special[real] |= (sim.node_sizes[node[real]] > 1) | (sim.point_row[cells[real]] > 0)
+        self.special[cells[:, 3] >= 0] = True
+        self.special &= real
+        self.some_special = bool(self.special.any())
+        nothing = np.empty(0, np.int64)
+        args = sim.number, sim.n_left, sim.n_own, self.special, sim.node, sim.member_begin, sim.unused
+        n = build.special_nodes(*args, nothing, nothing, nothing)
+        self.node_lead, self._start, self._one = (np.empty(n, np.int64) for _ in range(3))
+        if n:
+            build.special_nodes(*args, self.node_lead, self._start, self._one)
+        m = int(self._one.sum())
+        self.node_begin = np.zeros(n + 1, np.int64)
+        self.node_corner, self.node_place, self.node_again = (np.empty(m, np.int64) for _ in range(3))
+        self.node_mass = np.empty(n)
+        lost = self._place_nodes(self.true_mass)
+        self._agree_on_lost(lost, "the node of corner")
+        rows = self.node_corner // 8
+        self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
+        lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
+        self.node_condition = sim.point_row[lead].astype(np.int64)
+        self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
+        self.outside, self.felt = np.zeros((n, 2)), np.zeros((n, 4))
+        total = len(sim.number)
+        self.force = np.zeros((total if self.some_special or self.shared else 1, elements.FORCE))
+        self.applied = np.zeros((total if self.some_applied else 1, elements.FORCE))
+        self.triangle_special = self.special[self.triangle_rows[: self.count] - own.start].any(axis=1)
+        self.block_special = self._per_block(self.triangle_special)
+
+    def _per_block(self, flags: np.ndarray) -> np.ndarray:
+        blocks = len(self.head)
+        padded = np.zeros(blocks * elements.BLOCK, bool)
+        padded[: self.count] = flags
+        return padded.reshape(blocks, elements.BLOCK).any(axis=1)
+
+    def _place_nodes(self, mass: np.ndarray) -> int:
+        sim = self.sim
+        return int(
+            build.place_nodes(
+                self.node_lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1],
+                mass, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_mass,
+            )
+        )  # fmt: skip
+
+    # ---- masses and time step ------------------------------------------------------------------------------------
+
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
+        contact of its free faces can have. And the dashpots (n_own, 4) [N s/m per m] of these contacts.
+
+        Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
+        altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
+        ones limit the time step by themselves. (It must not follow from who is near: a restart makes those lists anew.)
+        """
+        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
+        number = sim.number[own]
+        cells = mesh.cells[number]
+        corners = connectivity.corner_counts(cells)
+        faces = 4 * number[:, None] + np.arange(4)
+        real = cells >= 0
+        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
+        penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)
+        closed = sim.closed_faces()[faces] & real
+        tied = closed & (sim.joint_row[faces] > 0)
+        each, drag = np.where(tied, 0.5 * penalty[sim.joint_row[faces]], 0.0), np.zeros(faces.shape)
+        if sim.options.collision:
+            length, double_area = self.shapes.length[own], self.shapes.double_area[own]
+            surfaces = Surfaces(sim, self.shapes, faces.reshape(-1), np.repeat(np.arange(own.start, own.stop), 4))
+            highest = float(np.max(length.max(axis=1) / double_area, initial=0.0))
+            others = bool((np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal))[real.reshape(-1)].any())
+            highest, some = sim.comm.max_into(np.array([highest, float(others)])).tolist()
+            most = surfaces.most_penalty(some == 0.0).reshape(-1, 4)
+            contact = 1.5 * most * (length * length / double_area[:, None] + length * highest)
+            may_touch = real & ~closed
+            if sim.options.dynamic:
+                may_touch |= tied  # once they break
+            each = np.maximum(each, np.where(may_touch, contact, 0.0))
+            # Half of 2 xi sqrt(k m) L, with k L = 2 `contact` and m L no more than two corners of the element have.
+            ratio = float(sim.comm.max_into(np.array([surfaces.ratio.max(initial=0.0)]))[0])
+            heavy = 2.0 * self.true_mass[own].max(axis=1, initial=0.0)[:, None]
+            drag = np.where(may_touch, ratio * np.sqrt(2.0 * contact * heavy), 0.0)
+        before = np.where(np.arange(4) > 0, np.arange(4) - 1, corners[:, None] - 1)
+        springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
+        return np.where(real, springs, 0.0), np.where(real, dashpots, 0.0)
+
+    def critical_time_step(self, target: float = 0.0, mass: np.ndarray | None = None) -> float:
+        """Stability limit times the safety factor [s]; infinite in static mode. target: raise `mass` (n, 4) until this
+        time step is stable. Collective."""
+        sim, o = self.sim, self.sim.options
+        if not o.dynamic:
+            return math.inf
+        least = limits.time_step(
+            self.c, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            o.safety, target, self.true_mass.copy() if mass is None else mass,
+        )  # fmt: skip
+        return o.safety * float(sim.comm.min_into(np.array([least]))[0])
+
+    def added_mass(self) -> float:
+        """Mass that mass scaling has added, over the true mass. Collective."""
+        comm, own = self.sim.comm, self.sim.owned
+        true = exact_sum(self.true_mass[own], comm)
+        return exact_sum(self.mass[own] - self.true_mass[own], comm) / true
+
+    def _set_masses(self) -> None:
+        """Masses of the corners that the motion sees, and the time step. Collective."""
+        sim, o = self.sim, self.sim.options
+        triangles = self.triangle_rows[: self.count]
+        self.mass = self.true_mass.copy()
+        own = sim.owned
+        if not o.dynamic:
+            limits.static_masses(
+                self.c, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
+            )  # fmt: skip
+            sim.clock.dt = 1.0
+        else:
+            wanted = sim.lattice.dt == 0.0
+            if wanted or o.mass_scaling > 0.0:
+                critical = self.critical_time_step(o.mass_scaling, self.mass)
+                if wanted:
+                    sim.lattice.dt = o.dt or o.mass_scaling or critical
+                    sim.lattice.estimated = sim.clock.step
+                    sim.tell_time_step(sim.lattice.dt, critical, self.added_mass() if o.mass_scaling > 0.0 else 0.0)
+            sim.clock.dt = sim.lattice.dt
+        if sim.comm.size > 1:
+            sim.halo.fill(self.mass)
+        self._place_nodes(self.mass)
+        dt = sim.clock.dt
+        self.node_kick = dt / self.node_mass
+        self._conditions = None if sim.conditions_vary() else sim.conditions_at(sim.clock.time, sim.clock.time, dt)
+        alone = ~self.special[triangles - own.start][:, :3]
+        with np.errstate(divide="ignore"):
+            self.c[: self.count, elements.KICK : elements.KICK + 3] = np.where(
+                alone, dt / self.mass[triangles, :3], 0.0
+            )
+
+    # ---- calls ---------------------------------------------------------------------------------------------------
+
+    def _bind(self) -> None:
+        """Kernels for this number of threads, and their argument lists."""
+        sim, pairs, o = self.sim, self.pairs, self.sim.options
+        one = sim.threads == 1
+        self._triangles: Any = elements.triangles if one else elements.triangles_threaded
+        self._quads: Any = elements.quads if one else elements.quads_threaded
+        self._move: Any = moving.move if one else moving.move_threaded
+        self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
+        small = not o.large_strain
+        self._triangle_args = (
+            sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
+            sim.stress0 is not None, small, self.slot_at, self.slot_law, self.slot_kind, self.slot_state,
+            self.slot_memory, self.head, self.follow, self.joint_table, self.joint_beyond, pairs.block_begin,
+            pairs.lane, pairs.slot, pairs.pushed,
+        )  # fmt: skip
+        self._quad_args = (
+            sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
+            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_kind, self.slot_state,
+            self.slot_memory, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+        )  # fmt: skip
+
+    def forces(self) -> None:
+        """Forces at the present positions, and the velocities that follow from them. Collective."""
+        sim, timers = self.sim, self.sim.timers
+        self.passes += 1
+        if len(self.pairs):
+            with timers("contact"):
+                self.pairs.forces(sim.x, sim.v, sim.clock.dt)
+        with timers("force"):
+            keep = sim.budget is not None
+            self._elements(self.triangle_special, self.block_special, self.force, self.of_joints, keep)
+        if self.some_special or self.shared:
+            with timers("node"):
+                self.move_nodes()
+
+    def _elements(
+        self, special: np.ndarray, block_special: np.ndarray, force: np.ndarray, of_joints: np.ndarray, keep: bool
+    ) -> None:
+        sim, o = self.sim, self.sim.options
+        alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
+        self._triangles(
+            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
+        )
+        if len(self.quad_rows):
+            self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
+
+    def move_nodes(self) -> None:
+        """New velocities of the nodes from the forces on their corners. Collective."""
+        sim, clock = self.sim, self.sim.clock
+        if self.some_applied:
+            self.applied[:] = 0.0
+            loads = sim.loads_at(clock.time)
+            moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
+            if len(self.fading_corner):
+                now = np.where(self.fading_steps, float(clock.step), clock.time)
+                left = np.clip(1.0 - (now - self.fading_begin) / self.fading_span, 0.0, 1.0)
+                moving.fading(self.fading_corner, self.fading_x, self.fading_y, left, self.applied)
+            if sim.surface_loads is not None:
+                sim.surface_loads.add_to(self.applied)
+        if self.shared:
+            sim.halo.fill(self.force)
+            if self.some_applied:
+                sim.halo.fill(self.applied)
+        table = self._conditions
+        if table is None:
+            half = 0.5 * clock.dt if sim.options.dynamic else 0.0
+            table = sim.conditions_at(clock.time, clock.time + half, clock.dt)
+        self._move(
+            sim.threads, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_kick,
+            self.node_condition, self.node_share, table, self.some_applied, self.force, self.applied, sim.v,
+            0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
+        )  # fmt: skip
+
+    # ---- looking ---------------------------------------------------------------------------------------------------
+
+    def evaluation(self, contact: bool = True) -> Evaluation:
+        """Forces at the present positions; everything is put back as it was. contact: with those of contact.
+        Collective."""
+        sim, pairs = self.sim, self.pairs
+        kept = [
+            (table, table.copy())
+            for table in (
+                sim.v, pairs.memory, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
+                self.follow, self.tally, self.outside, self.felt,
+            )
+        ]  # fmt: skip
+        behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
+        remembered = self.slot_memory[behind]
+        stored = self.force
+        total = len(sim.number)
+        self.force, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
+        if not contact:
+            pairs.pushed[:] = 0.0
+        elif len(pairs):
+            pairs.forces(sim.x, sim.v, sim.clock.dt)
+        every, blocks = np.ones(self.count, bool), np.ones(len(self.head), bool)
+        self._elements(every, blocks, self.force, of_joints, True)
+        if self.some_special or self.shared:
+            self.move_nodes()
+        found = Evaluation(
+            self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(), self.outside.copy(),
+            self.felt.copy(), sim.v.copy(),
+        )  # fmt: skip
+        self.force = stored
+        self.slot_memory[self.slot_state > INTACT] = 0.0
+        self.slot_memory[behind] = remembered
+        for table, values in kept:
+            table[...] = values
+        return found
+
+    def first_corners(self) -> np.ndarray:
+        """Lowest corner (element * 4 + k) of each special node. Not to be changed."""
+        return self._first_corners
+
+    @cached_property
+    def _first_corners(self) -> np.ndarray:
+        out = self.node_lead.copy()
+        several = self._start >= 0
+        out[several] = self.sim.member[self._start[several]]
+        return out
+
+    @cached_property
+    def my_nodes(self) -> np.ndarray:
+        """Special nodes whose lowest corner is on an element of this rank, bool."""
+        row, own = self.sim.where[self._first_corners // 4], self.sim.owned
+        return (row >= own.start) & (row < own.stop)
+
+    @cached_property
+    def leads(self) -> np.ndarray:
+        """(np,) lowest corner (element * 4 + k) of elements that are there at each point of the mesh, -1: none."""
+        sim, mesh = self.sim, self.sim.the_mesh()
+        corner = np.arange(mesh.cells.size).reshape(mesh.cells.shape)
+        use = (mesh.cells >= 0) & sim.alive[:, None]
+        out = np.full(len(mesh.points), -1, np.int64)
+        out[mesh.cells[use][::-1]] = corner[use][::-1]
+        return out
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """Lower faces of all edges between two elements that are there, of all ranks."""
+        return np.flatnonzero(self.sim.joint_exists())
+
+    @cached_property
+    def lower_faces(self) -> np.ndarray:
+        """Lower faces of the owned elements that have a joint model."""
+        sim = self.sim
+        faces = (4 * sim.number[sim.owned][:, None] + np.arange(4)).reshape(-1)
+        return faces[sim.joint_exists()[faces] & (sim.joint_row[faces] > 0)]
+
+    @cached_property
+    def lower_slots(self) -> np.ndarray:
+        """Their slots."""
+        return self.slot_of(self.lower_faces)
+
+    def alone(self) -> np.ndarray:
+        """(n_own, 4) bool: corners of owned elements that move by themselves. Not to be changed."""
+        return self._alone
+
+    @cached_property
+    def _alone(self) -> np.ndarray:
+        return ~self.special & (self.sim.the_mesh().cells[self.sim.number[self.sim.owned]] >= 0)
+
+    def stresses(self, at: np.ndarray | None = None, energies: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """Stress (n_own, 4) xx, yy, xy, zz [Pa] and, unless they are not wanted, elastic energies (n_own,) [J/m] of the
+        owned elements, or of some of them (at: the how-manieth)."""
+        sim = self.sim
+        if at is None:
+            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, self.s0, self.quad_s0
+            n, first = sim.n_own, sim.n_left
+        else:
+            triangle = self.triangle_of_row[at]
+            three, n, first = triangle >= 0, len(at), 0
+            triangle, quad = triangle[three], np.searchsorted(self.quad_rows, at[~three] + sim.n_left)
+            places = np.flatnonzero(three).astype(np.int32), np.flatnonzero(~three).astype(np.int32)
+            rows = (
+                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], self.s0[triangle], self.quad_s0[quad],
+            )  # fmt: skip
+        stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
+        build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
+        return stress, energy
+
+    def stored_in_joints(self) -> np.ndarray:
+        """What the joints of the owned elements give back when they are unloaded, half to each side (n_own,) [J/m]."""
+        sim = self.sim
+        out = np.zeros(sim.n_own)
+        energy.stored_in_joints(
+            self.slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_memory, sim.where,
+            sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, sim.n_left, out,
+        )  # fmt: skip
+        return out
+
+    def slot_of(self, faces: np.ndarray) -> np.ndarray:
+        """Slots of faces of owned elements."""
+        return self.first_slot[self.sim.where[faces // 4] - self.sim.n_left] + faces % 4
+
+    def edge_forces(self, slots: np.ndarray) -> np.ndarray:
+        """Joint forces (n, 4) [N/m] on the first and the last corner of the edges of slots."""
+        return self._edges(slots)[:, :4]
+
+    def joint_means(self, slots: np.ndarray) -> np.ndarray:
+        """Mean opening, slip [m], normal and shear stress [Pa] of joints (n, 4)."""
+        return self._edges(slots)[:, 4:8]
+
+    def joint_points(self, slots: np.ndarray) -> np.ndarray:
+        """Normal (3) and shear (3) stress [Pa] at the points of joints, from the first corner of the slot's face to the
+        last (n, 6)."""
+        return self._edges(slots)[:, 8:]
+
+    def _edges(self, slots: np.ndarray) -> np.ndarray:
+        sim = self.sim
+        out = np.zeros((len(slots), 14))
+        build.edges_now(
+            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_memory, sim.where,
+            sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, out,
+        )  # fmt: skip
+        return out
+
+    # ---- what is taken out of the tables ---------------------------------------------------------------------------
+
+    def memories(self, transfer: bool) -> Memories:
+        """What joints and contacts of the owned elements remember.
+
+        transfer: joints that are broken are left out; their friction is handed over to the contacts that follow them.
+        """
+        parts = [joint_rows(self, transfer), self.pairs.memories(self.sim)]
+        if transfer:
+            parts.append(self.handed_over())
+        return Memories.of(
+            self.sim.n_own, np.concatenate([owner for owner, _ in parts]), np.concatenate([rows for _, rows in parts])
+        )
+
+    def slot_element(self, slots: np.ndarray) -> np.ndarray:
+        """Owned element (0 ..) of slots."""
+        return self.sim.where[self.slot_face[slots] // 4] - self.sim.n_left
+
+    def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
+        """Contact memories of joints that have just broken: the joint's shear force, half to each of the two edges.
+
+        Owned element (0 ..) and row (memories.py) for each of their sides.
+        """
+        sim = self.sim
+        slots = np.flatnonzero(self.slot_state == BROKEN)
+        rows = np.zeros((len(slots), WORDS))
+        if not len(slots):
+            return np.empty(0, np.int64), rows
+        _, _, sigma, tau = self.joint_means(slots).T
+        mesh = sim.the_mesh()
+        ends = connectivity.face_points(mesh.cells, self.slot_face[slots])
+        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
+        shear = np.where(sigma < 0.0, tau * np.hypot(way[:, 0], way[:, 1]), 0.0)
+        cut = sim.cut
+        sides = []
+        for face in (self.slot_face[slots], sim.partner[self.slot_face[slots]]):
+            e, k = face // 4, face % 4
+            quad = mesh.cells[e, 3] >= 0
+            turn = (k - cut[e]) % 4
+            half, edge = np.where(quad, turn // 2, 0), np.where(quad, turn % 2, k)
+            sides.append((2 * e + half, half, edge))
+        (mine, half, edge), (other, _, other_edge) = sides
+        low = mine < other
+        at = np.arange(len(slots))
+        rows.view(np.int64)[:, KEY] = 2 * other + half
+        rows[at, FIRST + np.where(low, edge, 3 + edge)] = 0.5 * shear
+        rows[at, FIRST + np.where(low, 3 + other_edge, other_edge)] = 0.5 * shear
+        return self.slot_element(slots), rows
+
+    def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
+        """New contact lists; joints on faces that have been opened are gone. Collective."""
+        sim = self.sim
+        self.tally[:, elements.NEW_BROKEN] = 0
+        opened = np.flatnonzero((self.slot_state != NONE) & ~sim.closed_faces()[self.slot_face])
+        if len(opened):
+            self.slot_state[opened] = NONE
+            self.slot_law[opened] = self.slot_kind[opened] = 0
+            build.relink(self.slot_state, self.slots_of_triangles, self.head, self.follow)
+        low, high, values = self.pairs.known()
+        owner, rows = handed_over
+        if len(owner):
+            more = ContactPairs.named(sim.number[sim.owned][owner], rows)
+            low, high, values = (np.concatenate(parts) for parts in zip((low, high, values), more))
+        self.pairs = ContactPairs(sim, self, low, high, values)
+        self._bind()
+        if sim.masses_change():
+            if sim.budget is not None:
+                sim.budget.pause(sim)
+            self._set_masses()

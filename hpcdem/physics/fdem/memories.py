@@ -1,0 +1,132 @@
+"""What joints behind their peak and contacts remember, taken out of the kernels' tables: rows that belong to elements,
+travel with them, and are put back at the next rebuild.
+
+A row is 20 words: key, state, and up to eighteen numbers. Keys of joints are -1 - edge (0..3); keys of contacts are the
+other body's number * 2 + half of this element, bodies being element * 2 + half (quads have two, see `pairs.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from hpcdem.physics.fdem.kernels import elements, joints
+from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.local import Local
+
+WORDS = 20
+KEY, STATE, FIRST = 0, 1, 2
+
+
+@dataclass
+class Memories:
+    """Rows rows[ptr[i] : ptr[i + 1]] belong to the i-th of the owned elements; ptr (n + 1,) i8, rows (m, 14) f8.
+
+    Keys are int64 bits.
+    """
+
+    ptr: np.ndarray
+    rows: np.ndarray
+
+    @staticmethod
+    def empty(n: int) -> Memories:
+        """n elements without any."""
+        return Memories(np.zeros(n + 1, np.int64), np.empty((0, WORDS)))
+
+    @staticmethod
+    def of(n: int, owner: np.ndarray, rows: np.ndarray) -> Memories:
+        """From rows and the element (0 .. n - 1) each belongs to, in any order."""
+        key = rows.view(np.int64)[:, KEY]
+        order = np.lexsort((key, owner))
+        ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=n)))).astype(np.int64)
+        return Memories(ptr, np.ascontiguousarray(rows[order]))
+
+    def counts(self) -> np.ndarray:
+        """Rows per element (n,)."""
+        return np.diff(self.ptr)
+
+    def owners(self) -> np.ndarray:
+        """Element of each row (m,)."""
+        return np.repeat(np.arange(len(self.ptr) - 1), self.counts())
+
+    def keys(self) -> np.ndarray:
+        """(m,) i8."""
+        return self.rows.view(np.int64)[:, KEY]
+
+    def take(self, which: np.ndarray) -> Memories:
+        """Those of the elements `which`, in that order."""
+        counts = self.counts()[which]
+        if not len(self.rows):
+            return Memories.empty(len(which))
+        ends = np.cumsum(counts)
+        at = np.repeat(self.ptr[which] - (ends - counts), counts) + np.arange(int(counts.sum()))
+        return Memories(np.concatenate(([0], ends)).astype(np.int64), self.rows[at])
+
+    def joined(self, counts: np.ndarray, rows: np.ndarray) -> Memories:
+        """With more elements behind."""
+        ends = self.ptr[-1] + np.cumsum(counts)
+        return Memories(
+            np.concatenate([self.ptr, ends]).astype(np.int64), np.ascontiguousarray(np.concatenate([self.rows, rows]))
+        )
+
+    def keep(self, rows: np.ndarray) -> Memories:
+        """Those rows (m,) bool alone."""
+        owner = self.owners()[rows]
+        ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(self.ptr) - 1))))
+        return Memories(ptr.astype(np.int64), np.ascontiguousarray(self.rows[rows]))
+
+    def without_partners(self, gone: np.ndarray) -> Memories:
+        """Without contacts with elements flagged in `gone` (ne,)."""
+        key = self.keys()
+        other = np.where(key >= 0, key // 4, 0)
+        return self.keep((key < 0) | ~gone[other])
+
+    def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Memories:
+        """Without the joints on faces flagged in `forget` (4 ne,); number (n,): the elements."""
+        key = self.keys()
+        face = 4 * number[self.owners()] + np.where(key < 0, -1 - key, 0)
+        return self.keep((key >= 0) | ~forget[face])
+
+    def put_into_joints(self, local: Local) -> None:
+        """Joints behind their peak take their places in the tables of a rebuild; `self` is in storage order."""
+        key = self.keys()
+        at = np.flatnonzero(key < 0)
+        edge = -1 - key[at]
+        slot = local.first_slot[self.owners()[at]] + edge
+        place_joints(
+            slot, self.rows[at], local.slots_of_triangles, local.slot_law, local.slot_state, local.slot_memory,
+            local.head, local.follow,
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def place_joints(slot, rows, of_triangles, law, state, memory, head, follow):
+    """Give slots their memories; triangles' slots go to the list of their block."""
+    for i in range(len(slot)):
+        s = slot[i]
+        if state[s] == joints.NONE:  # opened meanwhile, or its partner was taken out
+            continue
+        law[s] = 0
+        state[s] = np.uint8(rows[i, STATE])
+        for m in range(joints.MEMORY):
+            memory[s, m] = rows[i, FIRST + m]
+        if s < of_triangles:
+            b = s // (3 * elements.BLOCK)
+            follow[s], head[b] = head[b], s
+
+
+def joint_rows(local: Local, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Owned element (0 ..) and row of each joint behind its peak; with `transfer` without those that are broken."""
+    state = local.slot_state
+    slots = np.flatnonzero((state == YIELDED) if transfer else ((state == YIELDED) | (state == BROKEN)))
+    rows = np.zeros((len(slots), WORDS))
+    face = local.slot_face[slots]
+    rows.view(np.int64)[:, KEY] = -1 - face % 4
+    rows[:, STATE] = state[slots]
+    rows[:, FIRST : FIRST + joints.MEMORY] = local.slot_memory[slots]
+    return local.slot_element(slots), rows

@@ -1,0 +1,232 @@
+"""The mesh of the blocks: points, triangles and quads, and what is known about them before the first step.
+
+Points, elements (cells), faces and edges are numbered for the whole model, see `connectivity`; the numbers know no
+ranks. `hpcdem.pre.mesh` makes meshes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
+
+FLAT = 1e-9
+"""A corner spans less than this much of the square of the longest edge: the element is flat."""
+SAME = 1e-9
+"""Points nearer than this part of the shortest edge are one point."""
+
+
+def _no_pairs() -> np.ndarray:
+    return np.empty((0, 2), np.int64)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Points and elements in the plane, with names for parts of them. Arrays are not to be changed."""
+
+    points: np.ndarray
+    """(np, 2) f8 [m]."""
+    cells: np.ndarray
+    """(ne, 4) i8 point numbers, counter-clockwise; the fourth is -1 for triangles."""
+    groups: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    """Set name -> group name -> ascending i8 element numbers; an element is in one group per set at most."""
+    layers: dict[str, np.ndarray] = field(default_factory=dict)
+    """Geometry layer -> (k, 2) i8 end points of the edges that lie on it."""
+    cracks: np.ndarray = field(default_factory=_no_pairs)
+    """(k, 2) i8 end points of the inner edges that carry a crack from the beginning."""
+    crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    """(k,) i8 number of the fracture set of each crack edge."""
+
+    @staticmethod
+    def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None) -> Mesh:
+        """A mesh from anything array-like, in the form the fields are documented in.
+
+        Cells of three columns are triangles. Pairs get their lower point first, ascending and each once (of a crack
+        edge named twice the first set stays); element numbers of groups are sorted.
+        """
+        points = np.array(points, np.float64, order="C").reshape(-1, 2)
+        cells = np.array(cells, np.int64, order="C")
+        cells = cells.reshape(-1, 3 if cells.ndim == 2 and cells.shape[1] == 3 else 4)
+        if cells.shape[1] == 3:
+            cells = np.column_stack([cells, np.full(len(cells), -1, np.int64)])
+        # Rows lie one after the other whatever was given: kernels are compiled for that.
+        points, cells = np.ascontiguousarray(points), np.ascontiguousarray(cells)
+        pairs = np.sort(np.array(_no_pairs() if cracks is None else cracks, np.int64).reshape(-1, 2), axis=1)
+        pairs, first = np.unique(pairs, axis=0, return_index=True)
+        sets = np.zeros(len(first), np.int64) if crack_sets is None else np.array(crack_sets, np.int64)[first]
+        return Mesh(
+            points,
+            cells,
+            {s: {g: np.unique(np.array(rows, np.int64)) for g, rows in of.items()} for s, of in (groups or {}).items()},
+            {name: _sorted_pairs(given) for name, given in (layers or {}).items()},
+            pairs,
+            sets,
+        )
+
+    def edges(self) -> Edges:
+        """All edges, ascending by number. Computed anew at each call."""
+        return edges_of(self.cells, len(self.points))
+
+    def areas(self) -> np.ndarray:
+        """(ne,) [m2]."""
+        return areas(self.points, self.cells)
+
+    def centroids(self) -> np.ndarray:
+        """(ne, 2) [m]."""
+        return centroids(self.points, self.cells)
+
+
+def _sorted_pairs(pairs: np.ndarray) -> np.ndarray:
+    return np.unique(np.sort(np.array(pairs, np.int64).reshape(-1, 2), axis=1), axis=0)
+
+
+def edge_rows(mesh: Mesh, edges: Edges, layer: str) -> np.ndarray:
+    """Rows of `edges` that lie on a geometry layer; HpcdemError if the mesh knows no such layer."""
+    if layer not in mesh.layers:
+        raise HpcdemError(f"the mesh has no edges of a layer '{layer}' (layers: {_listed(mesh.layers)})")
+    return np.sort(find_edges(edges, mesh.layers[layer], len(mesh.points)))
+
+
+def crack_rows(mesh: Mesh, edges: Edges) -> np.ndarray:
+    """Rows of `edges` for the rows of `mesh.cracks`, in their order."""
+    return find_edges(edges, mesh.cracks, len(mesh.points))
+
+
+def check(mesh: Mesh, source: str = "mesh") -> None:
+    """Raise HpcdemError `source: element or point, what is wrong` for the first thing a simulation cannot take.
+
+    Refused are: no elements; numbers that are not finite or name no point; an element that is flat, clockwise, folded
+    or concave; two points in one place; a point without element; an element given twice; three elements on an edge or
+    two on the same side of it; groups, layers and cracks that name what is not there or overlap.
+    """
+    if not len(mesh.cells):
+        raise HpcdemError(f"{source}: there are no elements")
+    for finding in (_bad_numbers, _bad_shapes, _bad_points, _bad_edges, _bad_names):
+        said = finding(mesh)
+        if said:
+            raise HpcdemError(f"{source}: {said}")
+
+
+def _at(mesh: Mesh, point: int) -> str:
+    x, y = mesh.points[point]
+    return f"({x:g}, {y:g})"
+
+
+def _element(mesh: Mesh, e: int) -> str:
+    corners = [int(p) for p in mesh.cells[e] if p >= 0]
+    where = f" at {_at(mesh, corners[0])}" if corners and corners[0] < len(mesh.points) else ""
+    return f"element {e}{where} with the points {', '.join(map(str, corners))}"
+
+
+def _listed(names) -> str:
+    return ", ".join(f"'{n}'" for n in names) or "none"
+
+
+def _bad_numbers(mesh: Mesh) -> str | None:
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        return f"point {bad[0]} is not finite: {_at(mesh, int(bad[0]))}"
+    n = len(mesh.points)
+    wrong = (mesh.cells[:, :3] < 0).any(axis=1) | (mesh.cells[:, 3] < -1) | (mesh.cells >= n).any(axis=1)
+    bad = np.flatnonzero(wrong)
+    if len(bad):
+        return f"element {bad[0]} names points {mesh.cells[bad[0]].tolist()}, but points are numbered 0 to {n - 1}"
+    return None
+
+
+def _bad_shapes(mesh: Mesh) -> str | None:
+    """Each corner of a convex counter-clockwise element turns left."""
+    for n in (3, 4):
+        rows = np.flatnonzero(connectivity.corner_counts(mesh.cells) == n)
+        xy = mesh.points[mesh.cells[rows, :n]]
+        side = np.roll(xy, -1, axis=1) - xy
+        before = np.roll(side, 1, axis=1)
+        turn = before[..., 0] * side[..., 1] - before[..., 1] * side[..., 0]
+        flat = FLAT * (side * side).sum(axis=2).max(axis=1)
+        bad = np.flatnonzero((turn <= flat[:, None]).any(axis=1))
+        if len(bad):
+            i = bad[0]
+            if (turn[i] < -flat[i]).all():
+                what = "runs clockwise (inverted)"
+            elif n == 3 or (np.abs(turn[i]) <= flat[i]).any():
+                what = "is flat"
+            else:
+                what = "is folded or concave"
+            return f"{_element(mesh, int(rows[i]))} {what}"
+    return None
+
+
+def _bad_points(mesh: Mesh) -> str | None:
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.cells[mesh.cells >= 0]] = True
+    if not used.all():
+        lost = int(np.flatnonzero(~used)[0])
+        return f"point {lost} at {_at(mesh, lost)} belongs to no element"
+    a, b = mesh.points[mesh.cells[:, :3]], mesh.points[np.roll(mesh.cells[:, :3], -1, axis=1)]
+    shortest = float(np.sqrt(((b - a) ** 2).sum(axis=2)).min())
+    twins = cKDTree(mesh.points).query_pairs(SAME * shortest, output_type="ndarray")
+    if len(twins):
+        p, q = min((int(min(t)), int(max(t))) for t in twins)
+        return (
+            f"points {p} and {q} lie in the same place {_at(mesh, p)}: elements on both sides would not hang together; "
+            "merge the points (a crack between them is an edge flagged as crack)"
+        )
+    return None
+
+
+def _bad_edges(mesh: Mesh) -> str | None:
+    partner = np.empty(4 * len(mesh.cells), np.int64)
+    face = connectivity._pair_faces(mesh.cells, len(mesh.points), partner)
+    if face >= 0:
+        p, q = connectivity.face_points(mesh.cells, np.array([face]))[0]
+        both = np.flatnonzero((mesh.cells == p).any(axis=1) & (mesh.cells == q).any(axis=1))
+        return _given_twice(mesh, face // 4) or (
+            f"the edge between points {p} and {q} at {_at(mesh, int(p))} is used by more than two elements: "
+            f"{', '.join(map(str, both[:5]))}"
+        )
+    lower = np.flatnonzero(partner > np.arange(len(partner)))
+    mine, other = (connectivity.face_points(mesh.cells, f) for f in (lower, partner[lower]))
+    bad = np.flatnonzero(mine[:, 0] == other[:, 0])
+    if len(bad):
+        f = int(lower[bad[0]])
+        return _given_twice(mesh, f // 4) or (
+            f"{_element(mesh, f // 4)} lies on the same side of a common edge as element {partner[f] // 4}"
+        )
+    return None
+
+
+def _given_twice(mesh: Mesh, e: int) -> str | None:
+    twins = np.flatnonzero((np.sort(mesh.cells, axis=1) == np.sort(mesh.cells[e])).all(axis=1))
+    return f"{_element(mesh, int(twins[0]))} is there again as element {twins[1]}" if len(twins) > 1 else None
+
+
+def _bad_names(mesh: Mesh) -> str | None:
+    n = len(mesh.cells)
+    for set_name, groups in mesh.groups.items():
+        taken = np.zeros(n, bool)
+        for name, rows in groups.items():
+            if len(rows) and (rows.min() < 0 or rows.max() >= n):
+                return f"group '{name}' of set '{set_name}' names elements outside 0 to {n - 1}"
+            if taken[rows].any() or len(np.unique(rows)) < len(rows):
+                twice = int(rows[taken[rows]][0]) if taken[rows].any() else int(rows[0])
+                return f"element {twice} is in two groups of set '{set_name}', one of them '{name}'"
+            taken[rows] = True
+    edges = mesh.edges()
+    for name, pairs in mesh.layers.items():
+        rows = find_edges(edges, pairs, len(mesh.points))
+        if (rows < 0).any():
+            p, q = pairs[np.flatnonzero(rows < 0)[0]]
+            return f"layer '{name}' has an edge between points {p} and {q}, but no element has"
+    if len(mesh.crack_sets) != len(mesh.cracks):
+        return f"there are {len(mesh.cracks)} crack edges, but {len(mesh.crack_sets)} numbers of fracture sets"
+    rows = find_edges(edges, mesh.cracks, len(mesh.points))
+    outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
+    if len(outside):
+        p, q = mesh.cracks[outside[0]]
+        return f"a crack joins points {p} and {q} at {_at(mesh, int(p))}, but there is no edge inside a body"
+    return None

@@ -1,0 +1,137 @@
+"""A quantity of a few objects of a model of blocks, asked for again and again, as histories do.
+
+Where the objects are is found once per storage; asking then touches them alone. What is combined over ranks is exact:
+each number comes from the one rank that has it, sums are rounded once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hpcdem.halo.comm import SerialComm
+from hpcdem.numerics.exact_sum import exact_sum
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.local import Evaluation, Local
+    from hpcdem.physics.fdem.looking import Looking
+    from hpcdem.physics.fdem.scene import Numbers
+
+_NAN = np.array([np.nan]).view(np.int64)[0]
+
+
+class Probe:
+    """A quantity of `looking.QUANTITIES` at numbers (n,) of elements, nodes or joints. Every method is collective."""
+
+    def __init__(self, sim: Looking, name: str, numbers: Numbers) -> None:
+        """CommandError if there is no such quantity or number. Not collective."""
+        self.sim, self.name = sim, name
+        self.on = sim.quantity(name).on
+        self.numbers = sim.numbers_on(self.on, numbers)
+        self.of_forces = name.startswith(("reaction", "unbalanced"))
+        self.local: Local | None = None
+        self._at = self._rows = self._place = np.empty(0, np.int64)
+        self._nodes, self._corners = np.empty(0, np.int64), (np.empty(0, np.int64), np.empty(0, np.int64))
+        self._nothing = np.empty(0)
+        self._n = 0
+
+    def find(self) -> None:
+        """Find the objects in the present storage."""
+        sim = self.sim
+        sim.close_model()
+        if self.local is sim.local:
+            return
+        self.local = sim.local
+        if self.of_forces:
+            self._find_corners()
+        else:
+            self._at, self._rows = sim.rows_of(self.on, self.numbers)
+            self._n = len(self.numbers)
+
+    def _find_corners(self) -> None:
+        """The nodes that have these points, each with the owner of its lowest corner, in the order of corners."""
+        sim, local = self.sim, self.sim.local
+        cells = sim.the_mesh().cells
+        place = np.full(len(sim.the_mesh().points), -1, np.int64)
+        place[self.numbers] = np.arange(len(self.numbers))
+        lead = local.first_corners()
+        point = cells[lead // 4, lead % 4]
+        self._nodes = np.flatnonzero(local.my_nodes & (place[point] >= 0))
+        corner, point = lead[self._nodes], point[self._nodes]
+        if self.name.startswith("unbalanced"):
+            number = sim.number[sim.owned]
+            i, k = np.nonzero(local.alone())
+            some = place[cells[number[i], k]] >= 0
+            self._corners = i[some], k[some]
+            corner = np.concatenate([corner, 4 * number[i[some]] + k[some]])
+            point = np.concatenate([point, cells[number[i[some]], k[some]]])
+        parts = sim.comm.allgather((corner, place[point]))
+        every = np.concatenate([part[0] for part in parts])
+        order = np.argsort(every)
+        self._place = np.concatenate([part[1] for part in parts])[order]
+        self._at, self._n = np.searchsorted(every[order], corner), len(every)
+        self._nothing = np.where(sim.node_exists()[self.numbers], 0.0, np.nan)
+
+    def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
+        """What this rank has of it, see `_at`."""
+        sim = self.sim
+        if not self.of_forces:
+            return sim.columns_of(self.on, [self.name], self._rows)[self.name]
+        seen = sim.evaluate() if seen is None else seen
+        axis = 0 if self.name.endswith("x") else 1
+        found = seen.outside[self._nodes, axis]
+        if self.name.startswith("unbalanced"):
+            i, k = self._corners
+            found = np.concatenate([found + seen.felt[self._nodes, axis], seen.force[sim.owned][i, 2 * k + axis]])
+        return found
+
+    def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:
+        """(n,) on all ranks; NaN for what is not there. seen: forces that are known already (of the storage in which
+        the objects were found last); None: as they are now."""
+        if seen is None:
+            self.find()
+        found = self._gathered(self._mine(seen))
+        if not self.of_forces:
+            return found
+        out = self._nothing.copy()
+        np.add.at(out, self._place, found)
+        return out
+
+    def _gathered(self, mine: np.ndarray) -> np.ndarray:
+        """(n,) of all ranks. Bits are added up as integers, of which all but one rank's are zero."""
+        comm = self.sim.comm
+        bits = np.zeros(self._n, np.int64)
+        bits[self._at] = np.ascontiguousarray(mine, np.float64).view(np.int64) - _NAN
+        return (comm.sum_into(bits) + _NAN).view(np.float64)
+
+    def total(self, seen: Evaluation | Local | None = None) -> float:
+        """Sum of those that are there, rounded once."""
+        if seen is None:
+            self.find()
+        mine = self._mine(seen)
+        return exact_sum(mine[~np.isnan(mine)], self.sim.comm)
+
+    def reduced(self, how: str, seen: Evaluation | Local | None = None) -> float:
+        """sum, mean, minimum or maximum of those that are there, or of "" the first of all; NaN where there is none."""
+        if how == "":
+            return float(self.values(seen)[0])
+        if self.of_forces and how == "sum":
+            return self.total(seen)
+        comm = self.sim.comm
+        if self.of_forces:  # a node's force is the sum of what several ranks may have
+            comm, mine = SerialComm(), self.values(seen)
+        else:
+            self.find()
+            mine = self._mine(seen)
+        mine = mine[~np.isnan(mine)]
+        count = int(comm.sum_into(np.array([len(mine)], np.int64))[0])
+        if not count:
+            return math.nan
+        if how == "minimum":
+            return float(comm.min_into(np.array([mine.min(initial=math.inf)]))[0])
+        if how == "maximum":
+            return float(comm.max_into(np.array([mine.max(initial=-math.inf)]))[0])
+        total = exact_sum(mine, comm)
+        return total / count if how == "mean" else total

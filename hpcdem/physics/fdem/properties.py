@@ -1,0 +1,294 @@
+"""Models of elements, faces and joints: which properties they have, in which units, and what values they can take.
+
+Names are Python's (``poisson_ratio``); languages put their own spelling on top. A model is given a dictionary of
+values and hands back a complete one, or a CommandError that names the property.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+
+ELEMENT, FACE, JOINT = "element", "element-face", "face-joint"
+
+
+@dataclass(frozen=True)
+class Property:
+    """One number of a model. default: None if it must be given (or follows from others, as `Model.derive` says)."""
+
+    name: str
+    unit: str
+    doc: str
+    default: float | None = None
+    low: float = 0.0
+    high: float = math.inf
+    low_itself: bool = True
+    """The lowest value is allowed itself."""
+    optional: bool = False
+    """May be left out without a default: it then follows from others."""
+
+    def check(self, value: float) -> float:
+        """The value as a float; CommandError if it cannot be."""
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise CommandError(f"{self.name} must be a number, got {value!r}") from None
+        inside = self.low <= number if self.low_itself else self.low < number
+        if math.isnan(number) or not (inside and number <= self.high):
+            sign = ">=" if self.low_itself else ">"
+            upper = f" and <= {self.high:g}" if math.isfinite(self.high) else ""
+            raise CommandError(f"{self.name} must be {sign} {self.low:g}{upper} ({self.unit}), got {number:g}")
+        if math.isinf(number) and self.default != math.inf:
+            raise CommandError(f"{self.name} must be finite, got {number:g}")
+        return number
+
+
+@dataclass(frozen=True)
+class Model:
+    """What can be assigned to elements, faces or joints. derive: fills in what follows from the values given, which are
+    numbers or arrays; CommandError if one cannot be."""
+
+    name: str
+    on: str
+    doc: str
+    properties: tuple[Property, ...]
+    derive: Callable[[dict[str, Any]], None] = lambda values: None
+
+    def has(self, name: str) -> bool:
+        """Whether it has a property of this name."""
+        return any(one.name == name for one in self.properties)
+
+    def property(self, name: str) -> Property:
+        """The property of this name; CommandError listing those there are."""
+        for one in self.properties:
+            if one.name == name:
+                return one
+        known = ", ".join(p.name for p in self.properties)
+        raise CommandError(f"model {self.name} has no property {name}; it has {known}")
+
+    def complete(self, given: Mapping[str, float]) -> dict[str, float]:
+        """All values of the model, checked, in the order of `properties`.
+
+        CommandError for an unknown name, a value out of range, or a compulsory property that is missing.
+        """
+        values = {name: self.property(name).check(value) for name, value in given.items()}
+        for one in self.properties:
+            if one.name not in values and one.default is not None:
+                values[one.name] = one.default
+            elif one.name not in values and not one.optional:
+                raise CommandError(f"model {self.name} needs {one.name} ({one.unit}: {one.doc})")
+        self.derive(values)
+        return {one.name: float(values[one.name]) for one in self.properties}
+
+    def complete_each(self, given: Mapping[str, float | np.ndarray], n: int) -> np.ndarray | None:
+        """The same for n objects at once, values being numbers or arrays (n,): (n, properties), or None if `complete`
+        refuses one of them."""
+        values: dict[str, Any] = {}
+        for name, value in given.items():
+            one, each = self.property(name), np.broadcast_to(np.asarray(value, np.float64), (n,))
+            inside = (one.low <= each if one.low_itself else one.low < each) & (each <= one.high)
+            if not (inside & (np.isfinite(each) | (one.default == math.inf))).all():
+                return None
+            values[name] = each
+        for one in self.properties:
+            if one.name not in values and one.default is not None:
+                values[one.name] = np.full(n, one.default)
+            elif one.name not in values and not one.optional:
+                return None
+        try:
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                self.derive(values)
+        except CommandError:
+            return None
+        return np.column_stack([values[one.name] for one in self.properties])
+
+
+MODULI = ("young", "poisson_ratio", "shear", "bulk")
+
+
+def _elastic(values: dict[str, Any]) -> None:
+    """All four moduli from two of them."""
+    given = [name for name in MODULI if name in values]
+    if len(given) != 2:
+        said = f"got {', '.join(given)}" if given else "got none"
+        raise CommandError(
+            f"an elastic model needs two of young, poisson_ratio, shear, bulk (Pa; usually young and poisson_ratio), "
+            f"{said}"
+        )
+    young, poisson, shear, bulk = (values.get(name, math.nan) for name in MODULI)
+    if given == ["young", "poisson_ratio"]:
+        shear, bulk = young / (2.0 * (1.0 + poisson)), young / (3.0 * (1.0 - 2.0 * poisson))
+    elif given == ["young", "shear"]:
+        poisson = young / (2.0 * shear) - 1.0
+        with np.errstate(divide="ignore"):
+            bulk = young * shear / np.asarray(3.0 * (3.0 * shear - young))
+    elif given == ["young", "bulk"]:
+        poisson, shear = 0.5 - young / (6.0 * bulk), 3.0 * bulk * young / (9.0 * bulk - young)
+    elif given == ["poisson_ratio", "shear"]:
+        young = 2.0 * shear * (1.0 + poisson)
+        bulk = young / (3.0 * (1.0 - 2.0 * poisson))
+    elif given == ["poisson_ratio", "bulk"]:
+        young = 3.0 * bulk * (1.0 - 2.0 * poisson)
+        shear = young / (2.0 * (1.0 + poisson))
+    else:
+        young = 9.0 * bulk * shear / (3.0 * bulk + shear)
+        poisson = young / (2.0 * shear) - 1.0
+    good = (-1.0 < poisson) & (poisson < 0.5) & (young > 0.0) & np.isfinite(bulk)
+    if not np.all(good):
+        wrong = np.asarray(poisson)[~np.asarray(good)].flat[0] if np.ndim(poisson) else poisson
+        raise CommandError(f"the moduli give Poisson's ratio {wrong:g}, which must lie between -1 and 0.5")
+    values.update(young=young, poisson_ratio=poisson, shear=shear, bulk=bulk)
+
+
+def _penalties(values: dict[str, Any]) -> None:
+    values.setdefault("penalty_shear", values["penalty_normal"])
+
+
+_FRICTION = Property("friction", "deg", "angle of friction", 0.0, high=89.0)
+_POSITIVE = {"low_itself": False}
+
+MECH_ISO_ELASTIC = Model(
+    "mech_iso_elastic",
+    ELEMENT,
+    "isotropic, elastic, large rotations",
+    (
+        Property("density", "kg/m3", "density", **_POSITIVE),
+        Property("young", "Pa", "Young's modulus", optional=True, **_POSITIVE),
+        Property("poisson_ratio", "1", "Poisson's ratio", optional=True, low=-1.0, high=0.4999, low_itself=False),
+        Property("shear", "Pa", "shear modulus", optional=True, **_POSITIVE),
+        Property("bulk", "Pa", "bulk modulus", optional=True, **_POSITIVE),
+        Property("damp_factor", "1", "viscous damping over 2 L sqrt(rho E), dynamic mode only", 0.0),
+        _FRICTION,
+        Property(
+            "penalty", "Pa", "contact penalty where a face has no contact model; 0: from the joints, or 10 E", 0.0
+        ),
+    ),
+    _elastic,
+)
+
+CONTACT_MOHR_COULOMB = Model(
+    "contact_mohr_coulomb",
+    FACE,
+    "penalty contact with Coulomb friction",
+    (
+        _FRICTION,
+        Property("penalty_normal", "Pa", "normal penalty", **_POSITIVE),
+        Property("penalty_shear", "Pa", "shear penalty; as penalty_normal", optional=True),
+        Property("damping_t", "Pa", "largest normal stress while surfaces approach", math.inf, **_POSITIVE),
+        Property("damping_b", "1", "exponent of the overlap while they part", 1.0, low=1.0),
+        Property("damping_ratio", "1", "normal dashpot, part of the critical of two elements; dynamic mode only", 0.0),
+    ),
+    _penalties,
+)
+
+COHESIVE = Model(
+    "classic_intrinsic_cohesive_interface",
+    JOINT,
+    "cohesive zone that breaks in tension, in shear, or both",
+    (
+        _FRICTION,
+        Property("cohesion", "Pa", "cohesion; 0: pure friction"),
+        Property("tensile_strength", "Pa", "tensile strength; 0: none"),
+        Property("gf1", "N/m", "fracture energy of mode I"),
+        Property("gf2", "N/m", "fracture energy of mode II"),
+        Property("penalty_normal", "Pa", "penalty when it opens", **_POSITIVE),
+        Property("penalty_overlay", "Pa", "penalty when it is pressed together; as penalty_normal", optional=True,
+                 **_POSITIVE),
+        Property("penalty_shear", "Pa", "penalty when it slides; as penalty_normal", optional=True, **_POSITIVE),
+    ),
+    lambda values: _cohesive(values),
+)  # fmt: skip
+
+
+def _cohesive(values: dict[str, Any]) -> None:
+    for name in ("penalty_overlay", "penalty_shear"):
+        values.setdefault(name, values["penalty_normal"])
+    for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
+        lost = (np.asarray(values[strength]) > 0.0) & (np.asarray(values[energy]) <= 0.0)
+        if lost.any():
+            where = float(np.asarray(values[strength])[lost].flat[0])
+            raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {where:g} Pa, got 0")
+
+
+MODELS = {model.name: model for model in (MECH_ISO_ELASTIC, CONTACT_MOHR_COULOMB, COHESIVE)}
+
+
+def model(name: str, on: str) -> Model:
+    """The model of this name for elements, faces or joints; CommandError listing those there are."""
+    found = MODELS.get(name)
+    if found is None or found.on != on:
+        known = ", ".join(m.name for m in MODELS.values() if m.on == on)
+        raise CommandError(f"there is no model {name} for an {on}; there is {known}")
+    return found
+
+
+class Rows:
+    """Sets of property values in use, each once: what elements, faces and joints hold is a row number.
+
+    Row 0 means no model. A row never changes its meaning, so equal assignments in equal order give equal numbers on
+    all ranks.
+    """
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[str, tuple[float, ...]]] = [("", ())]
+        self._found: dict[tuple[str, tuple[float, ...]], int] = {self.rows[0]: 0}
+        self._columns: dict[tuple[str, float], np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def row(self, of: Model, values: Mapping[str, float]) -> int:
+        """Number of the row with these complete values."""
+        return int(self.numbers(of, np.array([[values[p.name] for p in of.properties]]))[0])
+
+    def numbers(self, of: Model, values: np.ndarray) -> np.ndarray:
+        """Rows (n,) with these complete values (n, properties)."""
+        out = np.empty(len(values), np.int32)
+        for i, one in enumerate(zip(*values.T.tolist()) if len(values) else ()):
+            key = of.name, one
+            row = self._found.get(key)
+            if row is None:
+                row = self._found[key] = len(self.rows)
+                self.rows.append(key)
+            out[i] = row
+        return out
+
+    def values(self, row: int) -> dict[str, float]:
+        """The values of a row by name; empty for row 0."""
+        name, numbers = self.rows[row]
+        return dict(zip((p.name for p in MODELS[name].properties), numbers)) if name else {}
+
+    def name(self, row: int) -> str:
+        """The name of its model, "" for row 0."""
+        return self.rows[row][0]
+
+    def column(self, name: str, default: float = 0.0) -> np.ndarray:
+        """One property of all rows (rows,), not to be changed; `default` where a row has none of this name."""
+        known = self._columns.get((name, default), np.empty(0))
+        if len(known) < len(self.rows):
+            place = {m.name: [p.name for p in m.properties].index(name) for m in MODELS.values() if m.has(name)}
+            new = [numbers[place[of]] if of in place else default for of, numbers in self.rows[len(known) :]]
+            known = np.concatenate([known, new])
+            known.flags.writeable = False
+            self._columns[name, default] = known
+        return known
+
+    def state(self) -> list:
+        """As JSON values."""
+        return [[name, list(numbers)] for name, numbers in self.rows]
+
+    @staticmethod
+    def restored(state: list) -> Rows:
+        """Inverse of `state`."""
+        made = Rows()
+        for name, numbers in state[1:]:  # properties that are new since then have their defaults
+            new = [one.default or 0.0 for one in MODELS[name].properties[len(numbers) :]]
+            made.rows.append((name, (*numbers, *new)))
+        made._found = {key: k for k, key in enumerate(made.rows)}
+        return made

@@ -1,0 +1,71 @@
+"""A tiny run of blocks that calls every kernel once, so that they are compiled before anyone waits for them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.model import Blocks
+
+ROCK = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 0.1, "friction": 20.0}
+JOINT = {
+    "friction": 30.0, "cohesion": 1e4, "tensile_strength": 1e4, "gf1": 1e-3, "gf2": 1e-3, "penalty_normal": 1e10,
+}  # fmt: skip
+
+
+def rehearse(threads: int = 1) -> None:
+    """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    points = [(x, y) for x in (0.0, 1.0, 2.0, 3.0) for y in (0.0, 1.0)] + [(0.5, 0.999), (1.5, 0.999), (1.0, 2.0)]
+    quads = [[0, 2, 3, 1], [2, 4, 5, 3]]
+    triangles = [[4, 6, 7, -1], [4, 7, 5, -1], [8, 9, 10, -1]]
+    for cells in (quads + triangles, triangles):
+        used, numbers = np.unique(np.array(cells)[np.array(cells) >= 0], return_inverse=True)
+        again = np.array(cells)
+        again[again >= 0] = numbers
+        mesh = Mesh.of(np.array(points)[used], again)
+        _rest(mesh, threads)
+        sim = Blocks(SerialComm(), threads)
+        sim.take_mesh(mesh)
+        sim.option(overlap="keep")
+        sim.element_model(None, "mech_iso_elastic", ROCK)
+        sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+        sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10, "damping_t": 1e8})
+        sim.face_property([0], {"friction": 1.0})
+        sim.velocity_condition([0], vx=0.0, vy=0.0)
+        sim.stress_condition([0], normal=-1.0)
+        sim.account_energy()
+        sim.set_velocity([len(used) - 1], 0.0, -1e-3)
+        sim.close_model()
+        sim.tangent()
+        connectivity.bodies(sim.partner)
+        sim.advance(3)
+        sim.energies()
+        sim.set_velocity(None, 0.0, 0.0)
+        sim.set_velocity([0, 1], 10.0, 10.0)
+        sim.advance(20)
+        sim.rebuild()
+        sim.unbalanced_ratio()
+        for name in ("stress_xx", "opening", "position_x", "reaction_x"):
+            sim.values(name)
+        sim.contacts()
+        sim.account_energy(False)
+        sim.option(dynamic=False)
+        sim.null([len(cells) - 2], relax=2)
+        sim.advance(2)
+        sim.time_step(mass_scaling=1e-3)
+        sim.option(dynamic=True)
+        sim.step()
+
+
+def _rest(mesh: Mesh, threads: int) -> None:
+    """One body at rest, of which an element is taken out slowly."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    sim.element_model(None, "mech_iso_elastic", ROCK)
+    sim.initial_stress(None, yy=-1.0)
+    sim.option(dynamic=False, overlap="keep")
+    sim.step()
+    sim.null([1], relax=2)
+    sim.advance(2)

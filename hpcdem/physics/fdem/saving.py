@@ -1,0 +1,244 @@
+"""The whole state of a model of blocks to a file and back, bit for bit, on any number of ranks and threads."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.core.clock import Clock
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.io import checkpoint
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import to_slabs
+from hpcdem.physics.fdem.budget import Budget
+from hpcdem.physics.fdem.memories import WORDS, Memories
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.simulation import Crack
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.physics.fdem.solving import Solving
+
+KIND = checkpoint.BLOCKS
+ARRAYS = {
+    "elements": ("alive", "element_row"),
+    "faces": ("partner", "joint_row", "open", "broken", "face_row", "load_row"),
+    "points": ("point_row",),
+}
+"""Assignments, known to all ranks; rank 0 writes them."""
+
+
+def save(sim: Solving, path: Path | str, extra: Mapping[str, Any]) -> None:
+    """Write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    with sim.timers("checkpoint"):
+        checkpoint.write(path, state_of(sim, extra), tables(sim), sim.comm)
+
+
+def state_of(sim: Solving, extra: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that is not a table, as JSON values. Collective."""
+    mesh = sim.mesh
+    tally = sim.comm.sum_into(sim.local.tally.sum(axis=0)) if sim.closed else np.zeros(1, np.int64)
+    return {
+        "kind": KIND,
+        "clock": dataclasses.asdict(sim.clock),
+        "lattice": dataclasses.asdict(sim.lattice),
+        "scene": sim.scene_state(),
+        "events": [list(row) for row in sim.event_rows],
+        "closed": sim.closed,
+        "longest": sim._longest,
+        "tally": tally.tolist(),
+        "rebuilds": sim.rebuilds,
+        "budget": sim.budget.state(sim) if sim.budget is not None else None,
+        "columns": {name: values.shape[1] for name, values in sim.cold.items()},
+        "mesh": None if mesh is None else {
+            "groups": {s: {g: rows.tolist() for g, rows in of.items()} for s, of in mesh.groups.items()},
+            "layers": {name: pairs.tolist() for name, pairs in mesh.layers.items()},
+            "cracks": mesh.cracks.tolist(),
+            "crack_sets": mesh.crack_sets.tolist(),
+        },
+        "extra": dict(extra),
+    }  # fmt: skip
+
+
+def tables(sim: Solving) -> dict[str, Table]:
+    """The arrays of the state, as slabs. Collective."""
+    if sim.mesh is None:
+        return {}
+    root = sim.comm.rank == 0
+    tables = {
+        "mesh_points": _whole({"x": sim.mesh.points[:, 0], "y": sim.mesh.points[:, 1]}, root),
+        "mesh_cells": _whole({f"corner_{k}": sim.mesh.cells[:, k] for k in range(4)}, root),
+    }
+    for kind, names in ARRAYS.items():
+        tables[kind] = _whole({name: getattr(sim, name).astype(np.int64) for name in names}, root)
+    if sim.stress0 is not None:
+        stress0 = {f"s{k}": sim.stress0[:, k] for k in range(4)}
+        tables["stress0"] = _whole({**stress0, "row": sim.stress0_row.astype(np.int64)}, root)
+    if len(sim.born):
+        born_at = sim.birthplace.reshape(-1, 8)
+        tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
+    own = sim.owned
+    number, x, v = sim.number[own], sim.x[own], sim.v[own]
+    columns: dict[str, np.ndarray] = {"number": number.copy()}
+    places = (sim.origin, sim.listed) if sim.closed else (x, x)
+    for name, rows in (("x", x), ("v", v), *zip(("origin", "listed"), places), *sim.cold.items()):
+        for c in range(rows.shape[1]):
+            columns[f"{name}_{c}"] = rows[:, c].copy()
+    tables["state"] = to_slabs(sim.comm, ("number",), columns)
+    memories = sim.local.memories(transfer=False) if sim.closed else sim.memories
+    keys = memories.keys()
+    order = {"number": number[memories.owners()], "key": keys.copy()}
+    order.update({f"m{c}": memories.rows[:, c].copy() for c in range(1, memories.rows.shape[1])})
+    tables["memories"] = to_slabs(sim.comm, ("number", "key"), order)
+    return tables
+
+
+def _whole(columns: dict[str, np.ndarray], root: bool) -> Table:
+    """A table that all ranks have, written by rank 0."""
+    n = len(next(iter(columns.values())))
+    made = {name: np.ascontiguousarray(values if root else values[:0]) for name, values in columns.items()}
+    return Table(made, offset=0 if root else n, total=n)
+
+
+def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
+    """Take the state of a file written by `save`. Collective. Returns `extra`. CommandError if the file is missing,
+    foreign or damaged; the simulation is then as it was."""
+    state, found = read(sim.comm, path, KIND, "a model of blocks")
+    put(sim, state, found)
+    return state["extra"]
+
+
+def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
+    """Take the blocks of a checkpoint that holds particles as well (hpcdem/physics/coupling/saving.py), without the
+    kernels of these; returns `extra`, or None if the file is not one of both. Collective."""
+    found = None
+    if sim.comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+        except HpcdemError:
+            found = None
+        if found is not None and found[0].get("kind") != checkpoint.BOTH:
+            found = None
+    text = sim.comm.bcast(None if found is None else json.dumps(found[0]))
+    if text is None:
+        return None
+    state = json.loads(text)
+    put(sim, state, without_particles(found[1]) if found is not None else None)
+    return state["extra"]
+
+
+def without_particles(tables: dict[str, Any]) -> dict[str, Any]:
+    """Those of the blocks among the tables of a checkpoint of both."""
+    others = checkpoint.OF_PARTICLES
+    return {name: table for name, table in tables.items() if not name.startswith(others) and name != checkpoint.LINKS}
+
+
+def read(
+    comm: SerialComm, path: Path | str, kind: str, what: str
+) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]] | None]:
+    """The state in a checkpoint of this kind, on all ranks, and its tables, on rank 0. Collective. what: its name in
+    messages. CommandError if the file is missing, foreign or damaged."""
+    found, error = None, None
+    if comm.rank == 0:
+        try:
+            found = checkpoint.read(path)
+            if found[0].get("kind") != kind:
+                raise HpcdemError(f"{path} is a checkpoint, but not one of {what}")
+        except HpcdemError as problem:
+            error = str(problem)
+    try:
+        comm.agree(error)
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    state = json.loads(comm.bcast(None if found is None else json.dumps(found[0])))
+    return state, None if found is None else found[1]
+
+
+def put(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | None) -> None:
+    """Take a state that was read; tables: on rank 0, else None. Collective."""
+    shared = None
+    if tables is not None:
+        shared = {name: table for name, table in tables.items() if name not in ("state", "memories")}
+    _apply(sim, state, sim.comm.bcast(shared), tables)
+
+
+def _apply(
+    sim: Solving, state: dict[str, Any], shared: dict[str, dict[str, np.ndarray]], tables: dict[str, Any] | None
+) -> None:
+    sim.clear()
+    if state["mesh"] is not None:
+        points = np.column_stack([shared["mesh_points"][c] for c in "xy"])
+        cells = np.column_stack([shared["mesh_cells"][f"corner_{k}"] for k in range(4)])
+        about = state["mesh"]
+        mesh = Mesh(
+            points,
+            cells,
+            {s: {g: np.array(rows, np.int64) for g, rows in of.items()} for s, of in about["groups"].items()},
+            {name: np.array(pairs, np.int64).reshape(-1, 2) for name, pairs in about["layers"].items()},
+            np.array(about["cracks"], np.int64).reshape(-1, 2),
+            np.array(about["crack_sets"], np.int64),
+        )
+        sim.place_mesh(mesh)
+        for kind, names in ARRAYS.items():
+            for name in names:
+                array = getattr(sim, name)
+                array[:] = shared[kind][name].astype(array.dtype)
+        if "stress0" in shared:
+            sim.stress0 = np.column_stack([shared["stress0"][f"s{k}"] for k in range(4)])
+            # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
+            sim.stress0_row[:] = shared["stress0"].get("row", sim.element_row)
+        if "born" in shared:
+            born_at = np.column_stack([shared["born"][f"p{k}"] for k in range(8)])
+            sim.take_births(shared["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
+    sim.take_scene_state(state["scene"])
+    sim.clock = Clock(**state["clock"])
+    sim.untouched = sim.clock.step == 0
+    sim.lattice = type(sim.lattice)(**{"step": sim.clock.step, "time": sim.clock.time, **state["lattice"]})
+    sim.event_rows = [Crack(*row) for row in state["events"]]
+    sim._longest = state["longest"]
+    if state["mesh"] is None:
+        return
+    places = _take_rows(sim, state, tables)
+    if state["budget"] is not None:
+        sim.budget = Budget.restored(state["budget"], sim.comm.rank == 0)
+    if state["closed"]:
+        _close_as_it_was(sim, state, places)
+    sim.rebuilds = state["rebuilds"]
+
+
+def _take_rows(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | None) -> dict[str, np.ndarray]:
+    """All rows on rank 0; the first close shares them out. Returns positions when storage and lists were made."""
+    width, speed = sim.x.shape[1], sim.v.shape[1]
+    if tables is None:
+        sim.number, sim.x, sim.v = np.empty(0, np.int64), np.empty((0, width)), np.empty((0, speed))
+        sim.cold = {name: np.empty((0, n)) for name, n in state["columns"].items()}
+        sim.memories = Memories.empty(0)
+        return {name: np.empty((0, width)) for name in ("origin", "listed")}
+    rows, kept = tables["state"], tables["memories"]
+
+    def table(name: str, n: int) -> np.ndarray:
+        return np.ascontiguousarray(np.column_stack([rows[f"{name}_{c}"] for c in range(n)]))
+
+    sim.number, sim.x, sim.v = rows["number"].copy(), table("x", width), table("v", speed)
+    sim.cold = {name: table(name, n) for name, n in state["columns"].items()}
+    words = np.zeros((len(kept["key"]), WORDS))
+    words.view(np.int64)[:, 0] = kept["key"]
+    for c in range(1, words.shape[1]):
+        words[:, c] = kept[f"m{c}"]
+    owner = np.searchsorted(sim.number, kept["number"])
+    sim.memories = Memories.of(len(sim.number), owner, words)
+    return {name: table(name, width) for name in ("origin", "listed")}
+
+
+def _close_as_it_was(sim: Solving, state: dict[str, Any], places: dict[str, np.ndarray]) -> None:
+    """Storage and lists anew at the present positions: no sum depends on them. When they are due to be made anew does
+    depend on the positions at which they were, which are put back."""
+    sim.cold.update(places)
+    sim.close_again()
+    sim.origin, sim.listed = sim.cold.pop("origin"), sim.cold.pop("listed")
+    sim.local.tally[0, : len(state["tally"])] = state["tally"] if sim.comm.rank == 0 else 0

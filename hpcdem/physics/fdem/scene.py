@@ -1,0 +1,779 @@
+"""What a model of blocks is made of: mesh, models of elements, faces and joints, boundary conditions, options.
+
+All of it is known to every rank, by the numbers of the mesh: what is said once is the same everywhere, whoever owns an
+element. What moves is in `simulation.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import connectivity, properties
+from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.properties import ELEMENT, FACE, JOINT, MODULI, Model, Rows
+from hpcdem.physics.fdem.tables import Drawn, Over, Table, Value
+
+Numbers = np.ndarray | Sequence[int] | None
+"""Numbers of elements, nodes, faces or joints; None: all."""
+Number = float | str
+"""A value of a boundary condition: a number, or the name of a table of values over model time."""
+
+SAFETY = 0.8
+"""Part of the stability limit that is used as time step."""
+OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
+"""What becomes of bodies that overlap before the first step."""
+
+
+@dataclass(frozen=True)
+class NodeCondition:
+    """What is prescribed at nodes. does_x, does_y: moving.FREE, VELOCITY, ACCELERATION; at_x, at_y: its value; force;
+    constraint (moving.UNBOUND, ...) and its unit vector."""
+
+    does_x: int = moving.FREE
+    at_x: Number = 0.0
+    does_y: int = moving.FREE
+    at_y: Number = 0.0
+    force_x: Number = 0.0
+    force_y: Number = 0.0
+    constraint: int = moving.UNBOUND
+    way: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Traction:
+    """Stress on faces [Pa]: components, and along the normal."""
+
+    xx: Number = 0.0
+    yy: Number = 0.0
+    xy: Number = 0.0
+    normal: Number = 0.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
+    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`."""
+
+    gx: float = 0.0
+    gy: float = 0.0
+    dynamic: bool = True
+    collision: bool = True
+    large_strain: bool = True
+    dt: float = 0.0
+    auto: bool = False
+    safety: float = SAFETY
+    mass_scaling: float = 0.0
+    overlap: str = REFUSE
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where elements are free of strain: points (n, 2) [m] and, for each element, the rows of its corners (ne, 4)."""
+
+    points: np.ndarray
+    cells: np.ndarray
+
+
+@dataclass
+class Fading:
+    """Forces that elements which were taken out leave behind: corners (element * 4 + k), forces (n, 2) [N/m], from
+    when on and for how long they die down (model time, or steps in static mode)."""
+
+    corner: np.ndarray
+    force: np.ndarray
+    begin: float
+    span: float
+    in_steps: bool
+
+
+class Scene:
+    """Mesh and assignments. Methods that assign raise CommandError, alike on all ranks, and change nothing then."""
+
+    def __init__(self) -> None:
+        self.clear_scene()
+
+    def clear_scene(self) -> None:
+        """Nothing is there."""
+        self.mesh: Mesh | None = None
+        self.options = Options()
+        self.tables: dict[str, Table] = {}
+        self.fields: dict[str, RandomField] = {}
+        self.varied: list[list[str]] = []
+        """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
+        self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
+        self.conditions: list[NodeCondition] = [NodeCondition()]
+        self.loads: list[Traction] = [Traction()]
+        self.fading: list[Fading] = []
+        self.born = np.empty(0, np.int64)
+        """Elements that came back after they were taken out, ascending."""
+        self.birthplace = np.empty((0, 4, 2))
+        """Where their corners were then [m]."""
+        self._reference: Reference | None = None
+        self._closed: np.ndarray | None = None
+        self._make_arrays(0, 0)
+
+    def _make_arrays(self, elements: int, points: int) -> None:
+        self.partner = np.full(4 * elements, -1, np.int64)
+        self.alive = np.ones(elements, bool)
+        """Elements that were not taken out."""
+        self.element_row = np.zeros(elements, np.int32)
+        self.joint_row = np.zeros(4 * elements, np.int32)
+        """Of both faces of a joint."""
+        self.open = np.zeros(4 * elements, bool)
+        """Faces that do not hold on to their partner (any more): broken, cracked, or the partner was taken out."""
+        self.broken = np.zeros(4 * elements, np.uint8)
+        """By the lower face: 1 if the joint broke."""
+        self.face_row = np.zeros(4 * elements, np.int32)
+        self.point_row = np.zeros(points, np.int32)
+        self.load_row = np.zeros(4 * elements, np.int32)
+        self.stress0: np.ndarray | None = None
+        """(elements, 4) xx, yy, xy, zz [Pa] at zero strain, as it was said, if there is any."""
+        self.stress0_row = np.zeros(elements, np.int32)
+        """Row of the element models for whose moduli it was said; 0: the element had no model yet."""
+
+    # What the simulation does when something has changed.
+
+    def _before_change(self) -> None:
+        """Assignments are about to change."""
+
+    def _changed(self, topology: bool = False, stiffness: bool = True) -> None:
+        """Assignments have changed; topology: also who hangs together with whom; stiffness: perhaps the stable time
+        step too."""
+
+    # ---- numbers -------------------------------------------------------------------------------------------------
+
+    def _mesh(self) -> Mesh:
+        if self.mesh is None:
+            raise CommandError("there is no mesh yet")
+        return self.mesh
+
+    def numbers_of_elements(self, elements: Any) -> np.ndarray:
+        """Checked element numbers, ascending; None: all that are there. CommandError for others."""
+        return self._numbers(elements, self.alive, "element")
+
+    def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
+        """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
+        return self._numbers(nodes, self.node_exists(), "node")
+
+    def node_exists(self) -> np.ndarray:
+        """(np,) bool."""
+        corners = self._mesh().cells[self.alive]
+        exists = np.zeros(len(self._mesh().points), bool)
+        exists[corners[corners >= 0]] = True
+        return exists
+
+    def numbers_of_faces(self, faces: Any) -> np.ndarray:
+        """Checked face numbers; None: all faces of elements that are there."""
+        return self._numbers(faces, self.face_exists(), "face")
+
+    def numbers_of_joints(self, joints: Any) -> np.ndarray:
+        """Checked numbers of inner edges (lower faces); None: all between elements that are there."""
+        return self._numbers(joints, self.joint_exists(), "joint (the lower face of an inner edge)")
+
+    def joint_exists(self) -> np.ndarray:
+        """(4 ne,) bool: lower faces of edges between elements that are there."""
+        face = np.arange(len(self.partner))
+        inner = (self.partner > face) & self.alive[face // 4]
+        inner[inner] &= self.alive[self.partner[inner] // 4]
+        return inner
+
+    def face_exists(self) -> np.ndarray:
+        """(4 ne,) bool."""
+        exists = np.repeat(self.alive, 4)
+        exists[3::4] &= self._mesh().cells[:, 3] >= 0
+        return exists
+
+    def _numbers(self, given: Any, there: np.ndarray, what: str) -> np.ndarray:
+        self._mesh()
+        if given is None:
+            return np.flatnonzero(there)
+        asked = np.asarray(given)
+        if asked.dtype == bool or (asked.size and not np.issubdtype(asked.dtype, np.integer)):
+            raise CommandError(f"numbers of {what}s must be integers, got {asked.dtype}")
+        asked = np.unique(asked.astype(np.int64).reshape(-1))
+        bad = asked[(asked < 0) | (asked >= len(there))]
+        gone = ""
+        if not len(bad):
+            bad = asked[~there[asked]]
+            gone = "" if self.alive.all() else "; elements were taken out"
+        if len(bad):
+            raise CommandError(f"there is no {what} {bad[0]}{gone}")
+        return asked
+
+    # ---- mesh ----------------------------------------------------------------------------------------------------
+
+    def _take(self, mesh: Mesh) -> None:
+        try:
+            meshes.check(mesh)
+        except HpcdemError as error:
+            raise CommandError(str(error)) from None
+        self._put(mesh)
+
+    def _put(self, mesh: Mesh) -> None:
+        kept = self.options, self.tables, self.fields
+        self.clear_scene()
+        self.options, self.tables, self.fields = kept
+        self.mesh = mesh
+        self._make_arrays(len(mesh.cells), len(mesh.points))
+        self.partner = connectivity.face_partners(mesh.cells, len(mesh.points))
+        if len(mesh.cracks):
+            rows = meshes.crack_rows(mesh, mesh.edges())
+            self._open_faces(mesh.edges().faces[rows, 0])
+
+    def _open_faces(self, lower: np.ndarray) -> None:
+        for faces in (lower, self.partner[lower]):
+            self.open[faces] = True
+            if self._closed is not None:
+                self._closed[faces] = False
+
+    def closed_faces(self) -> np.ndarray:
+        """(4 ne,) bool: faces that hang together with their partner, by a joint or as one body. Not to be changed."""
+        if self._closed is None:
+            self._closed = (self.partner >= 0) & ~self.open
+        return self._closed
+
+    @property
+    def reference(self) -> Reference:
+        """The mesh, and for elements that came back where they did."""
+        mesh = self._mesh()
+        if self._reference is None:
+            cells, points = mesh.cells, mesh.points
+            if len(self.born):
+                cells = cells.copy()
+                own = len(points) + np.arange(4 * len(self.born)).reshape(-1, 4)
+                cells[self.born] = np.where(cells[self.born] >= 0, own, -1)
+                points = np.concatenate([points, self.birthplace.reshape(-1, 2)])
+            self._reference = Reference(points, cells)
+        return self._reference
+
+    def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
+        """Elements (n,) have come back, their corners at places (n, 4, 2) [m]."""
+        stay = ~np.isin(self.born, born)
+        number = np.concatenate([self.born[stay], born])
+        order = np.argsort(number, kind="stable")
+        self.born = number[order]
+        self.birthplace = np.concatenate([self.birthplace[stay], places])[order]
+        self._reference = None
+
+    # ---- models --------------------------------------------------------------------------------------------------
+
+    def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a model (model.blocks.properties) with all its properties to elements."""
+        at = self.numbers_of_elements(elements)
+        self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
+        self._note_moduli(at)
+
+    def _note_moduli(self, at: np.ndarray) -> None:
+        """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
+        new = at[self.stress0_row[at] == 0]
+        self.stress0_row[new] = self.element_row[new]
+
+    def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of elements that have a model. The stress follows the strain (total form)."""
+        at = self.numbers_of_elements(elements)
+        self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
+
+    def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a contact model to faces, also to those that will be free only when a joint breaks."""
+        at = self.numbers_of_faces(faces)
+        self._assign(self.face_rows, (self.face_row, at), at, FACE, name, properties)
+
+    def face_property(self, faces: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of the contact model of faces; None: of all that have one."""
+        if faces is None:
+            faces = np.flatnonzero((self.face_row > 0) & self.face_exists())
+        at = self.numbers_of_faces(faces)
+        self._adjust(self.face_rows, (self.face_row, at), at, FACE, properties)
+
+    def joint_model(self, joints: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
+
+        Joints that are broken stay broken. None: all inner edges."""
+        at = self.numbers_of_joints(joints)
+        self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
+
+    def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
+        """Change some properties of joints that have a model; None: of all that have one."""
+        if joints is None:
+            joints = np.flatnonzero((self.joint_row > 0) & self.joint_exists())
+        at = self.numbers_of_joints(joints)
+        self._adjust(self.joint_rows, self._both_sides(at), at, JOINT, properties)
+
+    def _both_sides(self, joints: np.ndarray) -> tuple[np.ndarray, ...]:
+        return self.joint_row, joints, self.joint_row, self.partner[joints]
+
+    def _assign(
+        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, name: str, given: Mapping[str, Value],
+        topology: bool = False,
+    ) -> None:  # fmt: skip
+        """Give objects a model. columns: where the row of each object goes, as (array, places (n,)) in turn."""
+        model = properties.model(name, on)
+        all_of_them = np.arange(len(of))
+        made = [(all_of_them, model, self._complete(on, of, model, {}, given))]
+        self._put_rows(rows, columns, made, on, given, all_of_them)
+        self._changed(topology)
+
+    def _adjust(
+        self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, given: Mapping[str, Value],
+        keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
+    ) -> None:  # fmt: skip
+        """Change properties of objects that have a model; keep: what stays of the old ones beside the new."""
+        if not len(of):
+            raise CommandError(f"no {on} has a model whose properties could be changed: {on} c-model comes first")
+        old = columns[0][columns[1]]
+        bare = of[old == 0]
+        if len(bare):
+            raise CommandError(f"{on} {bare[0]} has no model whose properties could be changed")
+        present, which = np.unique(old, return_inverse=True)
+        names = np.array([rows.name(row) for row in present.tolist()])
+        which = which.reshape(-1)
+        if not all(map(_is_number, given.values())):
+            old, names, which = old, names[which], np.arange(len(of))  # one set for each object
+        else:
+            old, of = present, of[np.unique(which, return_index=True)[1]]  # one for each that there is
+        made = []
+        for name in np.unique(names).tolist():
+            at, model = np.flatnonzero(names == name), properties.MODELS[name]
+            before = {p.name: rows.column(p.name)[old[at]] for p in model.properties}
+            made.append((at, model, self._complete(on, of[at], model, before, given, keep)))
+        self._put_rows(rows, columns, made, on, given, which)
+        self._changed()
+
+    def _put_rows(
+        self, rows: Rows, columns: Sequence[np.ndarray], made: Sequence[tuple[np.ndarray, Model, np.ndarray]], on: str,
+        given: Mapping[str, Value], which: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Make rows of complete sets of properties, (1, k) for all of these places or one for each, and give each
+        object the one at the place `which` (n,)."""
+        self._before_change()
+        number = np.zeros(sum(len(at) for at, *_ in made), np.int32)
+        for at, model, values in made:
+            number[at] = rows.numbers(model, values)
+        for column, at in zip(columns[0::2], columns[1::2]):
+            column[at] = number[which]
+        for name, value in given.items():
+            if isinstance(value, (Over, Drawn)) and [on, name] not in self.varied:
+                self.varied.append([on, name])
+
+    def _complete(
+        self, on: str, of: np.ndarray, model: Model, before: Mapping[str, np.ndarray], given: Mapping[str, Value],
+        keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
+    ) -> np.ndarray:  # fmt: skip
+        """Complete, checked properties of objects `of` (n,): (n, properties), or (1, properties) if none of them
+        differs from object to object. CommandError names the first object whose value cannot be."""
+        each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
+        new = {name: each.get(name, value) for name, value in given.items()}
+        for name in new:
+            model.property(name)
+        wanted: dict[str, Any] = keep(dict(before), new) if keep else {**before, **new}
+        if not each and not before:
+            return np.array([list(model.complete(wanted).values())])
+        found = model.complete_each(wanted, len(of)) if all(map(_can_be_number, wanted.values())) else None
+        if found is not None:
+            return found
+        for i, number in enumerate(of.tolist()):
+            try:
+                model.complete({name: v[i] if isinstance(v, np.ndarray) else v for name, v in wanted.items()})
+            except CommandError as error:
+                if not each:
+                    raise
+                raise CommandError(f"{on} {number}: {error}") from None
+        raise AssertionError("both ways to complete properties agree")
+
+    def _spread(self, on: str, of: np.ndarray, name: str, value: Value) -> np.ndarray:
+        """One number for each object."""
+        if isinstance(value, Over):
+            if value.table not in self.tables:
+                self._value(name, value.table)
+            return self.tables[value.table].at(self._places(on, of)[:, value.axis])
+        if isinstance(value, Drawn):
+            if value.field not in self.fields:
+                known = ", ".join(f"'{n}'" for n in self.fields) or "none"
+                raise CommandError(f"{name}: there is no field '{value.field}' (fields: {known})")
+            return self.fields[value.field].values(on, of, self._places(on, of))
+        numbers = np.asarray(value, np.float64)
+        if numbers.shape != (len(of),):
+            raise CommandError(f"{name}: {len(of)} numbers are needed, one for each {on}, got {numbers.shape}")
+        return numbers
+
+    def _places(self, on: str, of: np.ndarray) -> np.ndarray:
+        """(n, 2) [m] in the mesh: centres of elements, middles of faces and joints."""
+        mesh = self._mesh()
+        if on == ELEMENT:
+            return connectivity.centroids(mesh.points, mesh.cells[of])
+        return mesh.points[connectivity.face_points(mesh.cells, of)].mean(axis=1)
+
+    def initial_stress(
+        self,
+        elements: Numbers,
+        xx: float = 0.0,
+        yy: float = 0.0,
+        xy: float = 0.0,
+        zz: float = 0.0,
+        gradient: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y) at the centroid
+        as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes with them, see
+        `initial_stresses`."""
+        at = self.numbers_of_elements(elements)
+        mesh = self._mesh()
+        names = ("xx", "yy", "xy", "zz")
+        values = np.tile(_finite("initial stress", [xx, yy, xy, zz]), (len(at), 1))
+        for name, slope in (gradient or {}).items():
+            if name not in names:
+                raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
+            centre = connectivity.centroids(mesh.points, mesh.cells[at])
+            values[:, names.index(name)] += centre @ _finite(f"gradient of {name}", list(slope))
+        self._before_change()
+        if self.stress0 is None:
+            self.stress0 = np.zeros((len(mesh.cells), 4))
+        self.stress0[at] = values
+        self.stress0_row[at] = self.element_row[at]
+        self._changed()
+
+    def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
+        """Stress [Pa] (n, 4) xx, yy, xy, zz of elements (n,) at zero strain, by their present moduli.
+
+        What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
+        mean follows the bulk modulus and the deviator the shear modulus."""
+        assert self.stress0 is not None
+        out = self.stress0[elements]
+        said, now = self.stress0_row[elements], self.element_row[elements]
+        ratio = np.ones((len(out), 2))
+        for c, name in enumerate(("bulk", "shear")):
+            modulus = np.array(self.element_rows.column(name))
+            other = (said > 0) & (modulus[said] != modulus[now])
+            ratio[other, c] = modulus[now[other]] / modulus[said[other]]
+        other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
+        normal = [0, 1, 3]
+        mean = out[other][:, normal].mean(axis=1, keepdims=True)
+        scaled = ratio[other, 1:] * (out[other] - np.where(np.arange(4) == 2, 0.0, mean))
+        scaled[:, normal] += ratio[other, :1] * mean
+        out[other] = scaled
+        return out
+
+    # ---- boundary conditions -------------------------------------------------------------------------------------
+
+    def table(self, name: str, pairs: Sequence[tuple[float, float]]) -> None:
+        """Make or replace a table of (time [s], value)."""
+        made = Table.of(pairs, name)
+        self._before_change()
+        self.tables[name] = made
+        self._changed(stiffness=False)
+
+    def remove_table(self, name: str) -> None:
+        """Delete a table; CommandError while a condition uses it."""
+        if name not in self.tables:
+            raise CommandError(f"there is no table '{name}'")
+        used_conditions = {self.conditions[r] for r in np.unique(self.point_row)}
+        used_loads = {self.loads[r] for r in np.unique(self.load_row)}
+        for one in (*used_conditions, *used_loads):
+            if name in asdict(one).values():
+                raise CommandError(f"table '{name}' is used by a boundary condition")
+        del self.tables[name]
+
+    def random_field(self, name: str, field: RandomField) -> None:
+        """Make or replace a random field; properties that were drawn from one of this name stay."""
+        self.fields[name] = field
+
+    def remove_field(self, name: str) -> None:
+        """Delete a random field; properties that were drawn from it stay."""
+        if name not in self.fields:
+            raise CommandError(f"there is no field '{name}'")
+        del self.fields[name]
+
+    def _value(self, what: str, value: Number) -> Number:
+        if isinstance(value, str):
+            if value not in self.tables:
+                known = ", ".join(f"'{n}'" for n in self.tables) or "none"
+                raise CommandError(f"{what}: there is no table '{value}' (tables: {known})")
+            return value
+        return float(_finite(what, [value])[0])
+
+    def velocity_condition(
+        self,
+        nodes: Numbers,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        ax: Number | None = None,
+        ay: Number | None = None,
+    ) -> None:
+        """Prescribe velocity [m/s] or acceleration [m/s2] of components; the others stay as they are (free or not).
+
+        Precedence at one node: move constraint, velocity, acceleration, force."""
+        changes: dict[str, Any] = {}
+        for axis, speed, push in (("x", vx, ax), ("y", vy, ay)):
+            if speed is not None and push is not None:
+                raise CommandError(f"velocity and acceleration in {axis} cannot both be prescribed")
+            if speed is not None:
+                changes[f"does_{axis}"], changes[f"at_{axis}"] = moving.VELOCITY, self._value(f"velocity {axis}", speed)
+            if push is not None:
+                changes[f"does_{axis}"] = moving.ACCELERATION
+                changes[f"at_{axis}"] = self._value(f"acceleration {axis}", push)
+        if not changes:
+            raise CommandError("a velocity condition needs a velocity or an acceleration")
+        self._condition(nodes, changes)
+
+    def force_condition(self, nodes: Numbers, fx: Number | None = None, fy: Number | None = None) -> None:
+        """Nodal force [N per m of thickness] of a point, shared by the elements' corners there."""
+        given = {"force_x": fx, "force_y": fy}
+        changes = {name: self._value(name, value) for name, value in given.items() if value is not None}
+        if not changes:
+            raise CommandError("a force condition needs a force")
+        self._condition(nodes, changes)
+
+    def move_constraint(self, nodes: Numbers, kind: int, direction: tuple[float, float] = (0.0, 0.0)) -> None:
+        """0: free, 1: fixed, 2: moves along `direction` only."""
+        if kind not in (moving.UNBOUND, moving.FIXED, moving.ALONG):
+            raise CommandError(f"a move constraint is 0 (free), 1 (fixed) or 2 (along a vector), got {kind}")
+        way = (0.0, 0.0)
+        if kind == moving.ALONG:
+            x, y = _finite("direction", list(direction)).tolist()
+            if x == 0.0 == y:
+                raise CommandError("a move constraint along a vector needs a vector that is not zero")
+            way = (x / math.hypot(x, y), y / math.hypot(x, y))
+        self._condition(nodes, {"constraint": kind, "way": way})
+
+    def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
+        at = self.numbers_of_nodes(nodes)
+        self._before_change()
+        self._change_rows(self.conditions, self.point_row, at, changes)
+        self._changed(stiffness=False)
+
+    def stress_condition(
+        self,
+        faces: Numbers,
+        xx: Number | None = None,
+        yy: Number | None = None,
+        xy: Number | None = None,
+        normal: Number | None = None,
+    ) -> None:
+        """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
+        pressure)."""
+        given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal}
+        changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
+        if not changes:
+            raise CommandError("a stress condition needs a stress")
+        at = self.numbers_of_faces(faces)
+        self._before_change()
+        self._change_rows(self.loads, self.load_row, at, changes)
+        self._changed(stiffness=False)
+
+    @staticmethod
+    def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
+        old = column[at]
+        for row in np.unique(old).tolist():
+            wanted = replace(rows[row], **changes)
+            if wanted not in rows:
+                rows.append(wanted)
+            column[at[old == row]] = rows.index(wanted)
+
+    def remove_conditions(self, nodes: Numbers = None) -> None:
+        """Take back velocities, accelerations, forces and constraints of nodes; None: of all, those too that have no
+        element at this moment."""
+        at = np.arange(len(self._mesh().points)) if nodes is None else self.numbers_of_nodes(nodes)
+        self._before_change()
+        self.point_row[at] = 0
+        self._changed(stiffness=False)
+
+    def remove_stress_conditions(self, faces: Numbers = None) -> None:
+        """Take back tractions of faces."""
+        at = self.numbers_of_faces(faces)
+        self._before_change()
+        self.load_row[at] = 0
+        self._changed(stiffness=False)
+
+    # ---- options -------------------------------------------------------------------------------------------------
+
+    def gravity(self, gx: float, gy: float) -> None:
+        """Acceleration of gravity [m/s2]."""
+        x, y = _finite("gravity", [gx, gy]).tolist()
+        self._set(gx=x, gy=y)
+
+    def option(
+        self,
+        dynamic: bool | None = None,
+        collision: bool | None = None,
+        large_strain: bool | None = None,
+        overlap: str | None = None,
+    ) -> None:
+        """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
+        large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
+        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        given = {"dynamic": dynamic, "collision": collision, "large_strain": large_strain}
+        if overlap is not None and overlap not in OVERLAP:
+            raise CommandError(f"overlap is one of {', '.join(OVERLAP)}, got {overlap}")
+        changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
+        if overlap is not None:
+            changes["overlap"] = overlap
+        self._set(**changes)
+
+    def time_step(
+        self,
+        value: float | None = None,
+        auto: bool | None = None,
+        safety: float | None = None,
+        mass_scaling: float | None = None,
+    ) -> None:
+        """How the time step of the dynamic mode is found. Without anything said: estimated at the first step and after
+        changes of the model.
+
+        value [s]: it is this. mass_scaling [s]: it is this, and nodes get the mass that makes it stable. auto on: it is
+        estimated again every 100 steps, too. Of these three the one that was said last holds and ends the other two;
+        0 (off) takes it back. safety (0.8): part of the stability limit that is used, by estimates and mass scaling.
+
+        CommandError for two of the three at once, and for a safety factor beside a value.
+        """
+        changes: dict[str, Any] = {}
+        for name, number in (("dt", value), ("mass_scaling", mass_scaling)):
+            if number is not None:
+                changes[name] = float(_finite("a time step", [number])[0])
+                if changes[name] < 0.0:
+                    raise CommandError(f"a time step must not be negative, got {number:g}")
+        if safety is not None:
+            if not 0.0 < safety <= 1.0:
+                raise CommandError(f"the safety factor of the time step must lie in (0, 1], got {safety:g}")
+            changes["safety"] = float(safety)
+        if auto is not None:
+            changes["auto"] = bool(auto)
+        wanted = [name for name in ("dt", "mass_scaling", "auto") if changes.get(name)]
+        if len(wanted) > 1:
+            one, other = ({"dt": "value", "mass_scaling": "mass scaling"}.get(name, name) for name in wanted[:2])
+            raise CommandError(f"{one} and {other} exclude each other: both say what the time step is")
+        if wanted == ["dt"] and safety is not None:
+            raise CommandError("value and safety exclude each other: a time step that is given is taken as it is")
+        if wanted:
+            changes = {"dt": 0.0, "mass_scaling": 0.0, "auto": False, **changes}
+        self._set(**changes)
+
+    def _set(self, **changes: Any) -> None:
+        self._before_change()
+        self.options = replace(self.options, **changes)
+        self._changed()
+
+    # ---- tables of the kernels -----------------------------------------------------------------------------------
+
+    def conditions_at(self, time: float, middle: float, dt: float) -> np.ndarray:
+        """The table of node conditions (rows, 9) at a moment: forces at `time`, velocities in the middle of the step;
+        accelerations as change of velocity over dt."""
+        out = np.zeros((len(self.conditions), moving.CONDITION))
+        for row, one in enumerate(self.conditions):
+            for does, at, kind, value in (
+                (moving.DOES_X, moving.AT_X, one.does_x, one.at_x), (moving.DOES_Y, moving.AT_Y, one.does_y, one.at_y),
+            ):  # fmt: skip
+                out[row, does] = kind
+                if kind == moving.VELOCITY:
+                    out[row, at] = self._now(value, middle)
+                elif kind == moving.ACCELERATION:
+                    out[row, at] = self._now(value, time) * dt
+            out[row, moving.FORCE_X] = self._now(one.force_x, time)
+            out[row, moving.FORCE_Y] = self._now(one.force_y, time)
+            out[row, moving.CONSTRAINT] = one.constraint
+            out[row, moving.WAY_X], out[row, moving.WAY_Y] = one.way
+        return out
+
+    def conditions_vary(self) -> bool:
+        """Whether a node condition follows a table."""
+        return any(isinstance(value, str) for one in self.conditions for value in asdict(one).values())
+
+    def loads_at(self, time: float) -> np.ndarray:
+        """The table of tractions (rows, 4) [Pa] at a moment."""
+        return np.array([[self._now(v, time) for v in (one.xx, one.yy, one.xy, one.normal)] for one in self.loads])
+
+    def _now(self, value: Number, time: float) -> float:
+        return self.tables[value](time) if isinstance(value, str) else value
+
+    # ---- state on disk -------------------------------------------------------------------------------------------
+
+    def scene_state(self) -> dict[str, Any]:
+        """All but the arrays, as JSON values."""
+        return {
+            "options": asdict(self.options),
+            "tables": {name: table.pairs() for name, table in self.tables.items()},
+            "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
+            "varied": self.varied,
+            "element_rows": self.element_rows.state(),
+            "face_rows": self.face_rows.state(),
+            "joint_rows": self.joint_rows.state(),
+            "conditions": [asdict(one) for one in self.conditions],
+            "loads": [asdict(one) for one in self.loads],
+            "fading": [
+                {**asdict(one), "corner": one.corner.tolist(), "force": one.force.tolist()} for one in self.fading
+            ],
+        }
+
+    def take_scene_state(self, state: dict[str, Any]) -> None:
+        """Inverse of `scene_state`."""
+        self._closed = None
+        self.options = Options(**state["options"])
+        self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
+        self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
+        self.varied = [list(one) for one in state.get("varied", [])]
+        self.element_rows = Rows.restored(state["element_rows"])
+        self.face_rows = Rows.restored(state["face_rows"])
+        self.joint_rows = Rows.restored(state["joint_rows"])
+        self.conditions = [NodeCondition(**{**one, "way": tuple(one["way"])}) for one in state["conditions"]]
+        self.loads = [Traction(**one) for one in state["loads"]]
+        self.fading = [
+            Fading(
+                np.array(one["corner"], np.int64), np.array(one["force"]).reshape(-1, 2), one["begin"], one["span"],
+                one["in_steps"],
+            )
+            for one in state["fading"]
+        ]  # fmt: skip
+
+
+def _is_number(value: Value) -> bool:
+    return not isinstance(value, (Over, Drawn, np.ndarray))
+
+
+def _can_be_number(value: Any) -> bool:
+    try:
+        np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+_OPEN = {"least": -math.inf, "greatest": math.inf}
+"""JSON knows no infinity."""
+
+
+def _plain(field: dict[str, Any]) -> dict[str, Any]:
+    return {name: None if value == _OPEN.get(name, 0) and name in _OPEN else value for name, value in field.items()}
+
+
+def _bounds(field: dict[str, Any]) -> dict[str, Any]:
+    return {name: _OPEN[name] if value is None else value for name, value in field.items()}
+
+
+def _finite(what: str, values: list) -> np.ndarray:
+    try:
+        numbers = np.array(values, np.float64)
+    except (TypeError, ValueError):
+        raise CommandError(f"{what} must be a number, got {values}") from None
+    if not np.isfinite(numbers).all():
+        raise CommandError(f"{what} must be finite, got {', '.join(f'{v:g}' for v in numbers)}")
+    return numbers
+
+
+def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Which two moduli stay when some are changed: Young's modulus and Poisson's ratio, or shear and bulk modulus."""
+    changed = [name for name in MODULI if name in given]
+    stays = {name: value for name, value in old.items() if name not in MODULI}
+    if not changed:
+        pair = ["young", "poisson_ratio"]
+    elif len(changed) == 1:
+        pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else ["shear", "bulk"]
+    else:
+        pair = []
+    return {**stays, **{name: old[name] for name in pair}, **given}

@@ -1,0 +1,698 @@
+"""The simulation of blocks: state, one step, and the rebuild of the lists. The page on which the method can be read.
+
+An element owns its corners: their positions, velocities, and what the joints on its edges and its contacts remember.
+Corners that move as one node (nothing lies between their elements) carry equal copies. So all there is to a model is
+rows of elements; they are shared out among the ranks in strips, as particles are, and travel with what they remember.
+
+State is either *closed* (sorted, ghosts in place, tables of the kernels made: ready to step) or *open* (owned elements
+and their memories only). Assignments open it; the next step closes it again.
+
+Every sum over elements that share something is taken in the order of their numbers in the mesh. So the bits depend
+neither on ranks and threads nor on when the lists were rebuilt.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hpcdem.core.cells import columns, keys
+from hpcdem.core.clock import Clock
+from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
+from hpcdem.core.memory import aligned
+from hpcdem.core.timers import Timers
+from hpcdem.decomp import strips
+from hpcdem.halo.comm import SerialComm
+from hpcdem.halo.exchange import connect
+from hpcdem.halo.migrate import Migration
+from hpcdem.halo.ownership import Ownership
+from hpcdem.physics.fdem import build, connectivity, overlaps
+from hpcdem.physics.fdem.kernels import elements
+from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
+from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
+from hpcdem.physics.fdem.local import Local
+from hpcdem.physics.fdem.memories import Memories
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.pairs import cut_corner
+from hpcdem.physics.fdem.scene import Fading, Numbers, Scene
+from hpcdem.physics.fdem.tables import Value
+
+NARROW, WIDE = 0.1, 0.3
+"""Buffer of the contact search over the mean edge, at rest and in fast motion."""
+ROOM = 0.6
+"""How far elements may go, both together, before storage and ghosts are made anew; over the mean edge."""
+SHORT_LIVED, LONG_LIVED = 60, 400
+"""Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
+LONGEST_WATCH = 64
+"""Most steps between two looks at how far elements have moved."""
+OLDEST = 2000
+"""Storage is made anew at this age even if nobody moved, so that borders can follow the load."""
+AUTO = 100
+"""Steps after which an automatic time step is estimated anew."""
+
+
+@dataclass
+class Lattice:
+    """What ownership and the next rebuild depend on; global, saved in checkpoints.
+
+    side of the cells [m]; skin: buffer of the contact search [m]; age: of the contact lists, stored: of the storage, in
+    steps; steps to the next look, steps between the last two looks, lists that came late; dt: time step of the dynamic
+    mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were made; dt
+    is the same since then.
+    """
+
+    side: float = 0.0
+    skin: float = 0.0
+    skin_factor: float = NARROW
+    age: int = 0
+    stored: int = 0
+    countdown: int = 1
+    pace: int = 1
+    late: int = 0
+    dt: float = 0.0
+    estimated: int = 0
+    step: int = 0
+    time: float = 0.0
+
+
+class Crack(NamedTuple):
+    """A joint that broke. joint: its number; mode: from 1 (opened) to 2 (slid); step, time [s]: of the positions at
+    which it broke; kinetic: energy of the two elements then [J/m]; peak_step, peak_kinetic: when it had passed its
+    strength (-1 and NaN in checkpoints of earlier versions)."""
+
+    joint: int
+    mode: float
+    step: int
+    kinetic: float
+    time: float
+    peak_step: int = -1
+    peak_kinetic: float = math.nan
+
+
+class SurfaceLoads(Protocol):
+    """Forces on free faces that others compute (hpcdem/physics/coupling): what the blocks ask of them."""
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        """(n_own, 4) bool: corners of owned elements that may get such a force."""
+
+    def add_to(self, applied: np.ndarray) -> None:
+        """Add the present ones to what is applied to corners (n, 8), in storage order [N/m]. Not collective."""
+
+    def made_anew(self) -> None:
+        """The storage was made anew. Collective."""
+
+    def meshed_anew(self) -> None:
+        """There is another mesh."""
+
+
+class Core(Scene):
+    """State, step and rebuild; `Blocks` adds the verbs. Every method is collective unless it says otherwise."""
+
+    number: np.ndarray
+    """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
+    x: np.ndarray
+    """Corners [m], see elements.py."""
+    v: np.ndarray
+    """Their velocities at the last half step [m/s]."""
+    cold: dict[str, np.ndarray]
+    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
+    memories: Memories
+    local: Local
+    halo: Any
+    surface_loads: SurfaceLoads | None
+    n_left: int
+    n_own: int
+    where: np.ndarray
+    """(ne,) storage row of each element of the model, -1: not held here."""
+    origin: np.ndarray
+    """Positions of the owned elements when the storage was made."""
+    listed: np.ndarray
+    """Positions of the owned elements when the contact lists were made."""
+
+    def __init__(
+        self,
+        comm: Any = None,
+        threads: int = 1,
+        outdir: Path | str = "data",
+        log: Any = None,
+        stop: Any = None,
+        balance_on: bool = True,
+    ) -> None:
+        self.comm = comm if comm is not None else SerialComm()
+        self.threads = threads
+        self.outdir = Path(outdir)
+        self.log, self.stop = log, stop
+        self.balance_on = balance_on
+        self.timers = Timers()
+        self.halo = None
+        self.surface_loads: SurfaceLoads | None = None
+        super().__init__()
+        self.clear()
+
+    def clear(self) -> None:
+        """Start a new model: no mesh, step 0, default options."""
+        self.release()
+        self.clear_scene()
+        self.clock = Clock()
+        self.lattice = Lattice()
+        self.ownership = Ownership(self.comm, self.balance_on)
+        self.rebuilds = 0
+        self.event_rows: list[Crack] = []
+        self.closed = False
+        self.budget: Any = None
+        self._topology_stale = True
+        self._longest = 0.0
+        self._mean_edge = 0.0
+        self.untouched = True
+        """Nothing has moved since there is this mesh."""
+        self._told_step = 0.0
+        self._empty()
+
+    def _empty(self) -> None:
+        self.number = np.empty(0, np.int64)
+        self.x, self.v = np.empty((0, 8)), np.empty((0, 6))
+        self.cold = {}
+        self.memories = Memories.empty(0)
+
+    def release(self) -> None:
+        """Give back what MPI holds for this simulation. Not collective."""
+        if self.halo is not None:
+            self.halo.close()
+        self.halo = None
+
+    # ---- mesh ----------------------------------------------------------------------------------------------------
+
+    def take_mesh(self, mesh: Mesh) -> None:
+        """Take a mesh (checked here; equal on all ranks). Elements have no model yet, edges no joints: bodies hang
+        together as ordinary finite elements. Edges in `mesh.cracks` are open from the beginning."""
+        self._take(mesh)
+        self._start_with(mesh)
+
+    def take_births(self, born: np.ndarray, places: np.ndarray) -> None:
+        """Elements (n,) have come back, their corners at places (n, 4, 2) [m]."""
+        super().take_births(born, places)
+        self.areas = connectivity.areas(self.reference.points, self.reference.cells)
+
+    def place_mesh(self, mesh: Mesh) -> None:
+        """The same for a mesh that is known to be good."""
+        self._put(mesh)
+        self._start_with(mesh)
+
+    def _start_with(self, mesh: Mesh) -> None:
+        self.release()
+        if self.surface_loads is not None:
+            self.surface_loads.meshed_anew()
+        self.closed = False
+        self.lattice = Lattice()
+        self.ownership = Ownership(self.comm, self.balance_on)
+        self.event_rows = []
+        self._topology_stale = True
+        self._longest = 0.0
+        self.untouched = True
+        self.budget = None
+        self.areas, self.cut = mesh.areas(), cut_corner(mesh)
+        edges = mesh.edges().points
+        way = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+        self._mean_edge = float(np.sqrt((way * way).sum(axis=1)).mean())
+        n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
+        self.number = np.arange(n * rank // size, n * (rank + 1) // size)
+        wide = bool((mesh.cells[:, 3] >= 0).any())
+        self.x = np.zeros((len(self.number), 12 if wide else 8))
+        self.v = np.zeros((len(self.number), 12 if wide else 6))
+        build.corners(mesh.points, mesh.cells, self.number, self.x)
+        self.cold = {}
+        self.memories = Memories.empty(len(self.number))
+
+    @property
+    def wide(self) -> bool:
+        """There are quads: rows of positions and velocities have twelve columns."""
+        return self.x.shape[1] == 12
+
+    def the_mesh(self) -> Mesh:
+        """The mesh; CommandError if there is none."""
+        return self._mesh()
+
+    @property
+    def owned(self) -> slice:
+        """Storage rows of the owned elements."""
+        return slice(self.n_left, self.n_left + self.n_own) if self.closed else slice(0, len(self.number))
+
+    def _before_change(self) -> None:
+        if self.budget is not None and self.closed:
+            if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
+                self._renew_lists()  # what broken joints lose is not the doing of commands
+            self.budget.pause(self)
+        self.open_model()
+
+    def masses_change(self) -> bool:
+        """Masses or the time step will be others with the next lists."""
+        return self.lattice.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
+
+    def _changed(self, topology: bool = False, stiffness: bool = True) -> None:
+        self._topology_stale |= topology
+        if topology:
+            self._closed = None
+        self.lattice.countdown = self.lattice.pace = 1
+        if stiffness:
+            self.lattice.dt = 0.0
+
+    def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+        before = self.element_row.copy()
+        super().element_model(elements, name, properties)
+        if self.log is None or self.stress0 is None:
+            return
+        at = np.flatnonzero((before != self.element_row) & (before > 0))
+        other = at[(self.initial_stresses(at) != self.stress0[at]).any(axis=1)]
+        if len(other):
+            self.log.warn_once(
+                "initial stress follows",
+                f"{len(other)} elements have other moduli than when their initial stress was said: it follows them, "
+                f"element {other[0]} has {_pascals(self.initial_stresses(other[:1])[0])} in place of "
+                f"{_pascals(self.stress0[other[0]])}; element initial after the models sets it for the present ones",
+            )
+
+    # ---- one step ------------------------------------------------------------------------------------------------
+
+    def step(self) -> int:
+        """Advance everything by one dt. The same text on one rank and on a thousand.
+
+        Returns what the outside asked for (0 nothing; else see runtime.stopping), agreed by all ranks.
+        """
+        self.close_model()
+        self.check_start()
+        self.untouched = False
+        timers, halo, lattice, request = self.timers, self.halo, self.lattice, 0
+        budget = self.budget if self.options.dynamic else None
+        if budget is not None:
+            budget.before_forces(self)
+        self.local.forces()
+        if budget is not None:
+            budget.after_forces(self)
+        with timers("move"):
+            for first, last in halo.border:
+                self._drift(first, last)
+            halo.start()
+            self._drift(*halo.inside)
+        self.clock.step += 1
+        if self.options.dynamic:
+            self.clock.time += self.clock.dt
+        lattice.age += 1
+        lattice.stored += 1
+        lattice.countdown -= 1
+        stale = outdated = False
+        if lattice.countdown == 0:
+            with timers("reduce"):
+                try:
+                    stale, outdated, request = self._look()
+                except EquilibriumError:
+                    halo.finish()  # the script may go on
+                    raise
+        with timers("halo"):
+            halo.finish()
+        if self.options.auto and self.options.dynamic and self.clock.step - lattice.estimated >= AUTO:
+            lattice.dt, stale = 0.0, True
+        if stale or outdated:
+            if not outdated or (budget is not None and self.masses_change()):
+                self._renew_lists()
+            if outdated:
+                self.open_model()
+        return request
+
+    def check_start(self) -> None:
+        """CommandError if nothing has moved yet and bodies overlap, unless that was asked for; the model is closed.
+        Collective."""
+        if self.untouched:
+            overlaps.check(self)
+
+    def _drift(self, first: int, last: int) -> None:
+        """Move the owned elements first : last by dt."""
+        kernel = elements.drift if self.threads == 1 else elements.drift_threaded
+        kernel(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
+
+    def _look(self) -> tuple[bool, bool, int]:
+        """How far has anyone gone since the lists were built? Sets the step of the next look.
+
+        Returns whether contact lists, and whether the storage has to be made anew now, and the outside's request. All
+        ranks get the same answers.
+        """
+        lattice, cells = self.lattice, self.the_mesh().cells
+        found, more = np.zeros(8), np.zeros(4)
+        build.survey(self.x, self.v, self.listed, self.n_left, self.n_own, cells, self.number, found)
+        build.survey(self.x, self.v, self.origin, self.n_left, self.n_own, cells, self.number, more)
+        found[4] = float(self.local.tally[:, elements.NEW_BROKEN].sum())
+        found[5] = float(self.local.tally[:, elements.NEW_YIELDED].sum())
+        found[6] = self.stop.local_request() if self.stop is not None else 0
+        found[7] = more[0]
+        self.comm.max_into(found)
+        path2, speed2, broken, inverted, breaks, yields, request, way2 = found.tolist()
+        dt = self.clock.dt
+        stride = math.sqrt(speed2) * dt
+        if broken or inverted or stride > 0.5 * self._mean_edge:
+            self._stop_on_runaway(bool(broken), bool(inverted))
+        self.local.tally[:, elements.NEW_YIELDED] = 0
+        stale, outdated = breaks > 0.0, lattice.stored >= OLDEST
+        wait = min(LONGEST_WATCH, 2 * lattice.pace)
+        if yields > 0.0:
+            wait = min(wait, LONGEST_WATCH // 4)  # a joint may be about to break
+        if self.options.collision:
+            room = 0.5 * lattice.skin - math.sqrt(path2)
+            lattice.late += room < 0.0
+            # Lists end where the ghosts do, so some of their room is left for the next ones.
+            outdated |= 0.5 * (ROOM - WIDE) * self._mean_edge < math.sqrt(way2) + stride
+            stale |= room < stride
+            if stale or outdated:
+                room = 0.5 * lattice.skin
+            if stride > 0.0:
+                wait = min(wait, int(0.5 * room / stride))
+        lattice.pace = lattice.countdown = max(1, wait)
+        return bool(stale), bool(outdated), int(request)
+
+    def _stop_on_runaway(self, broken: bool, inverted: bool) -> None:
+        """Name the elements that cannot be right, and stop on all ranks: raises PhysicsError. Collective."""
+        cells = self.the_mesh().cells
+        x, v, number = self.x[self.owned], self.v[self.owned], self.number[self.owned]
+        corners = connectivity.corner_counts(cells[number])
+        with np.errstate(invalid="ignore", over="ignore"):
+            speed = np.hypot(v[:, 0:6:2], v[:, 1:6:2]).max(axis=1)
+            turn = _turn(x, 0, 2, 4)
+            bad = ~np.isfinite(x[:, :6]).all(axis=1) | ~(speed * self.clock.dt <= 0.5 * self._mean_edge) | ~(turn > 0.0)
+            if self.wide:
+                bad |= (corners == 4) & ~(_turn(x, 0, 4, 6) > 0.0)
+        rows = np.flatnonzero(bad)[np.argsort(number[bad])][:10]
+        mine = [(int(number[i]), float(x[i, 0]), float(x[i, 1]), float(v[i, 0]), float(v[i, 1])) for i in rows]
+        named = sorted(row for part in self.comm.allgather(mine) for row in part)[:10]
+        total = int(self.comm.sum_into(np.array([bad.sum()], np.int64))[0])
+        what = "a number is not finite" if broken else (
+            "an element is turned inside out" if inverted else "an element moves over half an edge per step"
+        )  # fmt: skip
+        text = "\n".join(f"  element {e} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g})" for e, x, y, vx, vy in named)
+        if not self.options.dynamic and not broken and not inverted:
+            e, x, y, vx, vy = named[0]
+            raise EquilibriumError(
+                f"step {self.clock.step}: {total} elements move over half an edge per static step, such as element {e} "
+                f"at ({x:g}, {y:g}) by ({vx:g}, {vy:g})"
+            )
+        raise PhysicsError(
+            f"step {self.clock.step}: {what} ({total} elements); the time step {self.clock.dt:g} s is probably too "
+            f"large, or loads are\n{text}"
+        )
+
+    # ---- open and closed -----------------------------------------------------------------------------------------
+
+    def open_model(self) -> None:
+        """Make the model free to be changed: owned elements and their memories only. Joints that broke become free
+        faces."""
+        if not self.closed:
+            return
+        with self.timers("neighbour"):
+            mesh = self.the_mesh()
+            middle = np.empty((len(self.number), 2))
+            build.middles(self.x, mesh.cells, self.number, middle)
+            local = self.local
+            longest2 = build.longest_link(
+                middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state
+            )
+            self._longest = math.sqrt(float(self.comm.max_into(np.array([longest2]))[0]))
+            self.memories = local.memories(transfer=True)
+            self._collect_events()
+            self.where[self.number] = -1
+            self._leave_storage()
+
+    def _leave_storage(self) -> None:
+        self.halo.close()
+        own = self.owned
+        self.number, self.x, self.v = self.number[own].copy(), self.x[own].copy(), self.v[own].copy()
+        self.closed = False
+
+    def waiting_events(self) -> list[Crack]:
+        """Joints that broke since the last rebuild, in order of steps, see `Crack`. Collective."""
+        local, clock, lattice = self.local, self.clock, self.lattice
+        slots = np.flatnonzero(local.slot_state == BROKEN)
+        mine = np.column_stack([local.slot_face[slots].astype(float), local.slot_memory[slots, MODE:]])
+        rows = np.concatenate(self.comm.allgather(mine)) if self.comm.size > 1 else mine
+        if not len(rows):
+            return []
+        faces = rows[:, 0].astype(np.int64)
+        lower = np.minimum(faces, self.partner[faces])
+        order = np.lexsort((faces, lower))  # both sides report, the lower face first
+        rows, lower = rows[order], lower[order]
+        assert (lower[0::2] == lower[1::2]).all(), "a joint broke on one side only"
+        first, joints = rows[0::2], lower[0::2]
+        both = rows[0::2] + rows[1::2]
+        dt = clock.dt if self.options.dynamic else 0.0
+        return [
+            Crack(
+                int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(both[k, 3]),
+                lattice.time + (int(first[k, 2]) - lattice.step) * dt, int(first[k, 4]), float(both[k, 5]),
+            )
+            for k in np.lexsort((joints, first[:, 2])).tolist()
+        ]  # fmt: skip
+
+    def rebuild(self) -> None:
+        """Storage and lists anew at the present positions, as the step does from time to time."""
+        self.open_model()
+        self.close_model()
+
+    def _renew_lists(self) -> None:
+        """Contact lists at the present positions; joints that broke become free faces. Storage stays."""
+        with self.timers("neighbour"):
+            self.lattice.skin = self._skin()
+            handed_over = self.local.handed_over()
+            self._collect_events()
+            self.local.renew_contacts(handed_over)
+            self.listed = self.x[self.owned].copy()
+            self.lattice.age = 0
+            self._note_time()
+            self.rebuilds += 1
+
+    def _note_time(self) -> None:
+        self.lattice.step, self.lattice.time = self.clock.step, self.clock.time
+
+    def _skin(self) -> float:
+        """Buffer of the next contact lists [m], from global values only."""
+        lattice = self.lattice
+        if 0 < lattice.age < SHORT_LIVED:
+            lattice.skin_factor = WIDE
+        elif lattice.age > LONG_LIVED:
+            lattice.skin_factor = NARROW
+        return lattice.skin_factor * self._mean_edge
+
+    def _collect_events(self) -> None:
+        """Joints that broke since the last rebuild become free faces, on all ranks. Collective."""
+        rows = self.waiting_events()
+        if rows:
+            self.event_rows += rows
+            joints = np.array([row[0] for row in rows])
+            self.broken[joints] = 1
+            self._open_faces(joints)
+
+    def close_again(self) -> None:
+        """Close a restored model: its lattice stays as it was."""
+        self._close(frozen=True)
+
+    def close_model(self) -> None:
+        """Make the model ready to step: storage, ghosts and tables at the present positions."""
+        if not self.closed:
+            self._close()
+
+    def _close(self, frozen: bool = False) -> None:
+        """From open to closed. frozen: keep the lattice as it is (restart)."""
+        self._check_ready()
+        mesh = self.the_mesh()
+        with self.timers("neighbour"):
+            if self._topology_stale:
+                self._renew_topology()
+            if self.lattice.dt == 0.0:
+                self._warn_of_snap_back()
+            middle = np.empty((len(self.number), 2))
+            radius = build.middles(self.x, mesh.cells, self.number, middle)
+            self._choose_lattice(radius, frozen)
+        middle = self._share_out(middle)
+        with self.timers("neighbour"):
+            cell = keys(middle, self.lattice.side)
+            order = strips.global_order(cell, self.number)
+            cell = cell[order]
+        with self.timers("halo"):
+            self._store(order, cell)
+        with self.timers("neighbour"):
+            self.local = Local(self)
+            if not frozen:
+                self.origin = self.x[self.owned].copy()
+                self.listed = self.origin.copy()
+                self.lattice.age = self.lattice.stored = 0
+                self._note_time()
+            self.rebuilds += 1
+        if self.surface_loads is not None:
+            self.surface_loads.made_anew()
+
+    def _check_ready(self) -> None:
+        """CommandError unless every element has a model."""
+        self.the_mesh()
+        bare = np.flatnonzero(self.alive & (self.element_row == 0))
+        if len(bare):
+            raise CommandError(f"element {bare[0]} has no model ({len(bare)} elements in all)")
+        if not self.alive.any():
+            raise CommandError("there are no elements left")
+
+    def _renew_topology(self) -> None:
+        """Which corners are one node."""
+        mesh = self.the_mesh()
+        apart = (self.joint_row > 0) | self.open
+        dead = np.repeat(~self.alive, 4)
+        apart |= dead
+        node, lead = connectivity.corner_clusters(mesh.cells, self.partner, apart)
+        node[~self.alive] = -1
+        self.node = node
+        self.node_sizes = np.bincount(node[node >= 0], minlength=len(lead))
+        self.member_begin = np.zeros(len(lead) + 1, np.int64)
+        self.member = np.empty(int(self.node_sizes[self.node_sizes > 1].sum()), np.int64)
+        build.cluster_members(node, self.node_sizes, self.member_begin, self.member)
+        cells = mesh.cells[self.alive]
+        self.point_corners = np.bincount(cells[cells >= 0], minlength=len(mesh.points))
+        self.where = np.full(len(mesh.cells), -1, np.int64)
+        self.unused = np.full(len(lead), -1, np.int64)
+        self._topology_stale = False
+
+    def _choose_lattice(self, radius: float, frozen: bool) -> None:
+        """Buffer and cell side for the next lists, from global values only."""
+        lattice = self.lattice
+        radius = float(self.comm.max_into(np.array([radius]))[0])
+        if frozen:
+            return
+        lattice.skin = self._skin()
+        room = ROOM * self._mean_edge if self.options.collision else 0.0
+        needed = max(2.0 * radius, self._longest) * (1.0 + 1e-9) + room
+        if not needed <= lattice.side <= 1.2 * needed:
+            lattice.side = 1.05 * needed
+
+    def _share_out(self, middle: np.ndarray) -> np.ndarray:
+        """Move borders if it pays, then send every element and its memories to the owner of its column.
+
+        Returns the middles of the elements that are owned now (n, 2) [m].
+        """
+        side = self.lattice.side
+        cell = keys(middle, side)
+        with self.timers("balance"):
+            self.ownership.renew(columns(cell), side, self.clock.step, self.timers.seconds(), None, self._costs())
+        with self.timers("migrate"):
+            leave = strips.strays(cell, self.ownership.borders, self.comm.rank) if self.comm.size > 1 else cell[:0]
+            migration = Migration(self.comm, len(cell), leave, self.ownership.owner_of(columns(cell[leave])))
+            leave = migration.leave
+            hers = self.memories.take(leave)
+            rows = [self.number.view(np.float64)[:, None], self.x, self.v, middle, *self.cold.values()]
+            table = np.hstack([part[leave] for part in rows])
+            arrived, counts, entries = migration.exchange(table, hers.counts(), hers.rows)
+            if not len(leave) and not len(arrived):
+                return middle
+            stay = migration.stay()
+            self.memories = self.memories.take(stay).joined(counts, entries)
+            joined, at = [], 0
+            for part in rows:
+                joined.append(np.concatenate([part[stay], arrived[:, at : at + part.shape[1]]]))
+                at += part.shape[1]
+            self.number = np.ascontiguousarray(joined[0][:, 0]).view(np.int64)
+            self.x, self.v, middle = joined[1], joined[2], np.ascontiguousarray(joined[3])
+            self.cold = dict(zip(self.cold, joined[4:]))
+        return middle
+
+    def _costs(self) -> np.ndarray:
+        """Relative cost of the owned elements: broken zones are dearer."""
+        cost = np.ones(len(self.number))
+        cost += 0.5 * np.minimum(self.memories.counts(), 12)
+        return cost
+
+    def _store(self, order: np.ndarray, cell: np.ndarray) -> None:
+        """Put the owned elements into storage order, with the ghosts around them."""
+        self.memories = self.memories.take(order)
+        self.cold = {name: values[order] for name, values in self.cold.items()}
+        number, v = self.number[order], self.v[order]
+        self.x, self.halo = connect(
+            self.comm, np.ascontiguousarray(self.x), order, cell, self.ownership.borders, self.threads
+        )
+        halo = self.halo
+        self.n_left, self.n_own = halo.n_left, len(order)
+        n = len(self.x)
+        self.number = np.empty(n, np.int64)
+        room = aligned((n * v.shape[1] + 8,))  # kernels read four columns at a time
+        room[-8:] = 0.0
+        self.v = room[:-8].reshape(n, v.shape[1])
+        self.closed = True
+        self.number[self.owned], self.v[self.owned] = number, v
+        halo.fill(self.number)
+        halo.fill(self.v)
+        if self.options.collision:
+            halo.keep_fresh(self.v)
+        self.where[self.number] = np.arange(n)
+
+    def has_faded(self, one: Fading) -> bool:
+        """Forces left behind are gone, or belong to the other mode."""
+        now = float(self.clock.step) if one.in_steps else self.clock.time
+        return now >= one.begin + one.span or one.in_steps == self.options.dynamic
+
+    def _warn_of_snap_back(self) -> None:
+        """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening."""
+        if self.log is None or not len(self.joint_rows) > 1:
+            return
+        mesh = self.the_mesh()
+        faces = np.flatnonzero(self.closed_faces() & (self.joint_row > 0))
+        ends = connectivity.face_points(mesh.cells, faces)
+        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
+        longest = np.zeros(len(self.joint_rows))
+        np.maximum.at(longest, self.joint_row[faces], np.hypot(way[:, 0], way[:, 1]))
+        for strength, penalty, energy in (
+            ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
+        ):  # fmt: skip
+            t, p, g = (self.joint_rows.column(name) for name in (strength, penalty, energy))
+            rows = np.flatnonzero((longest > 0.0) & (t > 0.0))
+            elastic = 2.0 * longest[rows] * t[rows] / p[rows]
+            softening = g[rows] / (SOFTENING_AREA * t[rows])
+            brittle = softening < 0.1 * elastic
+            if not brittle.any():
+                continue
+            worst = np.argmin(softening / elastic)
+            row = rows[worst]
+            others = f", and {int(brittle.sum()) - 1} other sets of properties," if brittle.sum() > 1 else ""
+            self.log.warn_once(
+                f"snap back {row} {energy}",
+                f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
+                f"elastic way, {elastic[worst]:.3g} m at an edge of {longest[row]:.3g} m: what the body stores is set "
+                "free at once; smaller elements or a higher penalty help",
+            )
+
+    def tell_time_step(self, dt: float, critical: float, added: float) -> None:
+        """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
+        that mass scaling adds, over the true mass. A step that is followed (auto) is told again when it has changed by
+        a tenth."""
+        o = self.options
+        if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
+            return
+        self._told_step = dt
+        limit = critical / o.safety
+        scaled = f"by mass scaling, which adds {added:.3g} times the mass"
+        how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
+        self.log.info(
+            f"time step {dt:.4g} s ({how}), {dt / limit:.2f} of the stability limit {limit:.4g} s; safety factor "
+            f"{o.safety:g}: {critical:.4g} s"
+        )
+        if dt > critical * (1.0 + 1e-9):
+            self.log.warn_once(
+                f"critical time step {dt > limit}",
+                f"the time step {dt:g} s is {dt / limit:.2f} of the stability limit {limit:.4g} s, more than the "
+                f"safety factor {o.safety:g} allows ({critical:.4g} s); a run that blows up should be repeated with a "
+                "smaller one",
+            )
+
+
+def _pascals(stress: np.ndarray) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in zip(("xx", "yy", "xy", "zz"), stress)) + " Pa"
+
+
+def _turn(x: np.ndarray, a: int, b: int, c: int) -> np.ndarray:
+    """Twice the area (n,) of the triangles whose corners begin in these columns."""
+    ux, uy, wx, wy = x[:, b] - x[:, a], x[:, b + 1] - x[:, a + 1], x[:, c] - x[:, a], x[:, c + 1] - x[:, a + 1]
+    return ux * wy - uy * wx

@@ -1,0 +1,195 @@
+"""Many steps: a number of them, or until something is reached."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.changing import Changing
+
+RATIO = 1e-5
+"""Balance at which a model counts as being at rest, if nothing else is asked for."""
+EVERY = 50
+"""Steps between two looks at the balance."""
+WINDOW = 20_000
+"""Static steps, at least, in which the balance must get better."""
+CROSSINGS = 10.0
+"""The same in times that a wave takes there and back through the model."""
+BETTER = 0.9
+"""Part of the least ratio so far that counts as progress."""
+SLIDES = 0.2
+"""Every corner of a body that slides has this part of its mean velocity at least; held ones do not move."""
+LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
+"""Steps after which a run towards a ratio has failed, if nothing else is said."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """How `Blocks.solve` ended. ratio: unbalanced over contributing forces at the last look, NaN if nobody looked;
+    reason: "ratio", "cycles", "time", "request" (a signal or limit asked to stop); without equilibrium "no progress" or
+    "limit", see `Watch`."""
+
+    steps: int
+    ratio: float
+    reason: str
+    request: int = 0
+
+
+@dataclass
+class Watch:
+    """Whether a run towards a ratio gets anywhere. It goes by global numbers, so it says the same on all ranks.
+
+    window: steps in which the least ratio must fall by a tenth, 0: any number. Since what came slowly so far may go on
+    slowly, it is never shorter than the way from the beginning to the last progress. When a joint breaks that begins
+    again. limit: steps in all, 0: any number. began, changed, progress: steps at which the run began, the last joint
+    broke, the ratio was last better; least: the ratio then; broken: joints then.
+    """
+
+    window: int
+    limit: int
+    began: int
+    changed: int = 0
+    progress: int = 0
+    least: float = math.inf
+    broken: int = -1
+
+    def failed(self, step: int, ratio: float, broken: int) -> str:
+        """Why there is no hope at this step, "" if there is; broken: joints so far."""
+        if broken != self.broken:
+            self.least, self.progress, self.broken = ratio, step, broken
+            self.changed = step
+        elif ratio <= BETTER * self.least:
+            self.least, self.progress = ratio, step
+        if self.limit and step - self.began >= self.limit:
+            return "limit"
+        stuck = step - self.progress >= max(self.window, self.progress - self.changed)
+        return "no progress" if self.window and stuck else ""
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A body (elements that hang together) that moves: number of elements, the lowest of them, its middle [m], its
+    velocity [m/s; in static mode m per step]."""
+
+    elements: int
+    first: int
+    x: float
+    y: float
+    vx: float
+    vy: float
+
+    def __str__(self) -> str:
+        return (
+            f"the body of {self.elements} element{'s' * (self.elements > 1)} around ({self.x:.6g}, {self.y:.6g}), with "
+            f"element {self.first}, slides or falls away by ({self.vx:.3g}, {self.vy:.3g})"
+        )
+
+
+class Solving(Changing):
+    """Verbs of `Blocks` that step. All collective."""
+
+    def advance(self, steps: int) -> int:
+        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+        if steps < 0:
+            raise CommandError(f"the number of steps must not be negative, got {steps}")
+        request = done = 0
+        while done < steps and not request:
+            request = self.step()
+            done += 1
+        self.timers.count(done, len(self.number[self.owned]))
+        return request
+
+    def solve(
+        self,
+        ratio: float | None = None,
+        cycles: int | None = None,
+        time: float | None = None,
+        every: int = EVERY,
+        window: int | None = None,
+        limit: int | None = None,
+    ) -> Solved:
+        """Step until the sum of unbalanced over the sum of contributing nodal forces falls below `ratio` (1e-5 if none
+        of the three is given), or after so many steps, or so much model time [s], whatever comes first.
+
+        every: steps between two looks at the ratio. window, limit: see `watch`; they end the run without equilibrium.
+        """
+        if ratio is None and cycles is None and time is None:
+            ratio = RATIO
+        given = {"ratio": ratio, "cycles": cycles, "time": time, "every": every}
+        for name, value in given.items():
+            if value is not None and not value > 0:
+                raise CommandError(f"{name} must be positive, got {value}")
+        if time is not None and not self.options.dynamic:
+            raise CommandError("time does not pass in static mode: use cycles or ratio")
+        self.close_model()
+        clock = self.clock
+        watch = self.watch(window, limit, ends=cycles is not None or time is not None)
+        end = math.inf if time is None else clock.time + time
+        done, found = 0, math.nan
+        while (cycles is None or done < cycles) and clock.time < end - 0.5 * clock.dt:
+            request = self.step()
+            self.close_model()
+            done += 1
+            self.timers.count(1, len(self.number[self.owned]))
+            if request:
+                return Solved(done, found, "request", request)
+            if ratio is not None and (done % every == 0 or done == cycles):
+                found = self.unbalanced_ratio()
+                why = "ratio" if found < ratio else watch.failed(clock.step, found, self.joint_counts()[2])
+                if why:
+                    return Solved(done, found, why)
+        return Solved(done, found, "cycles" if cycles is not None and done >= cycles else "time")
+
+    def watch(self, window: int | None = None, limit: int | None = None, ends: bool = False) -> Watch:
+        """A watch over a run towards a ratio that begins now. window, limit [steps]; 0: none; None: what is usual.
+
+        ends: the run ends by itself, so that usually there is neither. Otherwise the limit is 1 000 000 static or
+        10 000 000 dynamic steps, and the window of static runs ten times as long as a wave takes there and back, at
+        least 20 000 steps; waves in motion die down as slowly as their damping is low, so there is none in dynamic
+        runs."""
+        for name, value in (("window", window), ("limit", limit)):
+            if value is not None and value < 0:
+                raise CommandError(f"{name} must not be negative, got {value}")
+        static = not self.options.dynamic
+        if window is None:
+            window = 0 if ends or not static else max(WINDOW, math.ceil(CROSSINGS * self._crossing()))
+        if limit is None:
+            limit = 0 if ends else LIMIT_STATIC if static else LIMIT_DYNAMIC
+        return Watch(window, limit, self.clock.step)
+
+    def _crossing(self) -> float:
+        """About how many static steps a wave takes through the model and back, twice: 4 n sqrt(1 + P / E), n: edges
+        along it; masses are those of the stiffest part, joints with the penalty P."""
+        size = float(np.ptp(self.the_mesh().points, axis=0).max())
+        tied = self.joint_row[self.closed_faces()]
+        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
+        penalty = np.max([self.joint_rows.column(name) for name in names], axis=0)[tied].max(initial=0.0)
+        young = np.array(self.element_rows.column("young"))[self.element_row[self.alive]].min()
+        return 4.0 * size / self._mean_edge * math.sqrt(1.0 + penalty / young)
+
+    def sliding_body(self) -> Moving | None:
+        """The fastest body, if it slides or falls as a whole: all its corners move, and it would go more than rounding
+        (1e-6 of an edge in 10 000 steps). Equal on all ranks. Collective."""
+        hold = np.where(self.closed_faces() & np.repeat(self.alive, 4), self.partner, -1)
+        of_elements = connectivity.bodies(hold)
+        names = [f"{name}_{axis}" for name in ("position", "velocity") for axis in "xy"]
+        mine = self.owned_values("corner", names)
+        rows = np.concatenate(self.comm.allgather(np.column_stack(list(mine.values()))))
+        rows = rows[np.argsort(rows[:, 0])]
+        element = rows[:, 0].astype(np.int64) // 4
+        _, body = np.unique(of_elements[element], return_inverse=True)
+        count = np.bincount(body)
+        x, y, vx, vy = (np.bincount(body, column) / count for column in rows[:, 1:].T)
+        least = np.full(len(count), math.inf)
+        np.minimum.at(least, body, np.hypot(rows[:, 3], rows[:, 4]))
+        speed = np.hypot(vx, vy)
+        speed[(least < SLIDES * speed) | (1e4 * speed * self.clock.dt < 1e-6 * self._mean_edge)] = 0.0
+        k = int(speed.argmax())
+        if speed[k] == 0.0:
+            return None
+        members = np.unique(element[body == k])
+        return Moving(len(members), int(members[0]), float(x[k]), float(y[k]), float(vx[k]), float(vy[k]))

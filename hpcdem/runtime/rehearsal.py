@@ -1,0 +1,29 @@
+"""Calls every kernel once that particles, blocks and files share: they have a cache folder of their own.
+
+numba keeps a kernel in the folder that was set when its module was imported. With these modules in the folder of
+particles, that of blocks would lack them in a process that has both, and the other way round.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hpcdem.core import cells, memory
+from hpcdem.decomp import strips
+from hpcdem.io import slabs, textnum
+from hpcdem.numerics import exact_sum, lanes, rng
+
+__all__ = ["lanes", "rehearse"]
+
+
+def rehearse(threads: int = 1) -> None:
+    """Call them as runs with this many threads per rank do. Writes nothing."""
+    cell = cells.keys(np.zeros((2, 2)), 1.0)
+    ids = np.array([2, 1])
+    strips.global_order(cell, ids)
+    strips.strays(cells.columns(cell), np.array([-1, 0, 1]), 0)
+    slabs.order_of([ids])
+    memory.take_rows(np.zeros((1, 1)), np.zeros(1, np.int64), np.empty((1, 1)), threads)
+    exact_sum.partial_bins(np.zeros(1))
+    rng.uniform(0, 0, 0)
+    textnum.warm_up()
