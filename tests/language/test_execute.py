@@ -51,7 +51,7 @@ class _Module:
     def __getattr__(self, verb):
         def call(sim, *args, **kwargs):
             name = f"{self.module}.{verb}"
-            real = getattr(importlib.import_module(f"hpcdem.commands.{self.module}"), verb)
+            real = getattr(importlib.import_module(f"hpcdem.commands.dem.{self.module}"), verb)
             inspect.signature(real).bind(sim, *args, **kwargs)
             self.recorder.calls.append((name, args, kwargs))
             self.recorder.positions.append((sim.position, sim.line))

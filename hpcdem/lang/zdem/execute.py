@@ -22,7 +22,7 @@ class Verbs:
     """The modules of `hpcdem.commands` by name, each imported when it is first needed."""
 
     def __getattr__(self, name: str) -> Any:
-        return importlib.import_module(f"hpcdem.commands.{name}")
+        return importlib.import_module(f"hpcdem.commands.dem.{name}")
 
 
 def refuse_unexecuted(statements: Sequence[Statement]) -> None:
