@@ -326,6 +326,13 @@ class Simulation:
         self._do.properties.free(self.engine, _degrees(dofs), where=_selection(where))
 
     @_verb
+    def add_physics(self, name: str, **parameters: float) -> None:
+        """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
+        contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
+        [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
+        self._do.physics.add(self.engine, name, **parameters)
+
+    @_verb
     def set(self, **options: Any) -> None:
         """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, outdir,
         and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
@@ -458,6 +465,7 @@ class Simulation:
         The names are those of `hpcdem.core.fields` (x y vx vy spin radius gid angle fx fy torque fix color group
         birth), of materials (density fric shear poiss damp kn ks hertz), mass, inertia, and clump: the id of the clump,
         which is that of its first member, -1 for particles of none. A member has a share of the mass of its clump.
+        Physics bring more (`add_physics`).
         """
         return self._of_this_rank(f"['{name}']", lambda: self._field(name))
 
@@ -469,7 +477,7 @@ class Simulation:
             values = engine.lists.owned_forces()[:, ("fx", "fy", "torque").index(name)]
         elif name == "clump":
             values = p.clump.view()
-        elif name in FIELDS:
+        elif name in FIELDS or name in p.extra:
             values = p[name].view()
         elif name in MATERIAL_FIELDS:
             values = engine.materials.rows[name][p["material"]]
@@ -477,7 +485,7 @@ class Simulation:
             self._ready()
             values = engine.body[:, ("mass", "inertia").index(name)].view()
         else:
-            raise ScriptError(*_place(), f"there is no field '{name}'; fields are {', '.join(FIELDS)}")
+            raise ScriptError(*_place(), f"there is no field '{name}'; fields are {', '.join((*FIELDS, *p.extra))}")
         values.flags.writeable = False
         return values
 
@@ -487,8 +495,9 @@ class Simulation:
         A clump takes the velocity, spin and fixed directions that are given to its first member; the places, radii and
         angles of members cannot be set.
         """
-        if name not in SETTABLE:
-            raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(SETTABLE)}")
+        settable = (*SETTABLE, *self.engine.particles.extra)
+        if name not in settable:
+            raise ScriptError(*_place(), f"field '{name}' cannot be set; these can: {', '.join(settable)}")
         self._asked(("set field", name, values), lambda: self._set_field(name, values))
         self.engine.edited = True
 
@@ -826,7 +835,7 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
         running, projects = session.current().interpreter, session.current().projects
         if not projects:
             raise CommandError("there are no blocks: it belongs into a PCDC script")
-        session.current().prepare_coupling()
+        session.current().prepare("coupled")
 
         def both() -> Coupling:
             return Coupling(projects[-1], coupling.couple(projects[-1], particles.engine, friction, dt))

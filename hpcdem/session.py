@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
+from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import doctor, ending, launch, run_folder, speed
 
 if TYPE_CHECKING:
@@ -51,9 +52,7 @@ class Session:
     keep: int = 0
     ends_with_frame: bool = False
     reproduction: Reproduction | None = None
-    kernels_ready: bool = False
-    blocks_ready: bool = False
-    coupling_ready: bool = False
+    ready: set[str] = field(default_factory=set)
     made: int = 0
     unfinished: list[Simulation] = field(default_factory=list)
     projects: list[Project] = field(default_factory=list)
@@ -61,17 +60,14 @@ class Session:
 
     def simulation(self, outdir: Path | None = None, log: Log | None = None) -> Simulation:
         """Collective: an empty model; the first one waits for the kernels."""
-        if not self.kernels_ready:
-            with self._counted():
-                prepare(self.comm, self.log, "", self.threads)
-            self.kernels_ready = True
-            self.stop.install(self.comm.rank)
+        self.prepare("")
         from hpcdem.physics.dem.simulation import Simulation  # brings the kernels with it
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         sim = Simulation(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
         sim.script, sim.draws, sim.job, sim.keep = self.text, self.draws, self.job, self.keep
         sim.number, self.made = self.made, self.made + 1
+        sim.prepare_kernels = self.prepare
         run_folder.claim(Path(outdir), self.comm, self.job)
         if self.reproduction is not None:
             watch_states(sim, self.reproduction)
@@ -80,10 +76,7 @@ class Session:
 
     def project(self, outdir: Path | None = None) -> Project:
         """Collective: an empty model of blocks; the first one waits for the kernels."""
-        if not self.blocks_ready:
-            prepare(self.comm, self.log, "blocks", self.threads)
-            self.blocks_ready = True
-            self.stop.install(self.comm.rank)
+        self.prepare("blocks")
         from hpcdem.commands.fdem import Project
         from hpcdem.physics.fdem.model import Blocks
 
@@ -95,12 +88,14 @@ class Session:
         self.projects.append(project)
         return project
 
-    def prepare_coupling(self) -> None:
-        """Collective: wait for the kernels of particles and blocks in one run."""
-        if not self.coupling_ready:
+    def prepare(self, kind: str) -> None:
+        """Collective: wait for the kernels of a kind, see `rehearse`, once."""
+        if kind not in self.ready:
             with self._counted():
-                prepare(self.comm, self.log, "coupled", self.threads)
-            self.coupling_ready = True
+                prepare(self.comm, self.log, kind, self.threads)
+            self.ready.add(kind)
+            if kind in ("", "blocks"):
+                self.stop.install(self.comm.rank)
 
     def _counted(self) -> AbstractContextManager[None]:
         """What blocks wait for that are there already stands in their table of stages."""
@@ -189,7 +184,7 @@ def prepare(comm: SerialComm, log: Log, kind: str, *threads: int) -> Path:
 
 def rehearse(kind: str, *threads: int) -> None:
     """Call every kernel of a kind once for each number of threads: "" of particles, "blocks", "coupled" what both need
-    besides, "shared" by all. Imports them: the cache must be settled before."""
+    besides, "shared" by all, or the name of a physics. Imports them: the cache must be settled before."""
     call: Callable[[int], None]
     if kind == "shared":
         from hpcdem.runtime.rehearsal import rehearse as call
@@ -197,6 +192,8 @@ def rehearse(kind: str, *threads: int) -> None:
         from hpcdem.commands.fdem.rehearsal import rehearse as call
     elif kind == "coupled":
         from hpcdem.physics.coupling.rehearsal import rehearse as call
+    elif kind in PHYSICS:
+        call = PHYSICS[kind]().warm_up
     else:
         from hpcdem.commands.dem.rehearsal import rehearse as call
     for n in threads:

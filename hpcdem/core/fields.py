@@ -3,7 +3,8 @@ and the Python API all read this table; a new field is one new row.
 
 A particle is two rows of eight 8-byte words, one cache line each. The *hot* row is what a contact needs of its
 partner, so it is what travels in the halo every step. The *cold* row stays with the owner.
-Integers are stored as int64 bits in the same rows.
+Integers are stored as int64 bits in the same rows. Physics that a model is given (physics/particle_physics.py) bring
+more columns: they stand in a third row, which has as many as there are, and travels in the halo too.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-HOT, COLD = "hot", "cold"
+HOT, COLD, MORE = "hot", "cold", "more"
 WIDTH = 8
 
 # Columns of the hot row, for kernels.
@@ -53,6 +54,7 @@ class Field:
     dtype: type
     unit: str
     doc: str
+    initial: float = 0.0
 
 
 FIELDS: dict[str, Field] = {

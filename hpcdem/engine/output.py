@@ -174,10 +174,15 @@ HISTORIES = {
 """What HIST can follow: unit and function of the simulation."""
 
 
-def unit_of(what: str) -> str:
+def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], float]]]:
+    """What HIST can follow in this model: HISTORIES, and the diagnostics of its physics."""
+    return HISTORIES | {name: what for physics in sim.physics for name, what in physics.diagnostics().items()}
+
+
+def unit_of(sim: Simulation, what: str) -> str:
     """The unit of what a HIST follows."""
     name = what.split()[0]
-    return OF_PARTS[name].unit if name in OF_PARTS else HISTORIES[what][0]
+    return OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0]
 
 
 def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
@@ -189,8 +194,8 @@ def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> Non
     what = sim.history_wishes[ident][1]
     step, time = sim.clock.step, sim.clock.time
     with sim.timers("output"):
-        name, unit = what.split()[0], unit_of(what)
-        value = OF_PARTS[name].value(sim, what, ident) if name in OF_PARTS else HISTORIES[what][1](sim)
+        name, unit = what.split()[0], unit_of(sim, what)
+        value = OF_PARTS[name].value(sim, what, ident) if name in OF_PARTS else followed(sim)[what][1](sim)
         _append(sim, f"hist_{ident}.csv", f"step,time [s],{what} [{unit}]", [f"{step},{time!r},{value!r}"])
         header = f"hpcdem\nhist id {ident}\n{what} [{unit}]\nstep value"
         _append(sim, f"hist_id_{ident}.dat", header, [f"{step} {value!r}"])
@@ -242,15 +247,22 @@ def write_energy(sim: Simulation, _: Snapshot | None = None) -> None:
     """A row of `energy.csv`: the budget now."""
     with sim.timers("output"):
         seen = sim.energy.look(sim)
-        numbers = (repr(v) for v in (sim.clock.time, *dataclasses.astuple(seen)))
-        _append(sim, "energy.csv", ENERGY_COLUMNS, [",".join([str(sim.clock.step), *numbers])])
+        of_physics = physics_energies(sim)
+        numbers = (repr(v) for v in (sim.clock.time, *dataclasses.astuple(seen), *of_physics.values()))
+        _append(sim, "energy.csv", ",".join([ENERGY_COLUMNS, *of_physics]), [",".join([str(sim.clock.step), *numbers])])
+
+
+def physics_energies(sim: Simulation) -> dict[str, float]:
+    """The energies [J] of the physics of a model, by name. Collective."""
+    known = followed(sim)
+    return {name: known[name][1](sim) for physics in sim.physics for name in physics.energies}
 
 
 def tell_energy(sim: Simulation) -> None:
     """The budget as a table in the log, at the end of a run; nothing without SET energy. Collective."""
     if sim.energy is None or sim.energy.start is None:
         return
-    seen = sim.energy.look(sim)
+    seen, of_physics = sim.energy.look(sim), physics_energies(sim)
     if sim.log is None:
         return
     rows = [
@@ -258,6 +270,7 @@ def tell_energy(sim: Simulation) -> None:
         for name, words in ENERGY_WORDS.items()
         if name != "work_blocks" or seen.work_blocks
     ]
+    rows += [(name, f"{value:.6g}") for name, value in of_physics.items()]
     sim.log.table("energy budget", ("energy", "J"), rows)
     sim.log.info(
         f"energy: closing error {seen.closing:.4g} J, {seen.relative:.2g} of the largest flow "
@@ -367,7 +380,8 @@ def _draw_curve(sim: Simulation, path: Path, names: list[str], points: list[tupl
         return
     from hpcdem.post import charts
 
-    x, y = (name if unit_of(name) == "1" else f"{name} ({unit_of(name)})" for name in names)
+    units = [unit_of(sim, name) for name in names]
+    x, y = (name if unit == "1" else f"{name} ({unit})" for name, unit in zip(names, units))
     with atomic_path(path) as temporary:
         charts.draw(Path(temporary), "png", "", x, y, [("", "line" if len(points) > 1 else "points", points)])
 

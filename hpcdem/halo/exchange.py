@@ -79,6 +79,14 @@ class Halo:
         """The same of a second array, renewed by `refresh_more`."""
         self.more += self._persistent(rows, BACK)
 
+    def storage(self, rows: np.ndarray) -> np.ndarray:
+        """Storage with ghosts, renewed by `refresh`, for owned rows (n, w) in this order. Collective."""
+        out = aligned((self.n_left + self.n_own + self.n_right, rows.shape[1]))
+        out[self.n_left : self.n_left + self.n_own] = rows
+        self.fill(out)
+        self.keep_fresh(out)
+        return out
+
     def _persistent(self, rows: np.ndarray, shift: int) -> list:
         if self.comm.mpi is None:
             return []

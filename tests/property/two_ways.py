@@ -505,7 +505,7 @@ def carry_out(text: str, folder: Path, comm: Any = None) -> tuple[Session, str]:
     folder.mkdir(parents=True, exist_ok=True)
     said = io.StringIO()
     one = Session(comm, Log(comm.rank, said), StopRequests(None, None, None), directory=folder, figure=False)
-    one.kernels_ready = one.blocks_ready = one.coupling_ready = True
+    one.ready |= {"", "blocks", "coupled"}
     session.enter(one)
     project = one.project()
     interpreter = one.interpreter = Interpreter(project)

@@ -69,7 +69,7 @@ def carry_out(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[str,
     os.chdir(job["folder"])
     told = io.StringIO()
     shared = watched(job)(
-        comm, Log(comm.rank, stream=told), StopRequests(), figure=False, kernels_ready=True
+        comm, Log(comm.rank, stream=told), StopRequests(), figure=False, ready={""}
     )  # fmt: skip
     failure, ours = None, False
     try:

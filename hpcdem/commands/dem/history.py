@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hpcdem.core.errors import CommandError
-from hpcdem.engine.output import HISTORIES
+from hpcdem.engine.output import followed
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 
@@ -16,7 +16,7 @@ DRAW_INTERVAL = 1000
 def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     """HIST: write `what` to hist_id_<id>.dat and hist_<id>.csv every `interval` steps. Collective.
 
-    what: one of output.HISTORIES, or of platens.OF_PARTS with the parts meant: ``gstress group a``, ``gstrain group
+    what: one of output.followed, or of platens.OF_PARTS with the parts meant: ``gstress group a``, ``gstrain group
     a|b``, ``ystress wall 3``, ``ystrain wall 0|3``; strains begin at 0 here.
     """
     if interval <= 0:
@@ -27,8 +27,8 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
         origin = OF_PARTS[name].begin(sim, what)
         if origin is not None:
             sim.history_origins[id] = origin
-    elif what not in HISTORIES:
-        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join((*HISTORIES, *OF_PARTS))}")
+    elif what not in followed(sim):
+        raise CommandError(f"HIST cannot follow {what}; it knows {', '.join((*followed(sim), *OF_PARTS))}")
     sim.history_wishes[id] = (interval, what)
 
 

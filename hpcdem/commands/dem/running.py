@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.engine import output
 from hpcdem.physics.dem import observe
@@ -109,6 +110,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
         sim.tables_changed()
         sim.look_soon()
     sim.refresh_tables()
+    check_time_step(sim)
 
 
 def _check_materials(sim: Simulation) -> None:

@@ -320,7 +320,7 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     ranks and threads. Collective.
     """
     p, w = sim.particles, sim.walls
-    columns = {name: p[name] for name in FIELDS}
+    columns = {name: p[name] for name in (*FIELDS, *p.extra)}
     if sim.closed:
         force = sim.lists.owned_forces()
         columns |= {name: force[:, k] for k, name in enumerate(("fx", "fy", "torque"))}
@@ -411,6 +411,7 @@ def frame(sim: Simulation) -> Frame:
     if sim.clumps:
         columns["clump"] = p.clump
         columns["clump_x"], columns["clump_y"] = sim.clumps.centres(p)
+    columns.update({name: p[name].copy() for name in p.extra})
     columns["color"], columns["group"] = p["color"].astype(np.int32), p["group"].astype(np.int32)
 
     out, iout = contact_rows(sim)

@@ -42,6 +42,7 @@ from hpcdem.physics.dem.particles import free_rows
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.simulation import Lattice, Simulation
 from hpcdem.physics.dem.walls import Walls
+from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime.checkpoints import newest_first
 
 
@@ -82,6 +83,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "lost": sim.lost,
         "rows": sim.rows,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
+        "physics": [[physics.name, physics.parameters()] for physics in sim.physics],
         "rebuilds": sim.rebuilds,
         "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
         "history_origins": {str(k): list(v) for k, v in sim.history_origins.items()},
@@ -96,7 +98,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
 def tables_of(sim: Simulation) -> dict[str, Table]:
     """The per-particle tables of the state, as slabs. Collective."""
     p = sim.particles
-    columns = {name: p[name].copy() for name in FIELDS}
+    columns = {name: p[name].copy() for name in (*FIELDS, *p.extra)}
     if sim.closed:
         force = sim.lists.owned_forces()
         for k, name in enumerate(("fx", "fy", "torque")):
@@ -121,6 +123,19 @@ def tables_of(sim: Simulation) -> dict[str, Table]:
         "wall_contacts": to_slabs(sim.comm, ("gid", "wall"), wall_contacts),
         **_clump_tables(sim),
     }
+
+
+def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
+    """Physics beside motion, by its name, with its parameters. CommandError for what there is not. Collective."""
+    if name not in PHYSICS:
+        raise CommandError(f"there is no physics '{name}'; there are {', '.join(PHYSICS)}")
+    sim.prepare_kernels(name)
+    kind: Any = PHYSICS[name]()
+    try:
+        physics = kind(**parameters)
+    except TypeError as error:
+        raise CommandError(f"{name}: {str(error).partition('() ')[2]}") from None
+    sim.add_physics(physics)
 
 
 CLUMP_STATE = {
@@ -242,6 +257,8 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[s
     sim.restart_step = sim.clock.step
     if sim.comm.rank == 0:
         sim.breaks[:] = state["breaks"]
+    for name, parameters in state.get("physics", []):
+        add_physics(sim, name, parameters)
     origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)
     sim.clumps = Clumps(**state.get("clumps", {}))
     if sim.clumps:
@@ -255,7 +272,7 @@ def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -
     """All particles and histories, on this rank; the first close shares them out. Returns their positions at the last
     rebuild (n, 2) [m]."""
     columns = dict(tables["particles"])
-    sim.particles.append(**{name: columns[name] for name in FIELDS})
+    sim.particles.append(**{name: columns[name] for name in (*FIELDS, *sim.particles.extra)})
     pairs, walls = tables["pairs"], tables["wall_contacts"]
     none = np.zeros(len(walls["gid"]), np.int64)
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])

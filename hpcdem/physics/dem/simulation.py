@@ -20,7 +20,7 @@ import numpy as np
 from hpcdem.core.cells import columns, keys
 from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.core.fields import CLUMP, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
+from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.core.timers import Timers
 from hpcdem.decomp import strips
@@ -38,6 +38,7 @@ from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.walls import Walls
+from hpcdem.physics.particle_physics import ParticlePhysics
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
@@ -84,8 +85,9 @@ class Simulation:
     comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
     stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
     draws: DRAW makes pictures; lost: particles that left the BOX so far; rows: first id of each row of GLINE and the
-    one after its last; fast: particles with a reach of their own in the lists (physics/dem/kernels/fast.py); energy:
-    the account of SET energy (budget.Budget), or None.
+    one after its last; physics: on the particles, beside their motion, in the order in which they act; fast: particles
+    with a reach of their own in the lists (physics/dem/kernels/fast.py); energy: the account of SET energy
+    (budget.Budget), or None.
     """
 
     def __init__(
@@ -108,6 +110,7 @@ class Simulation:
         self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
         self.number = 0  # of the simulations of a program, in the order in which they were made
+        self.prepare_kernels: Callable[[str], object] = lambda kind: None  # compiles those of added physics
         self.coupled = False  # to blocks, which step them both (physics/coupling)
         self.goes_on_with = "--resume"
         self.draws = False
@@ -125,6 +128,7 @@ class Simulation:
         self.clock = Clock()
         self.settings = Settings()
         self.particles = Particles()
+        self.physics: list[ParticlePhysics] = []
         self.materials = PropertyTable(MATERIAL)
         self.bond_types = PropertyTable(BOND_TYPE)
         self.walls = Walls()
@@ -206,6 +210,9 @@ class Simulation:
             self._forces()
         if self.energy is not None:
             self.energy.after_forces(self)
+        for physics in self.physics:
+            with timers(physics.name):
+                physics.advance(self)
         self.clock.tick()
         return request
 
@@ -279,6 +286,18 @@ class Simulation:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
         self.lattice.countdown = self.lattice.pace = 1
 
+    def add_physics(self, physics: ParticlePhysics) -> None:
+        """Take physics that act on the particles beside their motion (physics/particle_physics.py). CommandError if the
+        model has physics of this name, or fields of these names."""
+        known = {*FIELDS, *self.particles.extra}
+        taken = [name for name in physics.fields if name in known]
+        if taken or any(physics.name == other.name for other in self.physics):
+            raise CommandError(f"the model has {f'a field {taken[0]}' if taken else physics.name} already")
+        self.open()
+        self.particles.extend(physics.fields)
+        self.physics.append(physics)
+        self.tables_changed()
+
     # ---- open and closed -----------------------------------------------------------------------------------------
 
     @property
@@ -327,7 +346,7 @@ class Simulation:
         self._longest2 = self.lists.longest_bond2()
         self._hist = self.lists.histories(p.ihot)
         self.halo.close()
-        p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p))
+        p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p), p.more[p.owned])
         self.clumps.open()
         self._lists = None
 
@@ -395,9 +414,11 @@ class Simulation:
             storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads, lattice.columns)
             rigid = self.clumps.storage(p, order, self.halo, self.threads)
             clump = None if rigid is None else rigid.view(np.int64)[:, CLUMP].copy()
+            more = self.halo.storage(p.more[order]) if p.extra else np.empty((len(storage), 0))
         with self.timers("neighbour"):
             halo, hist = self.halo, self.hist
-            p.place(storage, take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads), halo.n_left, rigid)
+            cold = take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads)
+            p.place(storage, cold, halo.n_left, rigid, more)
             left, right = storage[: halo.n_left], storage[halo.n_left + p.n_own :]
             cell = np.concatenate([keys(left, lattice.side), cell, keys(right, lattice.side)])
             self.origin = p.positions()
@@ -582,7 +603,7 @@ class Simulation:
             migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
             leave = migration.leave
             hist = self.hist.take(leave)
-            rows = [p.hot[leave], p.cold[leave]] + ([p.rigid[leave]] if p.rigid is not None else [])
+            rows = [p.hot[leave], p.cold[leave], p.more[leave]] + ([p.rigid[leave]] if p.rigid is not None else [])
             arrived, counts, entries = migration.exchange(np.hstack(rows), hist.counts(), hist.rows)
             if not len(leave) and not len(arrived):
                 return cell
@@ -592,8 +613,10 @@ class Simulation:
             take_rows(p.hot, stay, hot[: len(stay)], self.threads)
             take_rows(p.cold, stay, cold[: len(stay)], self.threads)
             hot[len(stay) :], cold[len(stay) :] = arrived[:, :WIDTH], arrived[:, WIDTH : 2 * WIDTH]
-            rigid = None if p.rigid is None else np.concatenate([p.rigid[stay], arrived[:, 2 * WIDTH :]])
-            p.set_owned(hot, cold, rigid)
+            end = 2 * WIDTH + len(p.extra)
+            more = np.concatenate([p.more[stay], arrived[:, 2 * WIDTH : end]])
+            rigid = None if p.rigid is None else np.concatenate([p.rigid[stay], arrived[:, end:]])
+            p.set_owned(hot, cold, rigid, more)
             return np.concatenate([cell[stay], keys(arrived, side)])
 
     def broken(self) -> tuple[int, int]:
@@ -656,6 +679,8 @@ class Simulation:
             lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,
         )  # fmt: skip
         self._tables_stale = False
+        for physics in self.physics:
+            physics.prepare(self)
 
     def pressed(self) -> np.ndarray:
         """Forces (n_own, 2) [N] of PROP xp, yp on the owned particles: pressure 2 R thickness."""

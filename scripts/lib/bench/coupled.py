@@ -63,7 +63,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     from hpcdem.runtime.progress import BETWEEN
 
     shared = session.current()
-    shared.prepare_coupling()
+    shared.prepare("coupled")
     rehearse(job["threads"])
     both = make(shared.comm, job["threads"])
     both.advance(max(5, job["steps"] // 10))

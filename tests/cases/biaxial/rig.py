@@ -203,9 +203,7 @@ def serial(folder: Path) -> Iterator[None]:
 
     before = session._current
     session.enter(
-        session.Session(
-            SerialComm(), Log(0), StopRequests(None, None), directory=folder, figure=False, kernels_ready=True
-        )
+        session.Session(SerialComm(), Log(0), StopRequests(None, None), directory=folder, figure=False, ready={""})
     )
     try:
         yield

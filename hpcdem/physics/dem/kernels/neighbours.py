@@ -11,6 +11,7 @@ the rows before it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -250,6 +251,15 @@ class ContactLists:
     slot_side: np.ndarray
     new_side: np.ndarray
     n_pairs: int
+
+    def pieces(self) -> Iterator[tuple[np.ndarray, np.ndarray, int, int]]:
+        """Of each block: row and partner of its pair slots, its first owned storage row and the one after its last.
+
+        All pairs of a particle are in the piece that owns it, in one order for any ranks and threads."""
+        b = self.blocks
+        for t in range(self.n_blocks):
+            first, end = self.ptr[b.poff[t]], self.ptr[b.poff[t] + max(b.cut[t + 1] - b.lo[t], 0)]
+            yield self.row[first:end], self.partner[first:end], int(b.cut[t]), int(b.cut[t + 1])
 
     def __init__(self, n_left: int, n_own: int, blocks: Blocks) -> None:
         self.n_left, self.n_own, self.blocks = n_left, n_own, blocks

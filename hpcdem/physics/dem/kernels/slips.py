@@ -48,10 +48,8 @@ def found(
     """
     out = np.zeros(lists.n_own, np.int8)
     if chain is not None:
-        b = lists.blocks
-        for t in range(lists.n_blocks):
-            first, end = lists.ptr[b.poff[t]], lists.ptr[b.poff[t] + max(b.cut[t + 1] - b.lo[t], 0)]
-            _through_rows(first, end, lists.row, lists.partner, hot, origin, chain, lists.n_left, out)
+        for row, partner, _, _ in lists.pieces():
+            _through_rows(row, partner, hot, origin, chain, lists.n_left, out)
     if len(lists.slot_row):
         _through_walls(lists.slot_row, lists.slot_wall, hot, origin, ends, ways, lists.n_left, out)
     return out
@@ -78,8 +76,8 @@ def _gone(hot, origin, i):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _through_rows(first, end, row, partner, hot, origin, chain, n_left, out):
-    for k in range(first, end):
+def _through_rows(row, partner, hot, origin, chain, n_left, out):
+    for k in range(len(row)):
         i, j = row[k], partner[k]
         if np.isnan(chain[i, 0]) == np.isnan(chain[j, 0]):
             continue

@@ -1,0 +1,23 @@
+"""Physics on particles beside their motion."""
+
+from __future__ import annotations
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.dem import saving
+from hpcdem.physics.dem.simulation import Simulation
+
+
+def add(sim: Simulation, name: str, **parameters: float) -> None:
+    """Physics by its name in physics/particle_physics.py, from the next step on. CommandError for names and parameters
+    that there are not. Collective."""
+    saving.add_physics(sim, name, parameters)
+
+
+def check_time_step(sim: Simulation) -> None:
+    """CommandError if the time step is too large for the physics of the model; it is closed. Collective."""
+    for physics in sim.physics:
+        limit = physics.stable_time_step(sim)
+        if sim.clock.dt > limit:
+            raise CommandError(
+                f"the time step {sim.clock.dt:g} s is beyond the stability limit of {physics.name}, {limit:g} s"
+            )

@@ -1,0 +1,1 @@
+"""Heat that flows through the contacts of discs: the worked example of physics on particles."""
