@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -50,10 +50,12 @@ class Coupled:
     late: searches that came late.
     """
 
+    name: ClassVar[str] = "discs"  # as a surface load of the blocks
+
     def __init__(self, particles: Simulation, blocks: Blocks, friction: float | None = None) -> None:
         if friction is not None and not 0.0 <= friction < math.inf:
             raise CommandError(f"friction must be a number that is not negative, got {friction}")
-        if blocks.surface_loads is not None or particles.coupled:
+        if self.name in blocks.surface_loads or particles.coupled:
             raise CommandError("these blocks or particles are coupled already")
         self.particles, self.blocks = particles, blocks
         self.comm = particles.comm
@@ -73,7 +75,7 @@ class Coupled:
         self._settled = 0.0, 0.0, 0.0
         self._law_key: Any = None
         blocks.open_model()
-        blocks.surface_loads = self
+        blocks.surface_loads.add(self)
         particles.coupled = True
 
     # ---- one step ----------------------------------------------------------------------------------------------------
@@ -289,14 +291,14 @@ class Coupled:
         if self.link is not None and not self._asleep:
             self.link.apply(applied)
 
-    def made_anew(self) -> None:
+    def storage_rebuilt(self) -> None:
         """The storage of the blocks is another: find the places of the forces in it."""
         if self.link is not None and not self._asleep:
             self._changed |= not self._stepping
             self._connect()
             self._replay()
 
-    def meshed_anew(self) -> None:
+    def mesh_replaced(self) -> None:
         """The blocks are others: nothing touches."""
         if self.link is not None:
             self.link.close()
@@ -528,7 +530,7 @@ class Coupled:
     def begin_restore(self) -> None:
         """Both models are about to be replaced."""
         self._asleep = True
-        self.meshed_anew()
+        self.mesh_replaced()
 
     def end_restore(self, state: Mapping[str, Any], known: Touching) -> None:
         """They have been."""
@@ -543,8 +545,8 @@ class Coupled:
 
     def release(self) -> None:
         """Part the two again; both may go on alone. Not collective."""
-        self.meshed_anew()
-        self.blocks.surface_loads = None
+        self.mesh_replaced()
+        self.blocks.surface_loads.remove(self)
         self.particles.coupled = False
 
 

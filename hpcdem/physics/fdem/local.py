@@ -201,9 +201,8 @@ class Local:
         self.fading_begin = np.repeat(np.array([one.begin for one in parts]), each)[at]
         self.fading_span = np.repeat(np.array([one.span for one in parts]), each)[at]
         self.fading_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
-        if sim.surface_loads is not None:
-            self.special |= sim.surface_loads.corners(sim)
-        self.some_applied = sim.surface_loads is not None or sim.comm.any(len(i) > 0 or len(at) > 0)
+        sim.surface_loads.corners(sim, self.special)
+        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or len(at) > 0)
 
     def _make_nodes(self) -> None:
         """Nodes that do not move by themselves: of several corners, with conditions or loads, of quads."""
@@ -404,8 +403,7 @@ class Local:
                 now = np.where(self.fading_steps, float(clock.step), clock.time)
                 left = np.clip(1.0 - (now - self.fading_begin) / self.fading_span, 0.0, 1.0)
                 moving.fading(self.fading_corner, self.fading_x, self.fading_y, left, self.applied)
-            if sim.surface_loads is not None:
-                sim.surface_loads.add_to(self.applied)
+            sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
             if self.some_applied:

@@ -17,7 +17,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from hpcdem.physics.fdem.memories import Memories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
 from hpcdem.physics.fdem.scene import Fading, Numbers, Scene
+from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 from hpcdem.physics.fdem.tables import Value
 
 NARROW, WIDE = 0.1, 0.3
@@ -94,22 +95,6 @@ class Crack(NamedTuple):
     peak_kinetic: float = math.nan
 
 
-class SurfaceLoads(Protocol):
-    """Forces on free faces that others compute (hpcdem/physics/coupling): what the blocks ask of them."""
-
-    def corners(self, blocks: Any) -> np.ndarray:
-        """(n_own, 4) bool: corners of owned elements that may get such a force."""
-
-    def add_to(self, applied: np.ndarray) -> None:
-        """Add the present ones to what is applied to corners (n, 8), in storage order [N/m]. Not collective."""
-
-    def made_anew(self) -> None:
-        """The storage was made anew. Collective."""
-
-    def meshed_anew(self) -> None:
-        """There is another mesh."""
-
-
 class Core(Scene):
     """State, step and rebuild; `Blocks` adds the verbs. Every method is collective unless it says otherwise."""
 
@@ -124,7 +109,7 @@ class Core(Scene):
     memories: Memories
     local: Local
     halo: Any
-    surface_loads: SurfaceLoads | None
+    surface_loads: SurfaceLoads
     n_left: int
     n_own: int
     where: np.ndarray
@@ -150,7 +135,7 @@ class Core(Scene):
         self.balance_on = balance_on
         self.timers = Timers()
         self.halo = None
-        self.surface_loads: SurfaceLoads | None = None
+        self.surface_loads = SurfaceLoads()
         super().__init__()
         self.clear()
 
@@ -205,8 +190,7 @@ class Core(Scene):
 
     def _start_with(self, mesh: Mesh) -> None:
         self.release()
-        if self.surface_loads is not None:
-            self.surface_loads.meshed_anew()
+        self.surface_loads.mesh_replaced()
         self.closed = False
         self.lattice = Lattice()
         self.ownership = Ownership(self.comm, self.balance_on)
@@ -527,8 +511,7 @@ class Core(Scene):
                 self.lattice.age = self.lattice.stored = 0
                 self._note_time()
             self.rebuilds += 1
-        if self.surface_loads is not None:
-            self.surface_loads.made_anew()
+        self.surface_loads.storage_rebuilt()
 
     def _check_ready(self) -> None:
         """CommandError unless every element has a model."""
