@@ -489,7 +489,8 @@ class Maker:
             self.add(f"CYC {self.pick(self.whole(10, 90), self.whole(10, 90), 0, 1)}")
 
 
-EVENTS = ("rain", "delete", "bond", "bond", "prop", "move_a_wall", "break", "fix", "set", "new_wall", "row", "ball", "export",
+EVENTS = ("rain", "delete", "bond", "bond", "prop", "move_a_wall", "break", "fix", "set", "new_wall", "row", "ball",
+"export",
           "save", "draw", "clumps", "join", "platens", "log")  # fmt: skip
 
 
