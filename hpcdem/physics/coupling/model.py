@@ -19,6 +19,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, X, Y
+from hpcdem.core.rebuild import CheckInterval
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.physics.coupling import saving
 from hpcdem.physics.coupling.kernels import disc_faces
@@ -35,8 +36,6 @@ __all__ = ["Coupled"]
 
 ROOM = 0.5
 """How far discs and faces may go towards each other between two searches, over the largest radius."""
-LONGEST_WATCH = 64
-"""Most steps between two looks at how far they have gone."""
 SAFETY = 0.8
 """Part of the stability limit that is used."""
 ON_DISCS, ON_FACES = 0, 1
@@ -67,7 +66,7 @@ class Coupled:
         self._changed = True
         self._stepping = False
         self._inside = -1
-        self._countdown = self._pace = 1
+        self._check_interval = CheckInterval()
         self._bins = np.zeros((2, *BINS_SHAPE), np.int64)
         self._done = [0, 0]
         self._booked = 0
@@ -107,10 +106,10 @@ class Coupled:
         particles.close()
         blocks.close_model()
         self._stepping = False
-        self._countdown -= 1
+        due = self._check_interval.passed()
         if not self._link_holds():
             self._connect()
-        elif self._countdown <= 0 and self._look():
+        elif due and self._look():
             self._connect()
         self._interact()
         if books:
@@ -210,10 +209,7 @@ class Coupled:
         path_d, speed_d, path_b, speed_b = np.sqrt(found[:4]).tolist()
         room, stride = link.room - path_d - path_b, (speed_d + speed_b) * dt
         self.late += room < 0.0
-        wait = min(LONGEST_WATCH, 2 * self._pace)
-        if stride > 0.0:
-            wait = int(min(wait, 0.5 * max(room, 0.0) / stride))
-        self._pace = self._countdown = max(1, wait)
+        self._check_interval.wait(0.5 * max(room, 0.0) / stride if stride > 0.0 else math.inf)
         return room < 2.0 * stride
 
     # ---- forces ------------------------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.core.memory import aligned, take_rows
+from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
 from hpcdem.core.timers import Timers
 from hpcdem.decomp import strips
 from hpcdem.halo.comm import SerialComm
@@ -44,27 +45,15 @@ NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
 SHORT_LIVED, LONG_LIVED = 60, 200
 """Lists that lasted fewer steps call for the wide skin, more steps for the narrow one."""
-LONGEST_WATCH = 64
-"""Most steps between two looks at how far particles have moved."""
 EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
 
 
 @dataclass
-class Lattice:
-    """What the order of particles and the moment of the next rebuild depend on; global, saved in checkpoints.
+class Lattice(RebuildState):
+    """Skin over the largest radius; longest bond [m] as last seen; columns that partners may lie apart."""
 
-    side h of the cells [m], skin [m], longest bond [m] as last seen, steps since the lists were built, steps to the
-    next look at the motion, steps between the last two looks, lists that came late, columns partners may lie apart.
-    """
-
-    side: float = 0.0
-    skin: float = 0.0
     skin_factor: float = NARROW
     bond_reach: float = 0.0
-    age: int = 0
-    countdown: int = 1
-    pace: int = 1
-    late: int = 0
     columns: int = 1
 
 
@@ -193,9 +182,8 @@ class Simulation:
             if self._walls_move:
                 self.walls.move(self.clock.dt)
         self.lattice.age += 1
-        self.lattice.countdown -= 1
         stale = False
-        if self.lattice.countdown == 0:
+        if self.lattice.passed():
             with timers("reduce"):
                 stale, request = self._look()
         with timers("halo"):
@@ -262,10 +250,8 @@ class Simulation:
         stale = room < stride or found[5 + fast.DUE] > 0.0
         if stale:
             room = 0.5 * lattice.skin
-        wait = min(LONGEST_WATCH, 2 * lattice.pace, fast.wait(room, stride, fall))
-        if not stale and found[5 + fast.HURRY] > 0.0:
-            wait = min(wait, 1.0 / found[5 + fast.HURRY])
-        lattice.pace = lattice.countdown = max(1, int(wait))
+        hurry = 0.0 if stale else found[5 + fast.HURRY]
+        lattice.wait(fast.wait(room, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
         return stale, int(found[4])
 
     def _look_at_fast(self, fall: float, found: np.ndarray) -> None:
@@ -284,7 +270,7 @@ class Simulation:
 
     def look_soon(self) -> None:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
-        self.lattice.countdown = self.lattice.pace = 1
+        self.lattice.soon()
 
     def add_physics(self, physics: ParticlePhysics) -> None:
         """Take physics that act on the particles beside their motion (physics/particle_physics.py). CommandError if the
@@ -471,10 +457,8 @@ class Simulation:
         first_class = self._first_fast_class(limit)
         if first_class is not None:
             lattice.skin_factor = NARROW if fast.LIFE / 2**first_class >= SHORT_LIVED else WIDE
-        elif 0 < lattice.age < SHORT_LIVED:
-            lattice.skin_factor = WIDE
-        elif lattice.age > LONG_LIVED:
-            lattice.skin_factor = NARROW
+        else:
+            lattice.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
         lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
         side = 2.0 * self.largest_radius + lattice.skin
         while 0.0 < side < max(lattice.bond_reach + lattice.skin, 1.000001 * self.clumps.reach):
@@ -535,7 +519,7 @@ class Simulation:
         pace = np.append(rows[:, 3], limit * 2.0**first_class)
         fall = 2.0 * gravity * dt * dt
         wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(room, pace, strict=True))
-        lattice.pace = lattice.countdown = max(1, min(lattice.countdown, int(min(wait, LONGEST_WATCH))))
+        lattice.pace = lattice.countdown = max(1, min(lattice.countdown, int(min(wait, LONGEST_WAIT))))
 
     def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
         """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;

@@ -25,6 +25,7 @@ from hpcdem.core.cells import columns, keys
 from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.memory import aligned
+from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
 from hpcdem.core.timers import Timers
 from hpcdem.decomp import strips
 from hpcdem.halo.comm import SerialComm
@@ -49,8 +50,6 @@ ROOM = 0.6
 """How far elements may go, both together, before storage and ghosts are made anew; over the mean edge."""
 SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
-LONGEST_WATCH = 64
-"""Most steps between two looks at how far elements have moved."""
 OLDEST = 2000
 """Storage is made anew at this age even if nobody moved, so that borders can follow the load."""
 AUTO = 100
@@ -58,23 +57,14 @@ AUTO = 100
 
 
 @dataclass
-class Lattice:
-    """What ownership and the next rebuild depend on; global, saved in checkpoints.
-
-    side of the cells [m]; skin: buffer of the contact search [m]; age: of the contact lists, stored: of the storage, in
-    steps; steps to the next look, steps between the last two looks, lists that came late; dt: time step of the dynamic
-    mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were made; dt
-    is the same since then.
+class Lattice(RebuildState):
+    """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
+    dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
+    made; dt is the same since then.
     """
 
-    side: float = 0.0
-    skin: float = 0.0
     skin_factor: float = NARROW
-    age: int = 0
     stored: int = 0
-    countdown: int = 1
-    pace: int = 1
-    late: int = 0
     dt: float = 0.0
     estimated: int = 0
     step: int = 0
@@ -241,7 +231,7 @@ class Core(Scene):
         self._topology_stale |= topology
         if topology:
             self._closed = None
-        self.lattice.countdown = self.lattice.pace = 1
+        self.lattice.soon()
         if stiffness:
             self.lattice.dt = 0.0
 
@@ -287,9 +277,8 @@ class Core(Scene):
             self.clock.time += self.clock.dt
         lattice.age += 1
         lattice.stored += 1
-        lattice.countdown -= 1
         stale = outdated = False
-        if lattice.countdown == 0:
+        if lattice.passed():
             with timers("reduce"):
                 try:
                     stale, outdated, request = self._look()
@@ -340,9 +329,7 @@ class Core(Scene):
             self._stop_on_runaway(bool(broken), bool(inverted))
         self.local.tally[:, elements.NEW_YIELDED] = 0
         stale, outdated = breaks > 0.0, lattice.stored >= OLDEST
-        wait = min(LONGEST_WATCH, 2 * lattice.pace)
-        if yields > 0.0:
-            wait = min(wait, LONGEST_WATCH // 4)  # a joint may be about to break
+        wait = float(LONGEST_WAIT // 4 if yields > 0.0 else LONGEST_WAIT)  # a joint may be about to break
         if self.options.collision:
             room = 0.5 * lattice.skin - math.sqrt(path2)
             lattice.late += room < 0.0
@@ -352,8 +339,8 @@ class Core(Scene):
             if stale or outdated:
                 room = 0.5 * lattice.skin
             if stride > 0.0:
-                wait = min(wait, int(0.5 * room / stride))
-        lattice.pace = lattice.countdown = max(1, wait)
+                wait = min(wait, 0.5 * room / stride)
+        lattice.wait(wait)
         return bool(stale), bool(outdated), int(request)
 
     def _stop_on_runaway(self, broken: bool, inverted: bool) -> None:
@@ -460,10 +447,7 @@ class Core(Scene):
     def _skin(self) -> float:
         """Buffer of the next contact lists [m], from global values only."""
         lattice = self.lattice
-        if 0 < lattice.age < SHORT_LIVED:
-            lattice.skin_factor = WIDE
-        elif lattice.age > LONG_LIVED:
-            lattice.skin_factor = NARROW
+        lattice.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
         return lattice.skin_factor * self._mean_edge
 
     def _collect_events(self) -> None:

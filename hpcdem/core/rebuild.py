@@ -1,0 +1,51 @@
+"""When lists have to be built again: what that depends on in every physics, and the steps between two checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LONGEST_WAIT = 64
+"""Most steps between two checks of how far anyone has gone."""
+
+
+@dataclass
+class CheckInterval:
+    """countdown: steps to the next check; pace: steps between the last two. Global, saved in checkpoints."""
+
+    countdown: int = 1
+    pace: int = 1
+
+    def passed(self) -> bool:
+        """One step more; whether a check is due."""
+        self.countdown -= 1
+        return self.countdown <= 0
+
+    def wait(self, *limits: float) -> None:
+        """The next check comes after at most so many steps, at least one, and at most twice the last wait."""
+        self.pace = self.countdown = max(1, int(min(LONGEST_WAIT, 2 * self.pace, *limits)))
+
+    def soon(self) -> None:
+        """Check at the next step: speeds or the time step were changed by a command."""
+        self.countdown = self.pace = 1
+
+
+@dataclass
+class RebuildState(CheckInterval):
+    """What the next rebuild depends on; from global values only, part of every checkpoint.
+
+    side of the cells [m]; skin: buffer of the search [m], skin_factor: over a length of the model; age of the lists in
+    steps; late: lists that came late.
+    """
+
+    side: float = 0.0
+    skin: float = 0.0
+    skin_factor: float = 0.0
+    age: int = 0
+    late: int = 0
+
+    def adapt_skin(self, narrow: float, wide: float, short: int, long: int) -> None:
+        """Lists that lasted fewer steps than `short` call for the wide skin, more than `long` for the narrow one."""
+        if 0 < self.age < short:
+            self.skin_factor = wide
+        elif self.age > long:
+            self.skin_factor = narrow
