@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
-from hpcdem.runtime import doctor, ending, launch, run_folder, speed
+from hpcdem.runtime import doctor, launch, run_folder, shutdown, speed
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
     from hpcdem.halo.comm import SerialComm
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.reproducing import Reproduction
-    from hpcdem.runtime.stopping import StopRequests
+    from hpcdem.runtime.reproducibility import Reproduction
+    from hpcdem.runtime.stop_requests import StopRequests
 
 
 @dataclass
@@ -256,8 +256,8 @@ def greet(
     places = comm.allgather(launch.place(cores_before, threads))
     library = launch.mpi_library() if comm.mpi is not None else None
     log.info(launch.start_report(places, library))
-    scene = doctor.Scene(places, comm.rank, launch.launcher(), library, directory=outdir or Path())
-    for warning in warnings + doctor.start_warnings(scene, comm):
+    machine = doctor.Machine(places, comm.rank, launch.launcher(), library, directory=outdir or Path())
+    for warning in warnings + doctor.start_warnings(machine, comm):
         log.warn(warning)
 
 
@@ -292,7 +292,7 @@ def _open(threads: int | None) -> Session:
         count, warnings = launch.prepare_environment(threads or launch.threads_by_default())
         comm = launch.start_mpi()
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.stopping import AUTOSAVE, StopRequests, slurm_end_time
+    from hpcdem.runtime.stop_requests import AUTOSAVE, StopRequests, slurm_end_time
 
     log = Log(comm.rank)
     greet(comm, log, cores_before, count, warnings)
@@ -307,13 +307,13 @@ def _open(threads: int | None) -> Session:
 
 def _watch_the_end(session: Session) -> None:
     """An uncaught error ends all ranks as it does in the program hpcdem; at a good end, simulations are finished."""
-    channel = ending.private_channel(session.comm)
+    channel = shutdown.private_channel(session.comm)
     usual = sys.excepthook
     done: list[bool] = []
 
-    def end(failure: ending.Failure | None) -> int:
+    def end(failure: shutdown.Failure | None) -> int:
         done.append(True)
-        code = ending.end_mpi(ending.come_together(session.comm, channel, failure))
+        code = shutdown.end_mpi(shutdown.come_together(session.comm, channel, failure))
         enter(None)
         return code
 
@@ -322,7 +322,7 @@ def _watch_the_end(session: Session) -> None:
             usual(kind, error, trace)
             return
         session.close(error)
-        sys.exit(end(ending.describe(error)))
+        sys.exit(end(shutdown.describe(error)))
 
     def at_exit() -> None:
         if done:
@@ -330,7 +330,7 @@ def _watch_the_end(session: Session) -> None:
         try:
             session.close()
         except Exception as error:  # a full disk, a missing matplotlib: the code of the process is settled already
-            end(ending.describe(error))
+            end(shutdown.describe(error))
         else:
             end(None)
 

@@ -18,7 +18,7 @@ from hpcdem.cli.common import HELP, messages_only, read_command_line, run_progra
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.errors import EXIT_OK
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 from hpcdem.session import Session, greet, prepare
 
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
@@ -67,7 +67,7 @@ def main() -> NoReturn:
 
     def work() -> None:
         from hpcdem.runtime.progress import Log
-        from hpcdem.runtime.stopping import StopRequests, slurm_end_time
+        from hpcdem.runtime.stop_requests import StopRequests, slurm_end_time
 
         log = Log(comm.rank)
         if not options.check:
@@ -80,7 +80,7 @@ def main() -> NoReturn:
         )  # fmt: skip
         run(session, options)
 
-    ending.leave(ending.run_together(comm, work))
+    shutdown.leave(shutdown.run_together(comm, work))
 
 
 def run_warmup(words: list[str]) -> NoReturn:

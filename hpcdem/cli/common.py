@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -40,7 +40,7 @@ def messages_only() -> Iterator[None]:
     try:
         yield
     except HpcdemError as error:
-        click.echo(ending.describe(error).text, err=True)
+        click.echo(shutdown.describe(error).text, err=True)
         sys.exit(error.exit_code)
 
 
@@ -59,4 +59,4 @@ def run_program(
 
         work(comm, Log(comm.rank), options)
 
-    ending.leave(ending.run_together(comm, together))
+    shutdown.leave(shutdown.run_together(comm, together))

@@ -9,7 +9,7 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
 from hpcdem.core.errors import UsageError
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 from hpcdem.session import Session, enter
 
 
@@ -32,7 +32,7 @@ def start(words: list[str]) -> NoReturn:
         from hpcdem.lang.pcdc.execute import Interpreter
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.run_folder import Job
-        from hpcdem.runtime.stopping import StopRequests
+        from hpcdem.runtime.stop_requests import StopRequests
 
         if comm.size > 1:
             raise UsageError(f"hpcdem console is for one rank, this are {comm.size}; a script runs on many")
@@ -57,4 +57,4 @@ def start(words: list[str]) -> NoReturn:
             raise
         session.close()
 
-    ending.leave(ending.run_together(comm, work))
+    shutdown.leave(shutdown.run_together(comm, work))

@@ -11,13 +11,13 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
 from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from hpcdem.halo.comm import SerialComm
-    from hpcdem.runtime.doctor import Finding, Scene
+    from hpcdem.runtime.doctor import Finding
 
 STYLES = {"OK": "green", "WARNING": "yellow", "PROBLEM": "bold red"}
 
@@ -44,11 +44,16 @@ def start(words: list[str], cores_before: int) -> NoReturn:
         comm, refusal = communicator()
 
     def work() -> None:
-        code = report(examine(comm, scene(comm, options["directory"], cores_before, threads, refusal)), sys.stdout)
+        from hpcdem.runtime.doctor import Machine, examine
+
+        places = comm.allgather(launch.place(cores_before, threads))
+        library = launch.mpi_library() if comm.mpi is not None or "mpi4py.MPI" in sys.modules else None
+        machine = Machine(places, comm.rank, launch.launcher(), library, refusal, options["directory"])
+        code = report(examine(machine, comm), sys.stdout)
         if comm.bcast(code) != EXIT_OK:
             sys.exit(code)
 
-    ending.leave(ending.run_together(comm, work))
+    shutdown.leave(shutdown.run_together(comm, work))
 
 
 def communicator() -> tuple[SerialComm, str]:
@@ -61,25 +66,6 @@ def communicator() -> tuple[SerialComm, str]:
         from hpcdem.halo.comm import SerialComm
 
         return SerialComm(), str(error)
-
-
-def scene(comm: SerialComm, directory: Path, cores_before: int, threads: int, refusal: str = "") -> Scene:
-    """Collective: what there is to look at."""
-    from hpcdem.post.movie import ffmpeg
-    from hpcdem.runtime.doctor import Scene
-
-    places = comm.allgather(launch.place(cores_before, threads))
-    begun = comm.mpi is not None or "mpi4py.MPI" in sys.modules
-    return Scene(
-        places, comm.rank, launch.launcher(), launch.mpi_library() if begun else None, refusal, directory, ffmpeg=ffmpeg
-    )
-
-
-def examine(comm: SerialComm, seen: Scene) -> list[Finding]:
-    """Collective: all findings, on rank 0."""
-    from hpcdem.runtime.doctor import examine as examined
-
-    return examined(seen, comm)
 
 
 def report(findings: Sequence[Finding], stream: TextIO) -> int:

@@ -15,7 +15,7 @@ from hpcdem.cli.common import HELP, PATH
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
 from hpcdem.runtime.run_folder import Job, claim
-from hpcdem.runtime.stopping import AUTOSAVE
+from hpcdem.runtime.stop_requests import AUTOSAVE
 from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hpcdem.lang.zdem.parser import Script
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.reproducing import Reproduction
+    from hpcdem.runtime.reproducibility import Reproduction
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ def planned_steps(script: Script, position: int, sim: Simulation) -> tuple[int, 
 
 def reproduction(session: Session, options: Options) -> Reproduction | None:
     """Collective: what --check-reproducible and --against ask for."""
-    from hpcdem.runtime.reproducing import Reproduction, read
+    from hpcdem.runtime.reproducibility import Reproduction, read
 
     if options.check_reproducible is None:
         if options.against is not None:
@@ -312,7 +312,7 @@ def saved_script(comm: SerialComm, folder: Path) -> bytes:
 
 def time_limit(context: click.Context, option: click.Parameter, value: str | None) -> float | None:
     """Seconds of HH:MM:SS; of `--autosave off` none."""
-    from hpcdem.runtime.stopping import parse_limit
+    from hpcdem.runtime.stop_requests import parse_limit
 
     if option.name == "autosave" and value == "off":
         return None

@@ -146,7 +146,7 @@ def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool
     return path
 
 
-def write_last_words(sim: Simulation) -> None:
+def write_crash_frame(sim: Simulation) -> None:
     """A frame of a state that makes no sense any more, for the user to look at."""
     with np.errstate(all="ignore"):
         sim.refresh_tables()

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.runtime import cgroups
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -101,17 +102,11 @@ def threads_by_default(as_zdem: bool = False) -> int:
 def physical_cores(root: str = "/") -> int:
     """The physical cores that this process may use: of its mask, two threads of a core being one, and no more than a
     control group allows it time for. root: where proc and sys are."""
-    from hpcdem.runtime.doctor import cgroups
-    from hpcdem.runtime.doctor.scene import Scene
-
     found = set()
     for cpu in os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1):
-        topology = Path(root, f"sys/devices/system/cpu/cpu{cpu}/topology/thread_siblings_list")
-        try:
-            found.add(topology.read_text(encoding="ascii").strip())
-        except (OSError, ValueError):
-            found.add(str(cpu))
-    quota = cgroups.cpu_quota(Scene([], root=Path(root)))
+        siblings = cgroups.read(Path(root, f"sys/devices/system/cpu/cpu{cpu}/topology/thread_siblings_list"))
+        found.add(siblings.strip() or str(cpu))
+    quota = cgroups.cpu_quota(Path(root))
     return max(1, len(found) if quota is None else min(len(found), round(quota)))
 
 
@@ -210,7 +205,7 @@ def start_mpi() -> SerialComm:
     try:
         import mpi4py
 
-        # One thread calls MPI, so MPI can leave its locks out; the exit is ours (runtime.ending).
+        # One thread calls MPI, so MPI can leave its locks out; the exit is ours (runtime.shutdown).
         mpi4py.rc.thread_level = "funneled"
         mpi4py.rc.finalize = False
         from mpi4py import MPI

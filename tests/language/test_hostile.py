@@ -223,7 +223,7 @@ def test_there_are_enough_of_them():
 ON_RANKS = """
 import json, sys
 from pathlib import Path
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 launch.prepare_environment(1)
 comm = launch.start_mpi()
 sys.path[:0] = [{root!r}, {here!r}]
@@ -245,7 +245,7 @@ def work():
     if comm.rank == 0:
         Path("told.json").write_text(json.dumps(told))
 
-ending.leave(ending.run_together(comm, work))
+shutdown.leave(shutdown.run_together(comm, work))
 """
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 def main() -> None:
     """One rank of it."""
-    from hpcdem.runtime import ending, launch
+    from hpcdem.runtime import launch, shutdown
 
     launch.prepare_environment(1)
     comm = launch.start_mpi()
@@ -21,7 +21,7 @@ def main() -> None:
         bench((folder / "script.sc").read_text())
         bench.interpreter.at_the_end()
 
-    ending.leave(ending.run_together(comm, work))
+    shutdown.leave(shutdown.run_together(comm, work))
 
 
 if __name__ == "__main__":

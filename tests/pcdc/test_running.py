@@ -7,7 +7,7 @@ import csv
 import pytest
 
 from hpcdem.core.errors import HpcdemError, PhysicsError, StoppedWithCheckpoint
-from hpcdem.runtime.stopping import STOP
+from hpcdem.runtime.stop_requests import STOP
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right\n"
 

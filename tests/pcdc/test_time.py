@@ -11,7 +11,7 @@ import pytest
 from hpcdem.commands.fdem import saving
 from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
 from hpcdem.physics.fdem.model import Blocks
-from hpcdem.runtime.stopping import STOP
+from hpcdem.runtime.stop_requests import STOP
 from tests.pcdc.fake import Bench, Noted
 from tests.pcdc.test_running import Asked
 

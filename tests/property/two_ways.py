@@ -26,7 +26,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.runtime.progress import Log
-from hpcdem.runtime.stopping import StopRequests
+from hpcdem.runtime.stop_requests import StopRequests
 from hpcdem.session import Session
 
 BLOCKS, PARTICLES, COUPLED = "blocks", "particles", "coupled"
@@ -617,7 +617,7 @@ def digests(kind: str, first: int, last: int, folder: Path, comm: Any = None) ->
 
 def main() -> None:
     """`mpiexec -n N python two_ways.py KIND FIRST LAST FOLDER`: digests as JSON, on any number of ranks."""
-    from hpcdem.runtime import ending, launch
+    from hpcdem.runtime import launch, shutdown
 
     kind, first, last, folder = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4])
     launch.prepare_environment(1)
@@ -625,7 +625,7 @@ def main() -> None:
     found = digests(kind, first, last, folder, comm)
     if comm.rank == 0:
         (folder / "digests.json").write_text(json.dumps(found))
-    ending.leave(ending.Ending(rank=comm.rank))
+    shutdown.leave(shutdown.ExitStatus(rank=comm.rank))
 
 
 if __name__ == "__main__":

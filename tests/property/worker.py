@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 
 AT_ONCE = 20.0
 """Seconds in which all ranks must fail if one does: a busy machine is no reason to call an error a lonely one."""
@@ -30,8 +30,8 @@ def main() -> None:
     """Until the other end hangs up."""
     launch.prepare_environment(1)
     comm = launch.start_mpi()
-    ending.GRACE = AT_ONCE
-    knock = ending.private_channel(comm)
+    shutdown.GRACE = AT_ONCE
+    channel = shutdown.private_channel(comm)
     with socket.socket(socket.AF_UNIX) as line:
         line.connect(sys.argv[1])
         with line.makefile("rw", encoding="utf-8") as talk:
@@ -44,8 +44,8 @@ def main() -> None:
             say({"pid": os.getpid()})
             for words in talk:
                 job = json.loads(words)
-                say(TASKS[job["task"]](comm, knock, job, say))
-    ending.leave(ending.Ending(rank=comm.rank))
+                say(TASKS[job["task"]](comm, channel, job, say))
+    shutdown.leave(shutdown.ExitStatus(rank=comm.rank))
 
 
 def get_ready(comm: Any) -> None:
@@ -59,12 +59,12 @@ def get_ready(comm: Any) -> None:
 # ---- a script --------------------------------------------------------------------------------------------------------
 
 
-def carry_out(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
+def carry_out(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
     """Run job["script"] in job["folder"]; then, if job["again"] names a checkpoint, restore it and save it again."""
     from hpcdem.cli.run import Options, run
     from hpcdem.core.errors import HpcdemError
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.stopping import StopRequests
+    from hpcdem.runtime.stop_requests import StopRequests
 
     os.chdir(job["folder"])
     told = io.StringIO()
@@ -77,12 +77,12 @@ def carry_out(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[str,
         if job.get("again"):
             save_again(comm, job["again"])
     except BaseException as error:
-        failure, ours = ending.describe(error), not isinstance(error, HpcdemError)
+        failure, ours = shutdown.describe(error), not isinstance(error, HpcdemError)
     answer = {
         "code": failure.code if failure else 0, "text": failure.text if failure else "", "ours": ours,
         "told": [row for row in told.getvalue().splitlines() if TOLD.match(row)], "seen": shared.seen(),
     }  # fmt: skip
-    if knock is not None and not ending.all_arrive(knock, failure):
+    if channel is not None and not shutdown.all_arrive(channel, failure):
         say(answer | {"alone": True})
         comm.abort(1)
     return answer
@@ -146,7 +146,7 @@ def prepare_accident(sim: Any, kind: str) -> None:
             case "dies":
                 os.kill(os.getpid(), signal.SIGKILL)
             case "alone":
-                ending.GRACE = 1.0
+                shutdown.GRACE = 1.0
                 raise CommandError("this rank has something against it")
             case "leaves a file":
                 Path("data").mkdir(exist_ok=True)
@@ -160,7 +160,7 @@ def prepare_accident(sim: Any, kind: str) -> None:
 # ---- a checkpoint ----------------------------------------------------------------------------------------------------
 
 
-def read_damaged(comm: Any, knock: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
+def read_damaged(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
     """Read a checkpoint after each of job["damages"], lists of (place, byte to put in), or a new length.
 
     Answers with one word each: "same", "refused", "changed", or what was raised.

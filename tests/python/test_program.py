@@ -82,7 +82,7 @@ def test_an_error_of_one_rank_ends_all(launch: Launcher, tmp_path: Path, how: st
     start = launch if how == "hpcdem" else launch.python
     done = start(3, "study.py", cwd=tmp_path, timeout=120)
     assert done.returncode != 0
-    assert "IndexError" in done.stderr and "study.py" in done.stderr and "runtime/ending" not in done.stderr
+    assert "IndexError" in done.stderr and "study.py" in done.stderr and "runtime/shutdown" not in done.stderr
 
 
 def test_the_traceback_of_a_users_error_begins_in_the_program(launch: Launcher, tmp_path: Path) -> None:

@@ -239,9 +239,10 @@ def test_the_report_is_one_line():
 def start_warnings(places: list[Place], environ: dict[str, str]) -> list[str]:
     """What the log says on a machine where nothing else is wrong (for that see test_doctor)."""
     nowhere = Path("/nowhere")
-    scene = doctor.Scene(places, environ={"NUMBA_CACHE_DIR": "/nowhere", **environ}, root=nowhere)
-    scene.limits = lambda number: (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-    return doctor.start_warnings(scene, SerialComm())
+    machine = doctor.Machine(places, environ={"NUMBA_CACHE_DIR": "/nowhere", **environ}, root=nowhere)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(resource, "getrlimit", lambda number: (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        return doctor.start_warnings(machine, SerialComm())
 
 
 def test_a_good_launch_has_no_warnings():
@@ -285,12 +286,12 @@ def test_a_batch_script_without_srun_is_left_alone():
 @pytest.mark.mpi
 def test_all_ranks_see_each_other(launch):
     program = (
-        "from hpcdem.runtime import ending, launch\n"
+        "from hpcdem.runtime import launch, shutdown\n"
         "comm = launch.start_mpi()\n"
         "places = comm.allgather(launch.place(launch.cores(), 1))\n"
         "launch.patient_barrier(comm)\n"
         "comm.rank or print(launch.start_report(places, launch.mpi_library()))\n"
-        "ending.leave(ending.Ending())\n"
+        "shutdown.leave(shutdown.ExitStatus())\n"
     )
     done = launch.python(3, "-c", program, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -206,7 +206,7 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(
         "import sys\n"
-        "from hpcdem.runtime import ending, launch, warmup\n"
+        "from hpcdem.runtime import launch, shutdown, warmup\n"
         "from hpcdem.runtime.progress import Log\n"
         "comm = launch.start_mpi()\n"
         "def warm():\n"
@@ -217,7 +217,7 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
         "    import kernels_of_a_test as k\n"
         "    hits = sum(k.twice.stats.cache_hits.values())\n"
         "    sys.stdout.write(f'rank {comm.rank} hits {hits}\\n')\n"
-        "ending.leave(ending.run_together(comm, work))\n"
+        "shutdown.leave(shutdown.run_together(comm, work))\n"
     )
     env = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for hits in ((0, 1, 1), (1, 1, 1)):

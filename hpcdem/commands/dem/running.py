@@ -404,7 +404,7 @@ def _run(sim: Simulation) -> None:
                 _answer(sim, request)
     except PhysicsError:
         sim.timers.count(clock.step - counted, len(sim.particles))
-        output.write_last_words(sim)
+        output.write_crash_frame(sim)
         raise
     finally:
         output.wait_for_disk()

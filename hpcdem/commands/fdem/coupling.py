@@ -140,7 +140,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
         yield
         project.due.finish()
     except PhysicsError:
-        output.write_last_words(sim)
+        output.write_crash_frame(sim)
         raise
     finally:
         output.wait_for_disk()

@@ -14,7 +14,7 @@ from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, Sto
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem.solving import RATIO, Watch
 from hpcdem.runtime.progress import duration, rate
-from hpcdem.runtime.stopping import STOP
+from hpcdem.runtime.stop_requests import STOP
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.model import Blocks

@@ -313,7 +313,7 @@ class Interpreter:
 
     def _agree(self, index: int, told: str) -> int:
         """Collective: all ranks are at this command with these values, or all raise ScriptError. Returns what was asked
-        from outside a while ago (runtime.stopping), the same on all ranks."""
+        from outside a while ago (runtime.stop_requests), the same on all ranks."""
         comm, stop = self.project.comm, self.project.blocks.stop
         asked = stop.overdue_request() if stop is not None else 0
         if comm.size == 1:

@@ -255,7 +255,7 @@ class Core(Scene):
     def step(self) -> int:
         """Advance everything by one dt. The same text on one rank and on a thousand.
 
-        Returns what the outside asked for (0 nothing; else see runtime.stopping), agreed by all ranks.
+        Returns what the outside asked for (0 nothing; else see runtime.stop_requests), agreed by all ranks.
         """
         self.close_model()
         self.check_start()

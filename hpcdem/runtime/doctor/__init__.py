@@ -1,145 +1,119 @@
 """What is wrong with a place before a run finds out: `hpcdem doctor`, and the warnings at the start of a run.
 
-One table of checks drives both. A check is a function of a `Scene` that yields findings; those that cost next to
-nothing and write no file are made at every start, and what they find goes into the log. Checks of the job look at all
+One table of checks drives both. A check is a function of a `Machine` that yields findings; those that cost next to
+nothing and write no file are made at every start, and what is wrong goes into the log. Checks of the job look at all
 ranks and are made by rank 0; those of each host by its first rank.
 """
 
 from __future__ import annotations
 
-import importlib
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple
 
-from hpcdem.runtime.doctor.findings import Finding, Found, Level, merged, problem, warning
-from hpcdem.runtime.doctor.scene import Scene
+from hpcdem.runtime.doctor import host, software, storage
+from hpcdem.runtime.doctor.machine import Finding, Findings, Level, Machine, warning
+from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
 
-__all__ = ["CHECKS", "Check", "Finding", "Level", "Scene", "examine", "look", "start_warnings"]
+__all__ = ["CHECKS", "Check", "Finding", "Level", "Machine", "examine", "start_warnings"]
 
 
-@dataclass(frozen=True)
-class Check:
-    """name: `module.function` of this package, loaded when it is needed; at_start: also at the start of every run."""
+class Check(NamedTuple):
+    """each_host: by the first rank of every host, not only by rank 0; at_start: also when a run starts."""
 
-    name: str
+    function: Callable[[Machine], Findings]
     each_host: bool = False
     at_start: bool = False
 
-    def look(self, scene: Scene) -> Iterator[Finding]:
-        """What it finds."""
-        module, _, function = self.name.partition(".")
-        look = getattr(importlib.import_module(f"hpcdem.runtime.doctor.{module}"), function)
-        yield from cast(Callable[[Scene], Iterable[Finding]], look)(scene)
-
 
 CHECKS = (
-    Check("software.python", each_host=True),
-    Check("software.packages", each_host=True),
-    Check("software.imports", each_host=True),
-    Check("mpi.library"),
-    Check("mpi.trial"),
-    Check("cores.crowded", at_start=True),
-    Check("cores.narrowed", at_start=True),
-    Check("cores.of_a_job_step", at_start=True),
-    Check("cores.quota", each_host=True, at_start=True),
-    Check("cores.mapping"),
-    Check("host.memory", each_host=True, at_start=True),
-    Check("host.memory_said", each_host=True),
-    Check("slurm.end_of_job"),
-    Check("slurm.cores_of_srun"),
-    Check("slurm.mpi_type"),
-    Check("software.hdf5"),
-    Check("storage.locking_of_hdf5", at_start=True),
-    Check("storage.kind"),
-    Check("storage.free_space", at_start=True),
-    Check("storage.results"),
-    Check("storage.future_files"),
-    Check("storage.temporary", each_host=True),
-    Check("kernels.not_ours_alone", each_host=True, at_start=True),
-    Check("kernels.cache", each_host=True),
-    Check("kernels.threads", each_host=True),
-    Check("host.shell_limits", each_host=True, at_start=True),
-    Check("host.shell_limits_said", each_host=True),
-    Check("host.clocks", at_start=True),
-    Check("host.text", at_start=True),
-    Check("software.figures"),
-    Check("software.petsc"),
+    Check(software.packages, each_host=True),
+    Check(software.libraries, each_host=True),
+    Check(software.mpi_library),
+    Check(software.mpi_launcher),
+    Check(host.oversubscribed, each_host=True, at_start=True),
+    Check(host.narrowed, at_start=True),
+    Check(host.cpu_quota, each_host=True, at_start=True),
+    Check(host.mapping),
+    Check(host.memory, each_host=True, at_start=True),
+    Check(host.srun_cores, at_start=True),
+    Check(host.sbatch_cores),
+    Check(host.slurm_end),
+    Check(software.slurm_mpi_type),
+    Check(storage.hdf5_locks, at_start=True),
+    Check(storage.in_memory),
+    Check(storage.free_space, at_start=True),
+    Check(storage.results),
+    Check(storage.shared, each_host=True),
+    Check(storage.quota),
+    Check(storage.temporary, each_host=True),
+    Check(storage.cache_owner, each_host=True, at_start=True),
+    Check(storage.cache, each_host=True),
+    Check(software.threads, each_host=True),
+    Check(host.shell_limits, each_host=True, at_start=True),
+    Check(host.clocks),
+    Check(host.text, at_start=True),
+    Check(software.petsc),
 )
 
+Found = list[tuple[int, bool, Finding]]
+"""What one rank found: the number of the check, which orders them, whether it is made on each host, and the finding."""
 
-SOON = 5.0
-"""Seconds until a new file is seen by all: network file systems remember for a while that it was not there."""
 
-
-def look(scene: Scene, at_start: bool = False) -> Found:
-    """What this rank finds: checks of the job if it is rank 0, those of the host if it is the first there.
-
-    A check that fails is a finding of the doctor and nothing to a run.
-    """
+def look(machine: Machine, at_start: bool = False) -> Found:
+    """What this rank finds. A check that fails is a finding of the doctor and nothing to a run."""
     found: Found = []
     for number, check in enumerate(CHECKS):
-        if (at_start and not check.at_start) or not (scene.first_of_host if check.each_host else scene.rank == 0):
+        if (at_start and not check.at_start) or not (machine.first_of_host if check.each_host else machine.rank == 0):
             continue
         try:
-            found += [(number, check.each_host, finding) for finding in check.look(scene)]
+            findings = list(check.function(machine))
         except Exception as error:
-            if not at_start:
-                failed = warning("doctor", f"the check {check.name} itself failed: {type(error).__name__}: {error}")
-                found.append((number, check.each_host, failed))
+            text = f"the check {check.function.__name__} itself failed: {type(error).__name__}: {error}"
+            findings = [] if at_start else [warning("doctor", text)]
+        found += [(number, check.each_host, finding) for finding in findings if finding.level or not at_start]
     return found
 
 
-def start_warnings(scene: Scene, comm: SerialComm) -> list[str]:
+def merged(of_ranks: Sequence[Found], hosts: Sequence[str]) -> list[Finding]:
+    """The findings of all ranks in the order of the checks, equal ones once. hosts: that of each rank.
+
+    A finding of a check of every host that is true of some of them names them.
+    """
+    seen: dict[tuple[int, bool, Finding], list[str]] = {}
+    for found, name in zip(of_ranks, hosts):
+        for item in found:
+            seen.setdefault(item, []).append(name)
+    result = []
+    for (_, each_host, finding), where in sorted(seen.items(), key=lambda item: item[0][0]):
+        if each_host and set(where) != set(hosts):
+            some = ", ".join(where[:4]) + (f" and {len(where) - 4} more" if len(where) > 4 else "")
+            finding = finding._replace(text=f"{some}: {finding.text}")
+        result.append(finding)
+    return result
+
+
+def start_warnings(machine: Machine, comm: SerialComm) -> list[str]:
     """Collective: what the log of a run says at its start, on rank 0; empty elsewhere and where all is well."""
-    of_ranks = comm.gather(look(scene, at_start=True))
-    return [finding.line() for finding in merged(of_ranks or [], [p.host for p in scene.places])]
+    of_ranks = comm.gather(look(machine, at_start=True))
+    return [finding.line() for finding in merged(of_ranks or [], [p.host for p in machine.places])]
 
 
-def examine(scene: Scene, comm: SerialComm) -> list[Finding]:
-    """Collective: all findings, on rank 0; empty elsewhere. Takes some seconds and writes a few files, which it removes
-    again."""
-    from hpcdem.runtime.launch import patient_barrier
-
+def examine(machine: Machine, comm: SerialComm) -> list[Finding]:
+    """Collective: all findings, on rank 0; empty elsewhere. Takes some seconds, writes a few files and removes them."""
+    machine.token = comm.bcast(storage.existing(machine.directory) / f".hpcdem-doctor-{time.time_ns()}")
+    with suppress(OSError):
+        if comm.rank == 0:
+            machine.token.touch()
     patient_barrier(comm)
-    scene.clocks = comm.allgather(scene.now())
-    found = look(scene) + _one_file_system(scene, comm)
+    machine.clocks = comm.allgather(time.time())
+    found = look(machine)
     patient_barrier(comm)
-    of_ranks = comm.gather(found)
-    return merged(of_ranks or [], [p.host for p in scene.places])
-
-
-def _one_file_system(scene: Scene, comm: SerialComm) -> Found:
-    """Collective: whether all hosts see what rank 0 writes among the results."""
-    if len(scene.hosts) == 1:
-        return []
-    from hpcdem.runtime.doctor.mounts import existing
-
-    token = comm.bcast(existing(scene.directory) / f".hpcdem-doctor-{time.time_ns()}" if comm.rank == 0 else None)
-    if comm.rank == 0:
-        with suppress(OSError):
-            token.touch()
-    comm.barrier()
-    deadline = time.monotonic() + SOON
-    while scene.first_of_host and not token.exists() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    missing = scene.first_of_host and not token.exists()
-    comm.barrier()
-    if comm.rank == 0:
-        with suppress(OSError):
-            token.unlink()
-    return [(len(CHECKS), True, _not_seen(token.parent))] if missing else []
-
-
-def _not_seen(folder: Path) -> Finding:
-    return problem(
-        "results",
-        f"a file that rank 0 made in {folder} is not seen: the hosts have different file systems there",
-        "--outdir DIR on a file system that all hosts see",
-    )
+    with suppress(OSError):
+        if comm.rank == 0:
+            machine.token.unlink()
+    return merged(comm.gather(found) or [], [p.host for p in machine.places])

@@ -1,228 +1,213 @@
-"""File systems: where results and temporary files go, and whether what a run does there works."""
+"""File systems: where results, temporary files and compiled kernels go, and whether what a run does there works."""
 
 from __future__ import annotations
 
-import errno
-import fcntl
+import grp
 import os
+import pwd
+import re
 import shutil
-import statistics
+import stat
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from hpcdem.runtime.doctor.findings import Finding, ok, problem, size, warning
-from hpcdem.runtime.doctor.mounts import Mount, existing, mount_of
-from hpcdem.runtime.doctor.scene import Disk, Scene
+from hpcdem.io.disk import explain, publish
+from hpcdem.io.lock import FolderLock, Taken
+from hpcdem.runtime import cgroups
+from hpcdem.runtime.doctor.machine import CLOCK_SKEW, MIB, Findings, Machine, ok, problem, size, warning
+from hpcdem.runtime.warmup import cache_base, cache_folder, temporary_base
 
-TOPIC = "results"
-ELSEWHERE = "--outdir DIR on another file system"
-LITTLE, VERY_LITTLE = 1 << 30, 64 << 20
-"""Free bytes below which a run is at risk, and below which it cannot begin."""
-FEW_FILES = 1000
-SLOW = 0.5
-"""Seconds for a MiB to be safe on the disk from which on checkpoints are felt."""
-SKEW = 5.0
-"""Seconds by which two clocks may differ."""
+NETWORK = frozenset(
+    "nfs nfs4 cifs smb3 smbfs ncpfs afs ceph 9p lustre gpfs mmfs beegfs pvfs2 orangefs panfs wekafs gfs2 ocfs2 "
+    "glusterfs acfs stornext virtiofs vboxsf drvfs".split()
+)
+"""File systems that other hosts can see, or that are asked over a wire."""
+LOCAL_FUSE = frozenset("fuseblk fuse.fuse-overlayfs fuse.squashfuse fuse.ntfs-3g fuse.gocryptfs fuse.bindfs".split())
+RESULTS, TEMPORARY = "--outdir DIR on another file system", "export TMPDIR=DIR on another file system"
+OWN_CACHE = "export NUMBA_CACHE_DIR=DIR of your own"
+LITTLE, VERY_LITTLE, FEW_FILES = 1024 * MIB, 64 * MIB, 1000
+"""Free bytes below which a run is at risk, and below which it cannot begin; free files below which it is at risk."""
+SLOW, SOON = 0.5, 5.0
+"""Seconds for a MiB to be safe on the disk from which on checkpoints are felt, and until a new file is seen by all."""
 
 
-def free_space(scene: Scene) -> Iterator[Finding]:
+def kind_of(path: Path, mountinfo: str) -> str:
+    """What the kernel calls the file system of a path, by its table (see proc(5)); empty where that does not tell."""
+    real, best = f"{os.path.realpath(path)}/", ("", "")
+    for found in re.finditer(r"^(?:\S+ ){4}(\S+) \S.*? - (\S+)", mountinfo, re.MULTILINE):
+        point = re.sub(r"\\([0-7]{3})", lambda code: chr(int(code[1], 8)), found[1])  # a blank is \040
+        point = f"{point.rstrip('/')}/"
+        if real.startswith(point) and len(point) >= len(best[0]):  # a later one of the same name hides the earlier
+            best = point, found[2]
+    return best[1]
+
+
+def is_network(kind: str) -> bool:
+    """Whether a file system is asked over a network. FUSE hides many of them: all but the local ones count."""
+    return kind in NETWORK or (kind.startswith("fuse") and kind not in LOCAL_FUSE)
+
+
+def existing(path: Path) -> Path:
+    """The path, or the nearest folder above it that exists."""
+    path = path.absolute()
+    return next((folder for folder in (path, *path.parents) if folder.is_dir()), path)
+
+
+def _where(machine: Machine, path: Path) -> tuple[str, str]:
+    """Kind of file system under the nearest folder that exists, and both as text: `/home/me (nfs4, network)`."""
+    kind = kind_of(existing(path), cgroups.read(machine.root / "proc/self/mountinfo"))
+    return kind, f"{existing(path)} ({kind or 'unknown'}{', network' * is_network(kind)})"
+
+
+def free_space(machine: Machine) -> Findings:
     """Room for results: bytes and files."""
-    yield from _room(scene, TOPIC, scene.directory, ELSEWHERE)
+    yield from _room("results", machine.directory, RESULTS)
 
 
-def _room(scene: Scene, topic: str, path: Path, cure: str) -> Iterator[Finding]:
+def results(machine: Machine) -> Findings:
+    """Try in the folder of the results what a run does there."""
+    yield from _trial(machine, "results", machine.directory, RESULTS)
+
+
+def temporary(machine: Machine) -> Findings:
+    """Both in the folder for temporary files."""
+    yield from _room("temporary", Path(tempfile.gettempdir()), TEMPORARY)
+    yield from _trial(machine, "temporary", Path(tempfile.gettempdir()), TEMPORARY)
+
+
+def _room(topic: str, path: Path, cure: str) -> Findings:
     folder = existing(path)
     try:
-        found = scene.disk.statvfs(folder)
+        found = os.statvfs(folder)
     except OSError as failure:
         yield problem(topic, f"{folder}: {failure.strerror}", cure)
         return
     free = found.f_bavail * found.f_frsize
-    if not found.f_blocks:  # a file system that does not say
-        pass
-    elif free < VERY_LITTLE:
-        yield problem(topic, f"{size(free)} free in {folder}", cure)
-    elif free < LITTLE:
-        yield warning(topic, f"only {size(free)} free in {folder}", cure)
-    if found.f_files and found.f_favail < FEW_FILES:  # some file systems do not count them
+    if found.f_blocks and free < LITTLE:  # some file systems do not say
+        say = problem if free < VERY_LITTLE else warning
+        yield say(topic, f"only {size(free)} free in {folder}", cure)
+    if found.f_files and found.f_favail < FEW_FILES:  # some do not count them
         yield warning(topic, f"room for only {found.f_favail} more files (inodes) in {folder}", cure)
 
 
-def kind(scene: Scene) -> Iterator[Finding]:
-    """On what the results will be."""
-    mount = mount_of(existing(scene.directory), scene.mountinfo)
-    if mount is None:
+def _trial(machine: Machine, topic: str, path: Path, cure: str) -> Findings:
+    """What a run asks of a folder, tried in a folder of its own there that is removed again."""
+    folder, doing, taken = existing(path), "make a folder in", []
+    name = _where(machine, folder)[1]
+    try:
+        with tempfile.TemporaryDirectory(prefix=".hpcdem-doctor-", dir=folder, ignore_cleanup_errors=True) as scratch:
+            doing, final = "write a file in", f"{scratch}/file"
+            for _ in range(3):  # the second time over the file of the first
+                Path(f"{final}.tmp").write_bytes(bytes(MIB))
+                began = time.perf_counter()
+                publish(f"{final}.tmp", final)
+                taken.append(time.perf_counter() - began)
+            skew, doing = os.stat(final).st_mtime - time.time(), "lock a file in"
+            locks = _locks_work(Path(scratch))
+    except OSError as failure:
+        yield problem(topic, explain(name, failure, doing), cure)
         return
-    if mount.read_only:
-        yield problem(TOPIC, f"{mount.point} is mounted read-only ({_name(mount)})", ELSEWHERE)
-    elif mount.in_memory:
-        yield warning(
-            TOPIC,
-            f"{existing(scene.directory)} is in memory ({_name(mount)}): what is there is lost at the next start of "
-            "the machine, and counts as memory of the run",
-            "--outdir DIR on a disk",
-        )
-
-
-def locking_of_hdf5(scene: Scene) -> Iterator[Finding]:
-    """HDF5's own locks fail or block on many network file systems; hpcdem switches them off unless told otherwise."""
-    given = scene.environ.get("HDF5_USE_FILE_LOCKING", "FALSE").upper()
-    mount = mount_of(existing(scene.directory), scene.mountinfo)
-    if given not in ("FALSE", "0") and mount is not None and mount.network:
-        yield warning(
-            "HDF5",
-            f"HDF5_USE_FILE_LOCKING={given}, and the results are on a network file system ({_name(mount)}), where "
-            "locks may fail or block",
-            "export HDF5_USE_FILE_LOCKING=FALSE",
-        )
-
-
-def results(scene: Scene) -> Iterator[Finding]:
-    """Try in the folder of the results what a run does there."""
-    yield from _tried(scene, TOPIC, scene.directory, ELSEWHERE)
-    yield from _quota(scene)
-
-
-def temporary(scene: Scene) -> Iterator[Finding]:
-    """The same in the folder for temporary files."""
-    folder = scene.temporary if scene.temporary is not None else Path(tempfile.gettempdir())
-    yield from _room(scene, "temporary", folder, "export TMPDIR=DIR on another file system")
-    yield from _tried(scene, "temporary", folder, "export TMPDIR=DIR on another file system")
-
-
-def _tried(scene: Scene, topic: str, path: Path, cure: str) -> Iterator[Finding]:
-    folder = existing(path)
-    mount = mount_of(folder, scene.mountinfo)
-    on = f"{folder} ({_name(mount)})" if mount is not None else str(folder)
-    found = Trial(scene.disk).run(folder, scene.now)
-    if found.failed:
-        yield problem(topic, f"{on}: {found.failed}", cure)
-        return
-    free = scene.disk.statvfs(folder)
-    text = f"{on}: {size(free.f_bavail * free.f_frsize)} free, 1 MiB is safe in {1000.0 * found.seconds:.2g} ms"
-    if found.seconds > SLOW:
+    median = sorted(taken)[1]
+    text = f"{name}: {size(shutil.disk_usage(folder).free)} free, 1 MiB is safe in {1000.0 * median:.2g} ms"
+    if median > SLOW:
         yield warning(topic, f"{text}: checkpoints will wait for the disk", cure)
     else:
         yield ok(topic, text)
-    if found.unlocked:
-        yield warning(
-            topic,
-            f"{folder}: locks of files do not work ({found.unlocked}), so two runs in one folder cannot be told apart",
-            "Mount with locks (NFS: lockd; Lustre: -o flock), or start one run per folder",
-        )
-    if abs(found.skew) > SKEW:
-        yield warning(
-            "clock",
-            f"files made in {folder} now carry a time {abs(found.skew):.0f} s in the "
-            f"{'future' if found.skew > 0 else 'past'}: the clocks of file server and host differ",
-            "timedatectl set-ntp true",
-        )
+    if not locks:
+        text = f"{folder}: locks of files do not work, so two runs in one folder cannot be told apart"
+        yield warning(topic, text, "Mount with locks (NFS: lockd; Lustre: -o flock), or start one run per folder")
+    if abs(skew) > CLOCK_SKEW:
+        text = f"files made in {folder} now carry a time {abs(skew):.0f} s in the {'future' if skew > 0 else 'past'}"
+        yield warning("clock", f"{text}: the clocks of file server and host differ", "timedatectl set-ntp true")
 
 
-def _name(mount: Mount) -> str:
-    return f"{mount.kind}, network" if mount.network else mount.kind
-
-
-@dataclass
-class Trial:
-    """What a run asks of a folder, tried in a folder of its own there that is removed again.
-
-    failed: what does not work at all; unlocked: how locks fail; seconds: for a MiB to be on the disk; skew: time of a
-    new file less the time here [s].
-    """
-
-    disk: Disk
-    failed: str = ""
-    unlocked: str = ""
-    seconds: float = 0.0
-    skew: float = 0.0
-    _doing: str = field(default="", repr=False)
-
-    def run(self, folder: Path, now: Callable[[], float]) -> Trial:
-        """Try; says what happened in its attributes and raises nothing."""
-        try:
-            self._doing = "make a folder"
-            scratch = Path(tempfile.mkdtemp(prefix=".hpcdem-doctor-", dir=folder))
-        except OSError as failure:
-            self.failed = f"cannot {self._doing}: {failure.strerror or failure}"
-            return self
-        try:
-            self._files(scratch, now)
-        except OSError as failure:
-            self.failed = f"cannot {self._doing}: {failure.strerror or failure}"
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)
-        return self
-
-    def _files(self, scratch: Path, now: Callable[[], float]) -> None:
-        block, taken = bytes(1 << 20), []
-        temporary, final = scratch / "file.tmp", scratch / "file"
-        for _ in range(3):
-            self._doing = "write a file"
-            with open(temporary, "wb") as file:
-                file.write(block)
-                file.flush()
-                began = time.perf_counter()
-                self._doing = "bring a file to the disk (fsync)"
-                self.disk.fsync(file.fileno())
-                taken.append(time.perf_counter() - began)
-            self._doing = "rename a file"
-            self.disk.replace(temporary, final)  # the second time over the file of the first
-        self.seconds = statistics.median(taken)
-        self.skew = final.stat().st_mtime - now()
-        self._doing = "read a file back"
-        if final.read_bytes() != block:
-            raise OSError(errno.EIO, "it is not what was written")
-        self._locks(final)
-
-    def _locks(self, path: Path) -> None:
-        wanted = fcntl.LOCK_EX | fcntl.LOCK_NB
-        with open(path, "r+b") as first, open(path, "r+b") as second:
-            try:
-                self.disk.lockf(first, wanted)
-                self.disk.lockf(first, fcntl.LOCK_UN)
-                self.disk.flock(first, wanted)
-            except OSError as failure:
-                self.unlocked = failure.strerror or str(failure)
-                return
-            try:
-                self.disk.flock(second, wanted)
-            except OSError:
-                return
-            self.unlocked = "two can have the same lock"
-
-
-def _quota(scene: Scene) -> Iterator[Finding]:
-    """What the program quota says, where there is one: lines with a * behind a number that is over its limit."""
-    if scene.which("quota") is None:
-        return
-    code, said, _ = scene.run(["quota", "-w"])
-    over = [line.split() for line in said.splitlines() if "*" in line]
-    if code and over:
-        said = f"the quota on {over[0][0]} is used up: {' '.join(over[0][1:4])} (used, quota, limit in KiB)"
-        yield warning(TOPIC, said, "quota -s")
-
-
-def future_files(scene: Scene) -> Iterator[Finding]:
-    """Results that carry a time to come: what asks for the newest file will be misled."""
-    most = 5000
-    now, names = scene.now(), []
+def _locks_work(folder: Path) -> bool:
+    """Whether a folder can be locked, once."""
+    lock = FolderLock(folder, {})
     try:
-        with os.scandir(scene.directory) as entries:
-            for number, entry in enumerate(entries):
-                if number >= most:
-                    break
-                if entry.is_file() and entry.stat().st_mtime > now + 60.0:
-                    names.append(entry.name)
-    except OSError:
+        FolderLock(folder, {}).release()
+        return False
+    except Taken:
+        return lock.works
+    finally:
+        lock.release()
+
+
+def shared(machine: Machine) -> Findings:
+    """Whether this host sees what rank 0 wrote among the results: within some seconds, as caches forget."""
+    end = time.monotonic() + SOON
+    while not (seen := machine.token.exists()) and len(machine.hosts) > 1 and time.monotonic() < end:
+        time.sleep(0.1)
+    if not seen and len(machine.hosts) > 1:
+        text = f"a file that rank 0 made in {machine.token.parent} is not seen: another file system is mounted there"
+        yield problem("results", text, "--outdir DIR on a file system that all hosts see")
+
+
+def quota(machine: Machine) -> Findings:
+    """What the program quota says, where there is one: a * stands behind a number that is over its limit."""
+    code, out, _ = machine.run(["quota", "-w"])
+    over = next((line.split() for line in out.splitlines() if "*" in line), None)
+    if code and over:
+        text = f"the quota on {over[0]} is used up: {' '.join(over[1:4])} (used, quota, limit in KiB)"
+        yield warning("results", text, "quota -s")
+
+
+def in_memory(machine: Machine) -> Findings:
+    """Results that are not on a disk."""
+    kind, name = _where(machine, machine.directory)
+    if kind in ("tmpfs", "ramfs", "devtmpfs"):
+        text = f"{name} is in memory: what is there is lost when the machine restarts, and counts as memory of the run"
+        yield warning("results", text, "--outdir DIR on a disk")
+
+
+def hdf5_locks(machine: Machine) -> Findings:
+    """HDF5's own locks fail or block on many network file systems; hpcdem switches them off unless told otherwise."""
+    given = machine.environ.get("HDF5_USE_FILE_LOCKING", "FALSE").upper()
+    kind, name = _where(machine, machine.directory) if given not in ("FALSE", "0") else ("", "")
+    if is_network(kind):
+        text = f"HDF5_USE_FILE_LOCKING={given}, and locks may fail or block in {name}"
+        yield warning("HDF5", text, "export HDF5_USE_FILE_LOCKING=FALSE")
+
+
+def cache_owner(machine: Machine) -> Findings:
+    """numba executes what it finds in its cache: whoever can write there can do what we can."""
+    base = cache_base(machine.environ)
+    if not base.exists():
         return
-    if names:
-        yield warning(
-            "clock",
-            f"{len(names)} files in {scene.directory} carry a time in the future ({min(names)}): the clock of this or "
-            "of another host is or was wrong",
-            f"timedatectl; then touch {scene.directory}/{min(names)}",
-        )
+    found = base.stat()
+    ours, who = found.st_uid == os.getuid(), ""
+    if found.st_uid not in (os.getuid(), 0):
+        who = f"belongs to user {found.st_uid}"
+    elif found.st_mode & stat.S_IWOTH:
+        who = "can be written by everyone"
+    elif found.st_mode & stat.S_IWGRP and not _private(found.st_gid):
+        who = "can be written by your group"
+    if who:
+        cure = f"chmod go-w {base}" if ours and not found.st_mode & stat.S_ISVTX else OWN_CACHE  # sticky: as /tmp
+        yield warning("kernels", f"the kernel cache {base} {who}, and compiled code is executed as it is found", cure)
+
+
+def _private(group: int) -> bool:
+    """Whether it is the group that many systems give each user for himself, or root's."""
+    try:
+        return group == 0 or grp.getgrgid(group).gr_name == pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return False
+
+
+def cache(machine: Machine) -> Findings:
+    """Where the kernels are kept and whether they are there."""
+    base, (folder, writable), hosts = cache_base(machine.environ), cache_folder(machine.environ), len(machine.hosts)
+    kind, name = _where(machine, base)
+    if not writable:
+        text = f"the kernel cache {base} cannot be written; {temporary_base()} is used, which is empty after a restart"
+        yield warning("kernels", text, OWN_CACHE)
+    if is_network(kind) and hosts > 1:
+        cure = "export NUMBA_CACHE_DIR=/tmp/hpcdem-kernels-$UID (see slurm/many_nodes.sh)"
+        yield warning("kernels", f"the kernel cache is on {name}: {hosts} hosts will read it at once", cure)
+    kernels = sum(file.endswith(".nbc") for _, _, files in os.walk(folder) for file in files)
+    if kernels:
+        yield ok("kernels", f"{_where(machine, folder)[1]}: {kernels} entries")
+    else:
+        yield ok("kernels", f"{base}: no kernels of this version for this processor yet", "hpcdem warmup")

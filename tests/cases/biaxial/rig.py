@@ -199,7 +199,7 @@ def serial(folder: Path) -> Iterator[None]:
     from hpcdem import session
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
-    from hpcdem.runtime.stopping import StopRequests
+    from hpcdem.runtime.stop_requests import StopRequests
 
     before = session._current
     session.enter(

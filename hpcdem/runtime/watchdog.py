@@ -4,8 +4,8 @@ Python calls its signal handlers between two of its own instructions. A rank tha
 never come, or inside the system for a disk that does not answer, never gets there: SIGTERM would do nothing at all. So
 a thread listens as well, to what the system's own handler writes into a pipe, and ends the process
 
-- `INSIST` seconds after a second SIGTERM or Ctrl-C, if it is still there then;
-- when a SIGTERM has not been answered and the process has been inside one and the same call for `PATIENCE` seconds.
+- `GRACE` seconds after a second SIGTERM or Ctrl-C, if it is still there then;
+- when a SIGTERM has not been answered and the process has been inside one and the same call for `TIMEOUT` seconds.
 
 The launcher then ends the other ranks. No step is slower for it: the thread sleeps until a signal comes.
 """
@@ -21,27 +21,27 @@ import time
 from collections.abc import Callable
 from types import FrameType
 
-from hpcdem.runtime.ending import EXIT_INTERRUPTED, EXIT_TERMINATED, flush
+from hpcdem.runtime.shutdown import EXIT_INTERRUPTED, EXIT_TERMINATED, flush
 
-PATIENCE = 60.0
-INSIST = 5.0
+TIMEOUT = 60.0
+GRACE = 5.0
 SAME_SIGNAL = 2.0
 """A SIGTERM this soon [s] after another is the same one: launchers and queues send it to a job by several ways."""
-_LOOK = 1.0
+_INTERVAL = 1.0
 _CODES = {"SIGTERM": EXIT_TERMINATED, "SIGINT": EXIT_INTERRUPTED}
 
 
-class LastResort:
-    """The thread that listens. rank: said in its messages; leave: ends the process (replaced in tests)."""
+class Watchdog:
+    """The thread that listens. rank: named in its messages; leave: ends the process (replaced in tests)."""
 
     def __init__(
         self,
         rank: int = 0,
-        patience: float = PATIENCE,
-        insist: float = INSIST,
+        timeout: float = TIMEOUT,
+        grace: float = GRACE,
         leave: Callable[[int], object] = os._exit,
     ) -> None:
-        self._rank, self._patience, self._insist, self._leave = rank, patience, insist, leave
+        self._rank, self._timeout, self._grace, self._leave = rank, timeout, grace, leave
         self._main = threading.main_thread().ident or 0
         self._first: dict[str, float] = {}  # when a signal came first
         self._due: tuple[float, str] | None = None
@@ -60,7 +60,7 @@ class LastResort:
             _close(*handles)
             return
         self._handles = handles
-        threading.Thread(target=self._watch, args=handles, name="last resort", daemon=True).start()
+        threading.Thread(target=self._watch, args=handles, name="watchdog", daemon=True).start()
 
     def answered(self) -> None:
         """All ranks have agreed to stop: the last checkpoint may take as long as it needs."""
@@ -78,25 +78,25 @@ class LastResort:
         poll.register(listening, select.POLLIN)
         while True:
             waiting = self._due is not None or ("SIGTERM" in self._first and not self._answered.is_set())
-            if poll.poll(1000.0 * min(_LOOK, self._patience / 4, self._insist / 4) if waiting else None):
+            if poll.poll(1000.0 * min(_INTERVAL, self._timeout / 4, self._grace / 4) if waiting else None):
                 heard = os.read(listening, 64)
                 if 0 in heard:
                     _close(listening, writing)
                     return
                 for number in heard:
-                    self._hear(signal.Signals(number).name, time.monotonic())
-            self._look(time.monotonic())
+                    self._receive(signal.Signals(number).name, time.monotonic())
+            self._check(time.monotonic())
 
-    def _hear(self, name: str, now: float) -> None:
+    def _receive(self, name: str, now: float) -> None:
         if name not in _CODES:
             return
         first = self._first.setdefault(name, now)
         if first == now:
             self._stuck = (None, now)
         elif self._due is None and (name == "SIGINT" or now - first > SAME_SIGNAL):
-            self._due = now + self._insist, name
+            self._due = now + self._grace, name
 
-    def _look(self, now: float) -> None:
+    def _check(self, now: float) -> None:
         if self._due is not None and now >= self._due[0]:
             name = self._due[1]
             self._end(_CODES[name], f"{'Ctrl-C' if name == 'SIGINT' else name} came twice")
@@ -104,8 +104,8 @@ class LastResort:
             frame = sys._current_frames().get(self._main)
             if frame is not self._stuck[0]:  # the frame is held, so another one cannot be taken for it
                 self._stuck = frame, now
-            if now - self._stuck[1] >= self._patience:
-                self._end(EXIT_TERMINATED, f"SIGTERM was not answered for {self._patience:g} s")
+            if now - self._stuck[1] >= self._timeout:
+                self._end(EXIT_TERMINATED, f"SIGTERM was not answered for {self._timeout:g} s")
         else:
             self._stuck = (None, now)
 

@@ -13,7 +13,7 @@
 srun and scancel pass on every signal. Of a signal to mpiexec itself the ranks see SIGUSR1 with either MPI, SIGTERM and
 SIGINT with MPICH only, SIGUSR2 with Open MPI only (as tried with MPICH 5.0 and Open MPI 5.0).
 
-A rank that hangs inside MPI cannot look at flags: `insisting.LastResort` ends it after a second SIGTERM or SIGINT, and
+A rank that hangs inside MPI cannot look at flags: `watchdog.Watchdog` ends it after a second SIGTERM or SIGINT, and
 after one SIGTERM that is not answered for a minute.
 
 A signal may reach one rank only and the clocks of the ranks differ, so a request counts only once all ranks have
@@ -34,7 +34,7 @@ from types import FrameType
 from typing import Any, Literal
 
 from hpcdem.core.errors import UsageError
-from hpcdem.runtime.insisting import SAME_SIGNAL, LastResort
+from hpcdem.runtime.watchdog import SAME_SIGNAL, Watchdog
 
 NONE, AUTO, SAVE, STOP = 0, 1, 2, 3
 """Codes of a request; the largest one wins. AUTO: the last checkpoint was long ago."""
@@ -97,7 +97,7 @@ class StopRequests:
         self._stop = ""
         self._interrupts = 0
         self._terminated: float | None = None
-        self._last_resort = LastResort()
+        self._watchdog = Watchdog()
         self._last_save_took: float | None = None
         self._last_saved = -math.inf
         self._before: dict[int, Any] = {}
@@ -112,8 +112,8 @@ class StopRequests:
             number = getattr(signal, name, None)
             if number is not None:
                 self._before[number] = signal.signal(number, self._on_signal)
-        self._last_resort = LastResort(rank)
-        self._last_resort.listen()
+        self._watchdog = Watchdog(rank)
+        self._watchdog.listen()
         return self
 
     def uninstall(self) -> None:
@@ -122,7 +122,7 @@ class StopRequests:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         self._before.clear()
-        self._last_resort.close()
+        self._watchdog.close()
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         """Only sets a flag: the state may be in the middle of a step."""
@@ -190,7 +190,7 @@ class StopRequests:
         if code >= STOP:
             self.reason = self._stop or "a request to another rank"
             self._quiet()
-            self._last_resort.answered()
+            self._watchdog.answered()
             return "stop"
         if code == SAVE:
             self._save = False

@@ -12,22 +12,22 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from hpcdem.runtime import insisting
-from hpcdem.runtime.ending import EXIT_INTERRUPTED, EXIT_TERMINATED, describe
-from hpcdem.runtime.insisting import LastResort
-from hpcdem.runtime.stopping import StopRequests
+from hpcdem.runtime import watchdog
+from hpcdem.runtime.shutdown import EXIT_INTERRUPTED, EXIT_TERMINATED, describe
+from hpcdem.runtime.stop_requests import StopRequests
+from hpcdem.runtime.watchdog import Watchdog
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.alone  # times of a second and less
 
 HANGS = """\
 import ctypes, sys
-from hpcdem.runtime import insisting
-from hpcdem.runtime.stopping import StopRequests
-insisting.SAME_SIGNAL = {same}
+from hpcdem.runtime import watchdog
+from hpcdem.runtime.stop_requests import StopRequests
+watchdog.SAME_SIGNAL = {same}
 stop = StopRequests().install(3)
-stop._last_resort._insist = {insist}
-stop._last_resort._patience = {patience}
+stop._watchdog._grace = {grace}
+stop._watchdog._timeout = {timeout}
 libc, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(128)
 libc.pthread_mutex_lock(mutex)
 print("now", flush=True)
@@ -37,12 +37,12 @@ libc.pthread_mutex_lock(mutex)  # for ever; no signal ends it, as it does not en
 
 @pytest.fixture
 def hanging() -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """`hanging(insist=0.3, patience=60)`: a process that waits for ever, inside C."""
+    """`hanging(grace=0.3, timeout=60)`: a process that waits for ever, inside C."""
     started = []
 
-    def start(insist: float, patience: float, same: float = 0.2) -> subprocess.Popen[str]:
+    def start(grace: float, timeout: float, same: float = 0.2) -> subprocess.Popen[str]:
         process = subprocess.Popen(
-            [sys.executable, "-c", HANGS.format(insist=insist, patience=patience, same=same)],
+            [sys.executable, "-c", HANGS.format(grace=grace, timeout=timeout, same=same)],
             cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         started.append(process)
@@ -58,7 +58,7 @@ def hanging() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 @pytest.mark.parametrize(("name", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
 def test_the_second_signal_ends_a_process_that_hangs(hanging, name, code):
-    process = hanging(insist=0.3, patience=60.0)
+    process = hanging(grace=0.3, timeout=60.0)
     process.send_signal(getattr(signal, name))
     with pytest.raises(subprocess.TimeoutExpired):  # the first one alone does not
         process.wait(1.0)
@@ -69,7 +69,7 @@ def test_the_second_signal_ends_a_process_that_hangs(hanging, name, code):
 
 
 def test_signals_that_come_by_several_ways_are_one(hanging):
-    process = hanging(insist=0.1, patience=60.0, same=10.0)
+    process = hanging(grace=0.1, timeout=60.0, same=10.0)
     for _ in range(3):
         process.send_signal(signal.SIGTERM)
         time.sleep(0.02)
@@ -79,7 +79,7 @@ def test_signals_that_come_by_several_ways_are_one(hanging):
 
 def test_signals_that_were_seen_together_are_one_and_the_next_one_counts(hanging):
     """As when a rank waits for its disk, and the system delivers what came meanwhile as one."""
-    process = hanging(insist=0.1, patience=60.0, same=0.3)
+    process = hanging(grace=0.1, timeout=60.0, same=0.3)
     process.send_signal(signal.SIGSTOP)
     for _ in range(2):
         process.send_signal(signal.SIGTERM)
@@ -92,7 +92,7 @@ def test_signals_that_were_seen_together_are_one_and_the_next_one_counts(hanging
 
 
 def test_a_sigterm_that_is_not_answered_ends_it_too(hanging):
-    process = hanging(insist=5.0, patience=0.5)
+    process = hanging(grace=5.0, timeout=0.5)
     process.send_signal(signal.SIGTERM)
     _, err = process.communicate(timeout=10)
     assert process.returncode == 143 and "not answered for 0.5 s" in err
@@ -100,7 +100,7 @@ def test_a_sigterm_that_is_not_answered_ends_it_too(hanging):
 
 def test_the_other_requests_have_time(hanging):
     """SIGUSR1 comes minutes before the end of a job: there is no hurry."""
-    process = hanging(insist=0.2, patience=0.2)
+    process = hanging(grace=0.2, timeout=0.2)
     for _ in range(2):
         process.send_signal(signal.SIGUSR1)
         time.sleep(0.3)
@@ -110,13 +110,13 @@ def test_the_other_requests_have_time(hanging):
 @pytest.fixture
 def ended(monkeypatch) -> Iterator[tuple[StopRequests, list[int]]]:
     """Requests of this process, and the exit codes with which it would have been ended."""
-    monkeypatch.setattr(insisting, "SAME_SIGNAL", 0.1)
-    monkeypatch.setattr("hpcdem.runtime.stopping.SAME_SIGNAL", 0.1)
+    monkeypatch.setattr(watchdog, "SAME_SIGNAL", 0.1)
+    monkeypatch.setattr("hpcdem.runtime.stop_requests.SAME_SIGNAL", 0.1)
     codes: list[int] = []
     stop = StopRequests().install()
-    stop._last_resort._leave = codes.append
-    stop._last_resort._patience = 0.4
-    stop._last_resort._insist = 0.3
+    stop._watchdog._leave = codes.append
+    stop._watchdog._timeout = 0.4
+    stop._watchdog._grace = 0.3
     yield stop, codes
     stop.uninstall()
 
@@ -189,10 +189,10 @@ def test_nothing_is_left_behind():
     """Threads of tests before this one may still be ending: only those begun here are looked at."""
     before = set(threading.enumerate())
     for _ in range(5):
-        resort = LastResort()
-        resort.listen()
+        dog = Watchdog()
+        dog.listen()
         assert set(threading.enumerate()) - before
-        resort.close()
+        dog.close()
     end = time.monotonic() + 5.0
     while set(threading.enumerate()) - before and time.monotonic() < end:
         time.sleep(0.01)

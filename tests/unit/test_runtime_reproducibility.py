@@ -10,7 +10,7 @@ import pytest
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.numerics.fingerprint import as_text, of_rows
-from hpcdem.runtime import reproducing
+from hpcdem.runtime import reproducibility
 from hpcdem.runtime.progress import Log
 
 A, B = "0123456789abcdef" * 2, "f" * 32
@@ -62,14 +62,14 @@ def written(tmp_path: Path, *rows: str) -> Path:
 
 def test_lines_and_back(tmp_path):
     parts = {"particles": A, "contacts": B}
-    rows = [reproducing.line(10, 1, parts), reproducing.line(20, 2, {"walls": A}), "step 20 | CYC 100%"]
+    rows = [reproducibility.line(10, 1, parts), reproducibility.line(20, 2, {"walls": A}), "step 20 | CYC 100%"]
     assert rows[0] == f"state 10: particles={A} contacts={B}"
-    assert reproducing.read(written(tmp_path, *rows)) == {(1, 10): parts, (2, 20): {"walls": A}}
+    assert reproducibility.read(written(tmp_path, *rows)) == {(1, 10): parts, (2, 20): {"walls": A}}
 
 
 def test_the_last_word_on_a_step_counts(tmp_path):
-    path = written(tmp_path, reproducing.line(10, 1, {"walls": A}), reproducing.line(10, 1, {"walls": B}))
-    assert reproducing.read(path) == {(1, 10): {"walls": B}}
+    path = written(tmp_path, reproducibility.line(10, 1, {"walls": A}), reproducibility.line(10, 1, {"walls": B}))
+    assert reproducibility.read(path) == {(1, 10): {"walls": B}}
 
 
 @pytest.mark.parametrize("text", ["", "state 10: particles=12\n", "state x: walls=" + A, "\x00\xff"])
@@ -77,18 +77,18 @@ def test_a_log_without_states_is_refused(tmp_path, text):
     path = tmp_path / "log.txt"
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(UsageError, match="expected the log of a run with --check-reproducible"):
-        reproducing.read(path)
+        reproducibility.read(path)
 
 
 def test_a_log_that_cannot_be_read(tmp_path):
     with pytest.raises(UsageError, match=r"--against .*: cannot read it"):
-        reproducing.read(tmp_path)
+        reproducibility.read(tmp_path)
 
 
 def test_the_first_difference_ends_it():
     out = io.StringIO()
     expected = {(1, step): {"particles": A, "contacts": A} for step in (10, 20, 30)}
-    check = reproducing.Reproduction(10, Log(stream=out), expected, "old.txt")
+    check = reproducibility.Reproduction(10, Log(stream=out), expected, "old.txt")
     model = check.new_model()
     check.see(model, 10, {"particles": A, "contacts": A})
     check.see(model, 15, {"particles": B, "contacts": A})  # not in the log: nothing to compare with
@@ -103,7 +103,7 @@ def test_the_first_difference_ends_it():
 def test_the_end(seen, said):
     out = io.StringIO()
     expected = {(1, step): {"particles": A} for step in (10, 20)}
-    check = reproducing.Reproduction(5, Log(stream=out), expected, "old.txt")
+    check = reproducibility.Reproduction(5, Log(stream=out), expected, "old.txt")
     for step in seen:
         check.see(check.models or check.new_model(), step, {"particles": A})
     check.close()

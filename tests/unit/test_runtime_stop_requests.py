@@ -13,7 +13,7 @@ import pytest
 
 from hpcdem.core.errors import UsageError
 from hpcdem.halo.comm import SerialComm
-from hpcdem.runtime.stopping import NONE, SAVE, STOP, StopRequests, parse_limit, slurm_end_time
+from hpcdem.runtime.stop_requests import NONE, SAVE, STOP, StopRequests, parse_limit, slurm_end_time
 
 
 @pytest.fixture
@@ -88,9 +88,9 @@ def test_a_signal_to_one_rank_is_seen_by_all_on_the_same_poll(launch, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(
         "import os, signal, sys\n"
-        "from hpcdem.runtime import ending, launch, stopping\n"
+        "from hpcdem.runtime import launch, shutdown, stop_requests\n"
         "comm = launch.start_mpi()\n"
-        "stop = stopping.StopRequests().install()\n"
+        "stop = stop_requests.StopRequests().install()\n"
         "for poll in range(100):\n"
         "    if comm.rank == 1 and poll in (3, 6):\n"
         "        os.kill(os.getpid(), signal.SIGUSR2 if poll == 3 else signal.SIGTERM)\n"
@@ -99,7 +99,7 @@ def test_a_signal_to_one_rank_is_seen_by_all_on_the_same_poll(launch, tmp_path):
         "        sys.stdout.write(f'{comm.rank} {poll} {answer} {stop.reason}\\n')\n"
         "    if answer == 'stop':\n"
         "        break\n"
-        "ending.leave(ending.Ending())\n"
+        "shutdown.leave(shutdown.ExitStatus())\n"
     )
     done = launch.python(3, program, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -1,8 +1,8 @@
 """How a run ends: all ranks together, with one message and one exit code, whatever happened on which rank.
 
 An error may come to all ranks at once (a bad script line), or to one of them while the others wait for it inside
-MPI. A failing rank cannot know which; so it knocks, with a barrier that does not block, and when the others do not
-come within a second it prints its message and aborts the job.
+MPI. A failing rank cannot know which; so it enters the abort barrier, which does not block, and when the others do not
+arrive within a second it prints its message and aborts the job.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
 
 GRACE = 1.0
 """Seconds a failing rank waits for the others to fail as well."""
-LAST_RESORT = 30
+EXIT_TIMEOUT = 30
 """Seconds after which a process that hangs on its way out is ended by the system."""
 
 
@@ -37,7 +37,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Ending:
+class ExitStatus:
     """How the job ends, for this rank: exit code of the job, rank, and (host, process id) of the other ranks."""
 
     code: int = EXIT_OK
@@ -72,36 +72,36 @@ def _line_of_script(error: BaseException) -> str:
     return place
 
 
-def run_together(comm: Any, work: Callable[[], None]) -> Ending:
+def run_together(comm: Any, work: Callable[[], None]) -> ExitStatus:
     """Call `work` on every rank and bring all ranks together at its end, with the message of an error printed.
 
     If only some ranks fail, the lowest of them prints and the job is aborted; this function does not return then.
     """
-    knock = private_channel(comm)
+    channel = private_channel(comm)
     try:
         work()
     except BaseException as error:  # KeyboardInterrupt and SystemExit too: the other ranks must not wait for this one
-        return come_together(comm, knock, describe(error))
-    return come_together(comm, knock, None)
+        return come_together(comm, channel, describe(error))
+    return come_together(comm, channel, None)
 
 
 def private_channel(comm: Any) -> Any:
-    """Collective, at the start of a run: what the ranks will use to find each other at its end."""
+    """Collective, at the start of a run: the communicator of the abort barrier, apart from all other messages."""
     return comm.mpi.Dup() if comm.mpi is not None else None
 
 
-def come_together(comm: Any, knock: Any, failure: Failure | None) -> Ending:
-    """The end of a run on this rank; see `run_together`. knock: of `private_channel`."""
+def come_together(comm: Any, channel: Any, failure: Failure | None) -> ExitStatus:
+    """The end of a run on this rank; see `run_together`. channel: of `private_channel`."""
     if failure is not None and failure.code == EXIT_OK:
         failure = None
     flush()
-    if knock is None:
-        return Ending(report(failure, 0, 1))
-    if not all_arrive(knock, failure):
+    if channel is None:
+        return ExitStatus(report(failure, 0, 1))
+    if not all_arrive(channel, failure):
         assert failure is not None
         report(failure, comm.rank, comm.size)
         comm.abort(failure.code)
-    ranks = knock.allgather((failure, socket.gethostname(), os.getpid()))
+    ranks = channel.allgather((failure, socket.gethostname(), os.getpid()))
     failures = [failure for failure, *_ in ranks]
     rank, first = next(((r, f) for r, f in enumerate(failures) if f is not None), (0, None))
     # All ranks hold the same message after a collective error; a single rank's error names its rank.
@@ -109,16 +109,16 @@ def come_together(comm: Any, knock: Any, failure: Failure | None) -> Ending:
     if comm.rank == 0:
         report(first, rank, 1 if same else comm.size)
     others = tuple((host, pid) for r, (_, host, pid) in enumerate(ranks) if r != comm.rank)
-    return Ending(EXIT_OK if first is None else first.code, comm.rank, others)
+    return ExitStatus(EXIT_OK if first is None else first.code, comm.rank, others)
 
 
-def all_arrive(knock: Any, failure: Failure | None) -> bool:
-    """Wait for every rank to get here: a failing rank for GRACE seconds, the others as long as it takes.
+def all_arrive(channel: Any, failure: Failure | None) -> bool:
+    """The abort barrier: a failing rank waits GRACE seconds for all others to get here, the others as long as it takes.
 
     The grace grows with the rank, so that of several failing ranks only the lowest comes to print and abort.
     """
-    deadline = time.monotonic() + GRACE + 0.2 * min(knock.Get_rank(), 20) if failure is not None else None
-    request = knock.Ibarrier()
+    deadline = time.monotonic() + GRACE + 0.2 * min(channel.Get_rank(), 20) if failure is not None else None
+    request = channel.Ibarrier()
     while not request.Test():
         if deadline is not None and time.monotonic() > deadline:
             return False
@@ -146,7 +146,7 @@ def flush() -> None:
             pass
 
 
-def leave(end: Ending) -> NoReturn:
+def leave(end: ExitStatus) -> NoReturn:
     """End MPI and the process.
 
     The exit code of a failed job is rank 0's, and it leaves last: launchers kill what still runs when a process
@@ -155,7 +155,7 @@ def leave(end: Ending) -> NoReturn:
     sys.exit(end_mpi(end))  # not os._exit: MPICH says goodbye to its launcher in an exit handler
 
 
-def end_mpi(end: Ending) -> int:
+def end_mpi(end: ExitStatus) -> int:
     """End MPI and return the exit code of this process: that of the job on rank 0, which waits for the others."""
     flush()
     if "mpi4py.MPI" in sys.modules:  # HDF5 may have started it too
@@ -164,7 +164,7 @@ def end_mpi(end: Ending) -> int:
         # After an error MPI may wait for messages that will never come: not for ever.
         if end.code != EXIT_OK and hasattr(signal, "alarm"):
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.alarm(LAST_RESORT)
+            signal.alarm(EXIT_TIMEOUT)
         if MPI.Is_initialized() and not MPI.Is_finalized():
             MPI.Finalize()
     if end.rank > 0:

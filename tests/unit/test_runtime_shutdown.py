@@ -8,7 +8,7 @@ import pytest
 
 from hpcdem.core.errors import CommandError, StoppedWithCheckpoint
 from hpcdem.halo.comm import SerialComm
-from hpcdem.runtime import ending
+from hpcdem.runtime import shutdown
 
 
 def outcome(error: BaseException | None) -> int:
@@ -16,7 +16,7 @@ def outcome(error: BaseException | None) -> int:
         if error is not None:
             raise error
 
-    return ending.run_together(SerialComm(), work).code
+    return shutdown.run_together(SerialComm(), work).code
 
 
 @pytest.mark.parametrize(
@@ -46,14 +46,14 @@ PROGRAM = """
 import sys, time
 import numpy as np
 from hpcdem.core.errors import *
-from hpcdem.runtime import ending, launch
+from hpcdem.runtime import launch, shutdown
 
 comm = launch.start_mpi()
 
 def work():
     {work}
 
-ending.leave(ending.run_together(comm, work))
+shutdown.leave(shutdown.run_together(comm, work))
 """
 
 
