@@ -18,6 +18,7 @@ from hpcdem.cli.common import HELP, messages_only, read_command_line, run_progra
 from hpcdem.cli.resume import resume, resumed_options
 from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.errors import EXIT_OK
+from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
 from hpcdem.session import Session, greet, prepare
 
@@ -30,11 +31,15 @@ STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 """`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
 
 
+KERNELS = {"particles": ("",), "blocks": ("blocks",), "coupled": ("", "blocks", "coupled")} | {
+    name: ("", name) for name in PHYSICS
+}
+"""Kinds of kernels (`session.rehearse`) in the order in which runs load them."""
+
+
 @click.command(context_settings=HELP)
 @click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the later runs [1].")
-@click.option(
-    "--of", "kind", type=click.Choice(["particles", "blocks", "coupled", "all"]), default="all", help="Kernels [all]."
-)
+@click.option("--of", "kind", type=click.Choice([*KERNELS, "all"]), default="all", help="Kernels [all].")
 def warmup(**options: object) -> None:
     """Compile all kernels now, for example on a login node, so that no job waits for it."""
 
@@ -90,14 +95,13 @@ def run_warmup(words: list[str]) -> NoReturn:
     if launch.speaks_for_all():
         if kind == "all":  # each kind in a process of its own, see runtime/warmup.py
             again = [sys.executable, "-m", "hpcdem", "warmup", "-j", str(threads), "--of"]
-            kinds = ("particles", "blocks", "coupled")
-            sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in kinds))
+            sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in KERNELS))
         launch.prepare_environment(threads)
         from hpcdem.halo.comm import SerialComm
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.warmup import warmup as compile_all
 
-        for one in {"particles": [""], "blocks": ["blocks"], "coupled": ["", "blocks", "coupled"]}[kind]:
+        for one in KERNELS[kind]:
             compile_all(Log(), partial(prepare, SerialComm(), Log(), one, *{1, threads}))
     sys.exit(EXIT_OK)
 
