@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import queue
 import sys
 import threading
@@ -60,16 +61,18 @@ class Mailboxes:
 
 class Pretended(SerialComm):
     """One of the ranks. counts: messages sent to other ranks, reductions, lists as long as there are ranks ("lists"),
-    calls of Python functions since `watch` ("calls")."""
+    calls of Python functions since `watch` ("calls"); most: bytes of the largest thing it was told or got at once."""
 
     def __init__(self, ranks: Ranks, rank: int) -> None:
         self.ranks, self.rank, self.size = ranks, rank, ranks.size
         self.counts: Counter = Counter()
+        self.most = 0
         self.mpi = Mailboxes(ranks, rank, self.counts)
 
     def watch(self) -> None:
         """Count from now on."""
         self.counts.clear()
+        self.most = 0
 
         def called(frame: Any, event: str, _: object) -> None:
             if event == "call" and "/hpcdem/" in frame.f_code.co_filename:
@@ -97,18 +100,25 @@ class Pretended(SerialComm):
         self.ranks.meet.wait(TIMEOUT)
         return every
 
+    def _copied(self, obj: Any) -> Any:
+        """What came from other ranks, as if it had been on the way."""
+        parcel = pickle.dumps(obj)
+        self.most = max(self.most, len(parcel))
+        return pickle.loads(parcel)
+
     def barrier(self) -> None:
         self._together(None, "reductions")
 
     def bcast(self, obj: Any, root: int = 0) -> Any:
-        return self._together(obj, "reductions")[root]
+        told = self._together(obj, "reductions")[root]
+        return obj if self.rank == root else self._copied(told)
 
     def gather(self, obj: Any) -> list | None:
         every = self._together(obj, "lists")
-        return every if self.rank == 0 else None
+        return self._copied(every) if self.rank == 0 else None
 
     def allgather(self, obj: Any) -> list:
-        return self._together(obj, "lists")
+        return self._copied(self._together(obj, "lists"))
 
     def any(self, flag: bool) -> bool:
         return any(self._together(bool(flag), "reductions"))
@@ -129,13 +139,10 @@ class Pretended(SerialComm):
     def exscan(self, count: int) -> int:
         return sum(self._together(count, "reductions")[: self.rank])
 
-    def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        return [given[self.rank] for given in self._together(parts, "lists")]
-
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
         self.counts["messages"] += len(parcels)
         every = self._together(parcels, "reductions")
-        return {source: given[self.rank] for source, given in enumerate(every) if self.rank in given}
+        return self._copied({source: given[self.rank] for source, given in enumerate(every) if self.rank in given})
 
     def agree(self, error: str | None) -> None:
         found = [e for e in self._together(error, "reductions") if e is not None]
@@ -169,7 +176,10 @@ class Ranks:
                 sys.setprofile(None)
 
         comms = [Pretended(self, rank) for rank in range(self.size)]
-        threads = [threading.Thread(target=work, args=(comm,), daemon=True) for comm in comms]
+        threads = [
+            threading.Thread(target=work, args=(comm,), daemon=True, name=f"rank {comm.rank} of {self.size}")
+            for comm in comms
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:

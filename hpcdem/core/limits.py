@@ -16,7 +16,7 @@ LONGEST, SHORTEST = 1e30, 1e-30
 FARTHEST = 1e12
 """Largest coordinate of a particle in radii: a double still resolves 1e-4 of the radius there."""
 MOST = 10**8
-"""Most particles that one command makes. Every rank makes all of them, a cluster's node could not hold more."""
+"""Most particles that one command makes. GEN makes all of them on every rank, a cluster's node could not hold more."""
 MOST_ATTEMPTS = 10**10
 """Most attempts of one GEN, about half an hour."""
 

@@ -10,6 +10,7 @@ verbs are built on them.
 
 from __future__ import annotations
 
+import math
 import os
 import pickle
 import time
@@ -64,15 +65,30 @@ class SerialComm:
         """Sum of the counts of all lower ranks."""
         return 0
 
-    def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        """Hand part p to rank p; returns what each rank handed to this one, in rank order. Rows stay whole."""
-        return list(parts)
-
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
         """Collective: hand parcels (n,) i8 to the ranks they are for (not to oneself); returns what came, by sender, in
         order of ranks. Costs messages for these parcels only, however many ranks there are."""
         assert not parcels, "there is no other rank"
         return {}
+
+    def to_ranks(self, target: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Collective: rows (n, ...) of these columns go to the ranks `target` (n,) i8, to oneself too.
+
+        Returns the rank (m,) i8 that each row that came is from, then the columns; in the order of ranks, those of one
+        rank in the order in which it had them. Types and shapes of rows are equal on all ranks. One `exchange`.
+        """
+        small = target.astype(np.uint16) if self.size <= 1 << 16 else target  # which numpy sorts in linear time
+        order = np.argsort(small, kind="stable")
+        cuts = np.flatnonzero(np.diff(target[order])) + 1
+        parts = {int(target[rows[0]]): rows for rows in np.split(order, cuts) if len(rows)}
+        parcels = {to: _packed([c[rows] for c in columns]) for to, rows in parts.items() if to != self.rank}
+        arrived = {source: _unpacked(parcel, columns) for source, parcel in self.exchange(parcels).items()}
+        if self.rank in parts:
+            arrived[self.rank] = [column[parts[self.rank]] for column in columns]
+        ranks = sorted(arrived)
+        sources = np.repeat(np.array(ranks, np.int64), [len(arrived[rank][0]) for rank in ranks])
+        every = [np.concatenate([c[:0], *(arrived[rank][k] for rank in ranks)]) for k, c in enumerate(columns)]
+        return sources, *every
 
     def agree(self, error: str | None) -> None:
         """Collective: raise HpcdemError on every rank if any rank hands in a message (the lowest rank's is used)."""
@@ -173,28 +189,9 @@ class MpiComm(SerialComm):
         return self._reduce_into(array, MPI.SUM)
 
     def exscan(self, count: int) -> int:
-        counts = np.empty(self.size, np.int64)
-        self.wait(self.mpi.Iallgather(np.array([count], np.int64), counts))
-        return int(counts[: self.rank].sum())
-
-    def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        from mpi4py import MPI
-
-        tail = parts[0].shape[1:]
-        dtype = parts[0].dtype
-        send = np.ascontiguousarray(np.concatenate(parts))
-        width = dtype.itemsize * int(np.prod(tail, dtype=np.int64))
-        out = np.array([len(p) for p in parts], dtype=np.int64)
-        into = np.empty_like(out)
-        self.wait(self.mpi.Ialltoall(out, into))
-        recv = np.empty((int(into.sum()), *tail), dtype=dtype)
-        # One MPI item is one row, so counts stay far from the 2**31 limit of MPI's int arguments.
-        row = MPI.BYTE.Create_contiguous(width).Commit()
-        try:
-            self.wait(self.mpi.Ialltoallv([send, (out, _starts(out)), row], [recv, (into, _starts(into)), row]))
-        finally:
-            row.Free()
-        return np.split(recv, np.cumsum(into)[:-1])
+        before = np.zeros(1, np.int64)  # rank 0 gets nothing
+        self.wait(self.mpi.Iexscan(np.array([count], np.int64), before))
+        return int(before[0]) if self.rank else 0
 
     def exchange(self, parcels: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
         """Nobody knows who sends to it. So a rank takes what comes until its own parcels have been received, enters a
@@ -248,6 +245,23 @@ def _pickled(obj: Any) -> np.ndarray:
 
 def _unpickled(payload: np.ndarray, counts: np.ndarray) -> list:
     return [pickle.loads(part.data) for part in np.split(payload, np.cumsum(counts)[:-1])]
+
+
+def _packed(columns: list[np.ndarray]) -> np.ndarray:
+    """(words,) i8: number of rows, then one column after the other, each filled up to whole words."""
+    whole = [np.frombuffer(c.tobytes() + bytes(-c.nbytes % 8), np.int64) for c in columns]
+    return np.concatenate([np.array([len(columns[0])]), *whole])
+
+
+def _unpacked(parcel: np.ndarray, like: tuple[np.ndarray, ...]) -> list[np.ndarray]:
+    """The columns of a parcel; like: arrays with rows of the same type and shape."""
+    n, at, found = int(parcel[0]), 8, []
+    flat = parcel.view(np.uint8)
+    for column in like:
+        size = n * column.dtype.itemsize * math.prod(column.shape[1:])
+        found.append(flat[at : at + size].view(column.dtype).reshape(n, *column.shape[1:]))
+        at += size + -size % 8
+    return found
 
 
 def _starts(counts: np.ndarray) -> np.ndarray:

@@ -10,16 +10,16 @@ import numpy as np
 class Migration:
     """One change of ownership: of n particles on this rank those at `leave` (indices) go to the ranks `owner`.
 
-    The new order on a rank is [stayed | arrived from rank 0, 1, ...]. leave: those that go, by destination. Nearly all
-    go to the neighbours; to others when a border has jumped. What a migration costs does not grow with the number of
-    ranks.
+    The new order on a rank is [stayed | arrived from rank 0, 1, ...]. leave: those that go, by destination, and
+    leave_to: their destinations. Nearly all go to the neighbours; to others when a border has jumped. What a migration
+    costs does not grow with the number of ranks.
     """
 
     def __init__(self, comm: Any, n: int, leave: np.ndarray, owner: np.ndarray) -> None:
         self.comm = comm
         by_owner = np.argsort(owner, kind="stable")
-        self.leave = leave[by_owner]
-        self.owners, first = np.unique(owner[by_owner], return_index=True)
+        self.leave, self.leave_to = leave[by_owner], owner[by_owner]
+        self.owners, first = np.unique(self.leave_to, return_index=True)
         self.cuts = first[1:]
         self.n = n
 
@@ -49,3 +49,45 @@ class Migration:
             new_rows.append(of_rows.view(np.float64).reshape(n, -1))
             new_entries.append(of_entries.view(np.float64).reshape(-1, entries.shape[1]))
         return np.concatenate(new_rows), np.concatenate(new_counts), np.concatenate(new_entries)
+
+
+class Trail:
+    """Where particles have gone that left this rank, so that what is known of them elsewhere can go after them.
+
+    Nothing is noted before `begin`, and nobody is followed.
+    """
+
+    def __init__(self) -> None:
+        self._left: list[tuple[np.ndarray, np.ndarray]] | None = None
+
+    def begin(self) -> None:
+        """Note who leaves from now on."""
+        self._left = []
+
+    def note(self, gid: np.ndarray, owner: np.ndarray) -> None:
+        """Particles gid (n,) i8 go to the ranks owner (n,) i8."""
+        if self._left is not None and len(gid):
+            self._left.append((gid, owner))
+
+    def follow(self, comm: Any, mine: np.ndarray, gid: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Collective: of rows (n, ...) about the particles gid (n,) i8, which were here at the `begin`, those about
+        `mine` (m,) i8, the owned ones of now; gid, then the columns. Rows about particles that are gone are dropped.
+
+        A particle that has left more than once is followed from rank to rank: where it went last from here it came
+        later than it was here, so the way ends.
+        """
+        if self._left is None:
+            return tuple(column[:0] for column in (gid, *columns))
+        left = self._left[::-1]
+        gone, first = np.unique(np.concatenate([np.empty(0, np.int64), *(g for g, _ in left)]), return_index=True)
+        to = np.concatenate([np.empty(0, np.int64), *(owner for _, owner in left)])[first]
+        here: list[tuple[np.ndarray, ...]] = []
+        rows = (gid, *columns)
+        while True:
+            stays = np.isin(rows[0], mine)
+            here.append(tuple(column[stays] for column in rows))
+            goes = ~stays & np.isin(rows[0], gone)
+            rows = tuple(column[goes] for column in rows)
+            if not comm.any(bool(goes.any())):
+                return tuple(np.concatenate(column) for column in zip(*here))
+            rows = comm.to_ranks(to[np.searchsorted(gone, rows[0])], *rows)[1:]

@@ -25,6 +25,12 @@ class Alone:
     def gather(self, value: _T) -> list[_T]:
         return [value]
 
+    def bcast(self, value: _T) -> _T:
+        return value
+
+    def sum_into(self, values: _T) -> _T:
+        return values
+
     def agree(self, error: str | None) -> None:
         if error is not None:
             raise HpcdemError(error)

@@ -19,18 +19,22 @@ A file of an earlier version of this layout is read by all later programs; one o
 from __future__ import annotations
 
 import json
+import math
 import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io import seal
+from hpcdem.io.agreed import Alone, on_first
 from hpcdem.io.frame import Table
 from hpcdem.io.h5 import reading, writing_to
+from hpcdem.io.parts import read_parts, share
 
 FORMAT = "hpcdem checkpoint"
 VERSION = 5
@@ -42,10 +46,12 @@ OF_PARTICLES, LINKS = "discs_", "disc_contacts"
 
 _PART = 1 << 18
 """Words that are mixed at a time."""
+_ALL_BITS = (1 << 64) - 1
 
 
-def word_sum(values: np.ndarray) -> int:
-    """Sum of the 64-bit words of an array modulo 2^64, whatever their order: the checksum of versions 1 and 2."""
+def word_sum(values: np.ndarray, first: int = 0) -> int:
+    """Sum of the 64-bit words of an array modulo 2^64, whatever their order: the checksum of versions 1 and 2. first:
+    as of `placed_sum`, but of no effect."""
     return int(np.add.reduce(_words(values), dtype=np.uint64))
 
 
@@ -68,7 +74,7 @@ def placed_sum(values: np.ndarray, first: int = 0) -> int:
             mixed *= np.uint64(0xD6E8FEB86659FD93)
             mixed ^= mixed >> np.uint64(32)
             total += int(np.add.reduce(mixed, dtype=np.uint64))
-    return total & 0xFFFFFFFFFFFFFFFF
+    return total & _ALL_BITS
 
 
 def _words(values: np.ndarray) -> np.ndarray:
@@ -88,7 +94,7 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
     def read_back(temporary: str) -> None:
         try:
             _seal(temporary, list(columns))
-            read(temporary)
+            _verify(temporary)
         except HpcdemError as failure:
             raise HpcdemError(f"checkpoint {os.fspath(path)} could not be read back after writing: {failure}") from None
 
@@ -108,20 +114,96 @@ def write(path: str | os.PathLike, state: Mapping[str, Any], tables: Mapping[str
         writer.group("/", {"format": FORMAT, "version": VERSION, **texts, "crc": _crc(**texts)})
 
 
-def read(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]]]:
-    """State and tables of a checkpoint, on this process alone. HpcdemError says what is wrong with the file."""
-    tables: dict[str, dict[str, np.ndarray]] = {}
-    with _opened(path) as (file, state, sums, check):
-        whole = os.path.getsize(path)
-        for full, expected in sums.items():
-            table, name = full.split("/")
-            if file[full].nbytes > whole:  # a size that is wrong must not be asked of the memory
-                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} would be larger than the file")
-            values = file[full][...]
-            if check(values) != expected:
-                raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
-            tables.setdefault(table, {})[name] = values
+Tables = dict[str, dict[str, np.ndarray]]
+"""Columns by name, by the name of the table."""
+
+
+def read(
+    path: str | os.PathLike,
+    comm: Any = Alone(),  # noqa: B008
+    whole: Callable[[str], bool] = lambda table: False,
+) -> tuple[dict[str, Any], Tables]:
+    """Collective: the state of a checkpoint, on all ranks, and of every table this rank's rows. HpcdemError on all
+    ranks says what is wrong with the file.
+
+    The rows of a table are shared out in slabs of nearly equal size, in the order of the file. whole: whether all ranks
+    get all rows of the table of this name. No rank reads more than it keeps, and every row is checked by somebody.
+    """
+    state, columns, check = on_first(comm, lambda: _contents(path))
+    places = []
+    for full, column in columns.items():
+        n = column.shape[0]
+        places.append((0, n if comm.rank == 0 else 0) if whole(full.split("/")[0]) else share(n, comm))
+    raw = read_parts(comm, path, [column.part(*place) for column, place in zip(columns.values(), places)])
+    found = [column.values(rows) for column, rows in zip(columns.values(), raw)]
+    sums = np.array([check(values, first) for values, (first, _) in zip(found, places)], dtype=np.uint64)
+    _compare(path, columns, comm.sum_into(sums).tolist())
+    tables: Tables = {}
+    for full, values in zip(columns, found):
+        table, name = full.split("/")
+        tables.setdefault(table, {})[name] = comm.bcast(values) if whole(table) else values
     return state, tables
+
+
+def _verify(path: str | os.PathLike) -> None:
+    """HpcdemError if the file is not what it says; a piece at a time."""
+    _, columns, check = _contents(path)
+    sums = []
+    for column in columns.values():
+        n = column.shape[0]
+        step = max(1, 8 * _PART // max(column.row, 1))
+        pieces = [(at, min(at + step, n)) for at in range(0, n, step)]
+        found = [check(column.values(read_parts(Alone(), path, [column.part(*p)])[0]), p[0]) for p in pieces]
+        sums.append(sum(found) & _ALL_BITS)
+    _compare(path, columns, sums)
+
+
+def _compare(path: str | os.PathLike, columns: Mapping[str, _Column], sums: Sequence[int]) -> None:
+    for (full, column), found in zip(columns.items(), sums):
+        if found != column.sum:
+            raise HpcdemError(f"{os.fspath(path)} is damaged: checksum of {full} is wrong")
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Where a dataset lies in the file: first byte of its rows, which follow one another; shape; type; checksum."""
+
+    first: int
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    sum: int
+
+    @property
+    def row(self) -> int:
+        """Bytes of a row."""
+        return self.dtype.itemsize * math.prod(self.shape[1:])
+
+    def part(self, begin: int, end: int) -> tuple[int, int]:
+        """The bytes of these rows."""
+        return self.first + begin * self.row, self.first + end * self.row
+
+    def values(self, rows: np.ndarray) -> np.ndarray:
+        """Rows from their bytes."""
+        return rows.view(self.dtype).reshape(-1, *self.shape[1:])
+
+
+def _contents(path: str | os.PathLike) -> tuple[dict[str, Any], dict[str, _Column], Callable[..., int]]:
+    """State, places of the datasets, and the function of their checksums; on this process alone."""
+    with _opened(path) as (file, state, sums, check):
+        size = os.path.getsize(path)
+        columns = {}
+        for full, expected in sums.items():
+            data = file[full]
+            table, name = full.split("/")
+            first = data.id.get_offset()
+            if not (table and name and data.shape and data.dtype.kind in "biuf"):
+                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} is no column of numbers")
+            if data.nbytes > size:  # a size that is wrong must not be asked of the memory
+                raise HpcdemError(f"{os.fspath(path)} is damaged: {full} would be larger than the file")
+            if first is None and data.nbytes:
+                raise HpcdemError(f"{os.fspath(path)} is damaged: the rows of {full} do not lie in one piece")
+            columns[full] = _Column(first or 0, data.shape, data.dtype, expected)
+        return state, columns, check
 
 
 def read_state(path: str | os.PathLike) -> dict[str, Any]:

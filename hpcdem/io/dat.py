@@ -21,15 +21,19 @@ import mmap
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.io.agreed import Alone, on_first
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain
 from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame, Table
+from hpcdem.io.parts import read_lines
+from hpcdem.io.slabs import by_ranges
 from hpcdem.io.textnum import INT, WORD, Column, TextTable, format_floats, sci
 from hpcdem.io.transport import Section
 
@@ -281,8 +285,13 @@ def is_frame(path: str | os.PathLike) -> bool:
         return False
 
 
-def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:
-    """The frame in a .dat file of hpcdem or ZDEM. Serial.
+def read_dat(
+    path: str | os.PathLike,
+    tables: Collection[str] | None = None,
+    comm: Any = Alone(),  # noqa: B008
+) -> Frame:
+    """The frame in a .dat file of hpcdem or ZDEM. Collective: of each table every rank gets some of the rows; of that
+    of the particles a slab, in ascending order of ids. No rank has them all in memory, if lines end as on Unix.
 
     tables: names of the tables to read (all by default); the others come back empty, which saves most of the time.
     Columns that the file does not have are absent from the table; columns not known here are passed over. Groups
@@ -290,33 +299,49 @@ def read_dat(path: str | os.PathLike, tables: Collection[str] | None = None) -> 
     """
     path = os.fspath(path)
     wanted = set(_TABLES if tables is None else tables)
-    try:
-        with open(path, "rb") as file, _mapped(file) as data:
-            parameters, raw, counts = _split(path, data, wanted)
-    except OSError as failure:
-        if isinstance(failure, FileNotFoundError):
-            raise HpcdemError(f"cannot read {path}: there is no such file") from None
-        raise HpcdemError(explain(path, failure, "read")) from None
+    parameters, places, counts, in_place = on_first(comm, lambda: _layout(path, wanted))
     if "current_step" not in parameters:
         raise HpcdemError(f"cannot read {path}: it has no line current_step, so it is no frame of ZDEM or hpcdem")
+    raw = _tables(comm, path, places, in_place)
+    balls = raw.get("ball data", [])
+    for k, table in enumerate(balls):
+        if comm.size > 1 and "id" in table:
+            balls[k] = by_ranges(comm, "id", table | {"id": table["id"].astype(np.int64)})
+    error = None
     try:
         walls = _walls(raw.get("wall data", []))
-        particles, groups = _particles(raw.get("ball data", []))
+        particles, names = _particles(balls)
         columns = {
             "particles": particles,
             "contacts": _links(raw.get("contact data", [])),
             "bonds": _links(raw.get("bond data", []), forces=True),
             "wall_contacts": _wall_contacts(raw.get("wall contact data", []), walls["id"]),
         }
-        frame = _frame(parameters, walls, groups, columns)
+        frame = _frame(parameters, walls, names, columns)
     except (ValueError, KeyError, IndexError) as failure:
-        raise HpcdemError(f"cannot read {path}: {failure}") from None
-    for section, found in (("wall", len(walls["id"])), ("ball", len(particles.get("gid", ())))):
+        error = f"cannot read {path}: {failure}"
+    comm.agree(error)
+    number = int(comm.sum_into(np.array([len(particles.get("gid", ()))]))[0])
+    for section, found in (("wall", len(walls["id"])), ("ball", number)):
         if counts.get(section, found) != found and (section != "ball" or "particles" in wanted):
             raise HpcdemError(
                 f"cannot read {path}: {counts[section]} {section}s announced, {found} found; is it cut off?"
             )
+    if comm.size > 1:
+        _agree_on_columns(comm, frame)
     return frame
+
+
+def _agree_on_columns(comm: Any, frame: Frame) -> None:
+    """Collective: the same groups on all ranks, in the order of the whole table; and columns that are there on some
+    ranks only, as they are nearly always zero, on all."""
+    p, mine = frame.tables["particles"].columns, frame.group_names
+    frame.group_names = list(dict.fromkeys(name for names in comm.allgather(mine) for name in names))
+    if "group" in p:
+        numbers = {name: k for k, name in enumerate(frame.group_names)}
+        p["group"] = np.array([numbers[name] for name in mine], np.int32)[p["group"]]
+    if "gid" in p and comm.any("push_x" in p):
+        p |= {name: p.get(name, np.zeros(len(p["gid"]))) for name in _PUSH_WORDS.values()}
 
 
 def _frame(
@@ -353,12 +378,35 @@ def _mapped(file: BinaryIO) -> Iterator[bytes | mmap.mmap]:
         yield data[:].replace(b"\r\n", b"\n") if dos else data
 
 
-def _split(
-    path: str, data: bytes | mmap.mmap, wanted: set[str]
-) -> tuple[dict[str, str], dict[str, list[_RawTable]], dict[str, int]]:
-    """Parameters by key, raw tables by section, and the numbers of walls and balls announced."""
+@dataclass(frozen=True)
+class _Place:
+    """A table of a section: header words, bytes of its rows, words of a row."""
+
+    section: str
+    names: list[str]
+    begin: int
+    end: int
+    width: int
+
+
+_Layout = tuple[dict[str, str], list[_Place], dict[str, int], bool]
+
+
+def _layout(path: str, wanted: set[str]) -> _Layout:
+    """Parameters by key, tables, the numbers of walls and balls announced, and whether the tables lie in the file as
+    they are read. Serial."""
+    try:
+        with open(path, "rb") as file, _mapped(file) as data:
+            return *_split(data, wanted), not isinstance(data, bytes)
+    except OSError as failure:
+        if isinstance(failure, FileNotFoundError):
+            raise HpcdemError(f"cannot read {path}: there is no such file") from None
+        raise HpcdemError(explain(path, failure, "read")) from None
+
+
+def _split(data: bytes | mmap.mmap, wanted: set[str]) -> tuple[dict[str, str], list[_Place], dict[str, int]]:
     parameters: dict[str, str] = {}
-    raw: dict[str, list[_RawTable]] = {}
+    places: list[_Place] = []
     counts: dict[str, int] = {}
     needed_by = {"ball": "particles", "contact": "contacts", "bond": "bonds", "wall contact": "wall_contacts"}
     section, at = "", 0
@@ -373,9 +421,10 @@ def _split(
             end = data.find(b"\n\n", at - 1)
             end = len(data) if end < 0 else end
             if section.startswith("wall data") or needed_by.get(section.removesuffix(" data")) in wanted:
-                raw.setdefault(section, []).append(_table(path, section, line.split(), data, at, end))
-                if not isinstance(data, bytes) and hasattr(mmap, "MADV_DONTNEED"):
-                    data.madvise(mmap.MADV_DONTNEED, 0, end)
+                first = data.find(b"\n", at, end)
+                width = len(data[at : end if first < 0 else first].split()) if at < end else 0
+                places.append(_Place(section, line.split(), at, max(at, end), width))
+            _let_go(data, end)
             at = end + 1
         elif ":" in line:
             key, _, value = line.partition(":")
@@ -383,32 +432,78 @@ def _split(
                 parameters[key.strip()] = value.strip()
             elif key.strip() in ("wall num", "ball num"):
                 counts[key.split()[0]] = int(value)
-    return parameters, raw, counts
+    return parameters, places, counts
+
+
+def _let_go(data: bytes | mmap.mmap, end: int) -> None:
+    """What was read of a mapped file need not stay in memory."""
+    if not isinstance(data, bytes) and hasattr(mmap, "MADV_DONTNEED"):
+        data.madvise(mmap.MADV_DONTNEED, 0, end)
+
+
+def _tables(comm: Any, path: str, places: list[_Place], in_place: bool) -> dict[str, list[_RawTable]]:
+    """Of each table the rows of this rank, by section; all of those of walls. Collective."""
+    raw: dict[str, list[_RawTable]] = {}
+    error, texts = None, {}
+    shared_out = in_place and comm.size > 1
+    for k, place in enumerate(places):
+        if shared_out and not place.section.startswith("wall data"):
+            texts[k] = read_lines(comm, path, place.begin, place.end)
+    try:
+        found = [
+            _table(path, place, texts[k], 0, len(texts[k])) if k in texts else {} for k, place in enumerate(places)
+        ]
+        if comm.rank == 0 and len(texts) < len(places):
+            with open(path, "rb") as file, _mapped(file) as data:
+                for k, place in enumerate(places):
+                    if k not in texts:
+                        found[k] = _table(path, place, data, place.begin, place.end)
+                        _let_go(data, place.end)
+    except HpcdemError as failure:
+        error = str(failure)
+    except OSError as failure:
+        error = explain(path, failure, "read")
+    comm.agree(error)
+    for k, place in enumerate(places):
+        table = found[k]
+        if place.section.startswith("wall data"):
+            table = comm.bcast(table)
+        elif comm.size > 1:
+            table = _alike(comm, place, table or {name: np.zeros(0) for name in place.names[: place.width]})
+        raw.setdefault(place.section, []).append(table)
+    return raw
+
+
+def _alike(comm: Any, place: _Place, table: _RawTable) -> _RawTable:
+    """The table with the same types on all ranks. Collective."""
+    words = [name for name in ("group", "name") if name in table]
+    size = np.array([1] + [table[name].dtype.itemsize for name in words if len(table[name])]).max(keepdims=True)
+    width = int(comm.max_into(size)[0])
+    return table | {name: table[name].astype(f"S{width}") for name in words}
 
 
 _PIECE = 1 << 24
 """Most bytes of a table that are cut into words at once: words take many times the memory of their text."""
 
 
-def _table(path: str, section: str, names: list[str], data: bytes | mmap.mmap, at: int, end: int) -> _RawTable:
+def _table(path: str, place: _Place, data: bytes | mmap.mmap, at: int, end: int) -> _RawTable:
     """Columns by header word of the lines from `at` to `end`: float64, or bytes where they are not numbers."""
+    names, width = place.names, place.width
     words = "group" in names or "name" in names
     pieces: list[list[np.ndarray]] = []
-    width = 0
-    while at < end:
+    while at < end and width:
         stop = end if end - at <= _PIECE else data.rfind(b"\n", at, at + _PIECE) + 1 or end
         text = data[at:stop]
         at = stop
-        width = width or len(text.partition(b"\n")[0].split())
         values = np.array(text.split()) if words else np.fromstring(text, sep=" ")
-        if width == 0:  # no rows
-            break
         if values.size % width or values.size < width * text.rstrip().count(b"\n"):
-            raise HpcdemError(f"cannot read {path}: a table of the section '{section}' has rows of unequal length")
+            raise HpcdemError(
+                f"cannot read {path}: a table of the section '{place.section}' has rows of unequal length"
+            )
         columns = zip(names, values.reshape(-1, width).T)
         pieces.append([c.astype(np.float64) if name not in ("group", "name") else c for name, c in columns])
     if not pieces:
-        return {name: np.zeros(0) for name in names}
+        return {name: np.zeros(0) for name in (names[:width] if width else names)}
     return {name: np.concatenate([piece[k] for piece in pieces]) for k, name in enumerate(names[:width])}
 
 

@@ -6,7 +6,7 @@ rank holding one contiguous slab. No rank ever holds more than its own rows and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -97,37 +97,12 @@ def _redistributed(
     comm: Any, key: str, arrays: dict[str, np.ndarray], chosen: np.ndarray | None
 ) -> dict[str, np.ndarray]:
     """The rows of all ranks whose key lies in this rank's key range."""
-    keys = np.asarray(arrays[key] if chosen is None else arrays[key][chosen], dtype=np.int64)
-    target = _targets(comm, keys)
-    order = order_of([target])
-    cuts = np.searchsorted(target[order], np.arange(1, comm.size))
-    if chosen is not None:
-        order = chosen[order]
-    widest_first = sorted(arrays, key=lambda name: -arrays[name].itemsize)  # each column then begins where it may
-    width = sum(values.itemsize for values in arrays.values())
-    parcels = []
-    for rows in np.split(order, cuts):
-        parcel = np.empty((len(rows), width), dtype=np.uint8)
-        for name, room in _columns_of(parcel, widest_first, arrays):
-            room[:] = _taken(arrays[name], rows)
-        parcels.append(parcel)
-    received: dict[str, list[np.ndarray]] = {name: [] for name in arrays}
-    for parcel in comm.alltoallv(parcels):
-        for name, values in _columns_of(np.array(parcel), widest_first, arrays):
-            received[name].append(values)
-    return {name: np.concatenate(parts) for name, parts in received.items()}
-
-
-def _columns_of(
-    parcel: np.ndarray, names: Sequence[str], like: dict[str, np.ndarray]
-) -> Iterator[tuple[str, np.ndarray]]:
-    """Views of the columns that lie one after the other in a parcel (rows, bytes per row): one exchange of plain bytes
-    then carries whole rows."""
-    flat, at = parcel.reshape(-1), 0
-    for name in names:
-        size = len(parcel) * like[name].itemsize
-        yield name, flat[at : at + size].view(like[name].dtype)
-        at += size
+    arrays = {
+        name: np.ascontiguousarray(values) if chosen is None else _taken(values, chosen)
+        for name, values in arrays.items()
+    }
+    target = _targets(comm, np.asarray(arrays[key], dtype=np.int64))
+    return dict(zip(arrays, comm.to_ranks(target, *arrays.values())[1:]))
 
 
 def _targets(comm: Any, keys: np.ndarray) -> np.ndarray:
@@ -148,6 +123,15 @@ def _targets(comm: Any, keys: np.ndarray) -> np.ndarray:
     return owner[index]
 
 
+def by_ranges(comm: Any, key: str, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Collective: the rows of all ranks in ascending order of an int64 column. Rows of equal keys come to one rank, in
+    the order of ranks; tables with the same keys are cut in the same places."""
+    if comm.size > 1:
+        columns = _redistributed(comm, key, columns, None)
+    order = order_of([columns[key]])
+    return {name: values[order] for name, values in columns.items()}
+
+
 def find_rows(comm: Any, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray]) -> np.ndarray:
     """Collective: the global row of each wanted key in a table held in slabs, -1 where there is no such row.
 
@@ -157,26 +141,35 @@ def find_rows(comm: Any, keys: Sequence[np.ndarray], wanted: Sequence[np.ndarray
     large = any(len(k) and not (-_SMALL_GID <= np.min(k) and np.max(k) < _SMALL_GID) for k in (*keys, *wanted))
     comm.agree(f"ids beyond {_SMALL_GID} cannot be looked up in pairs" if large and len(keys) > 1 else None)
     mine, asked = _combined(keys), _combined(wanted)
-    n = len(mine)
-    offset = comm.exscan(n)
     if comm.size == 1:
-        return _local_rows(mine, asked, offset)
+        return _local_rows(mine, asked, 0)
+    offset = comm.exscan(len(mine))
+    return ask(comm, holders(comm, mine, asked), asked, lambda q: _local_rows(mine, q, offset))
+
+
+def holders(comm: Any, mine: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Collective: the rank whose slab has, or would have, each wanted key (m,) i8; its own where there are no rows.
+
+    mine (n,) i8: this rank's slab of the keys, ascending over all ranks.
+    """
     # First key of every slab; an empty slab starts where the next one does.
     starts = np.full(comm.size, np.iinfo(np.int64).max, dtype=np.int64)
-    if n:
+    if len(mine):
         starts[comm.rank] = mine[0]
-    starts = np.minimum.accumulate(comm.min_into(starts)[::-1])[::-1]
-    holds = comm.max_into(np.where(np.arange(comm.size) == comm.rank, n, 0).astype(np.int64)) > 0
-    ranks = np.flatnonzero(holds)
-    if len(ranks) == 0:
-        return np.full(len(asked), -1, dtype=np.int64)
-    target = ranks[np.maximum(np.searchsorted(starts[ranks], asked, side="right") - 1, 0)]
-    order = order_of([target])
-    cuts = np.searchsorted(target[order], np.arange(1, comm.size))
-    questions = comm.alltoallv(np.split(asked[order], cuts))
-    answers = comm.alltoallv([_local_rows(mine, q, offset) for q in questions])
-    found = np.empty(len(asked), dtype=np.int64)
-    found[order] = np.concatenate(answers)
+    comm.min_into(starts)
+    ranks = np.flatnonzero(comm.max_into(np.where(np.arange(comm.size) == comm.rank, len(mine), 0)) > 0)
+    if not len(ranks):
+        return np.full(len(wanted), comm.rank)
+    return ranks[np.maximum(np.searchsorted(starts[ranks], wanted, side="right") - 1, 0)]
+
+
+def ask(comm: Any, target: np.ndarray, questions: np.ndarray, answer: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Collective: the answers (n, ...) of the ranks `target` (n,) i8 to these questions (n,), row by row; `answer` is
+    what this rank says to those it is asked."""
+    sources, asked = comm.to_ranks(target, questions)
+    _, answers = comm.to_ranks(sources, answer(asked))
+    found = np.empty_like(answers)
+    found[np.argsort(target, kind="stable")] = answers
     return found
 
 

@@ -387,8 +387,8 @@ class _Single(Alone):
 
     mpi: Any = None
 
-    def alltoallv(self, parts: list[np.ndarray]) -> list[np.ndarray]:
-        return parts
+    def to_ranks(self, target: np.ndarray, *columns: np.ndarray) -> tuple[np.ndarray, ...]:
+        return target, *columns
 
 
 def _rounds(comm: Any, log: Any, frames: list[FrameFile], options: Options, output: _Output, sums: strain.Sums) -> None:
@@ -446,8 +446,8 @@ def _none(now: Snapshot) -> np.ndarray:
 def _to_next(comm: Any, rows: np.ndarray) -> np.ndarray:
     """Collective: every rank's rows (n, k) go to the next rank, the last one's to rank 0; what came from the one
     before."""
-    parts = [rows if r == (comm.rank + 1) % comm.size else rows[:0] for r in range(comm.size)]
-    return comm.alltoallv(parts)[(comm.rank - 1) % comm.size]
+    _, arrived = comm.to_ranks(np.full(len(rows), (comm.rank + 1) % comm.size), rows)
+    return arrived
 
 
 def _write(section: Section, options: Options, first: FrameFile, folder: Path) -> None:

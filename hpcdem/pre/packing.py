@@ -107,17 +107,23 @@ def insert_randomly(
     return np.column_stack([px[new], py[new], pr[new]]), int(tried)
 
 
-def lattice(radii: np.ndarray, x: tuple[float, float], y: tuple[float, float], seed: int, stream: int) -> np.ndarray:
-    """Square lattice of spacing 2 max(radii), row by row from the lower left, a listed radius drawn at each node.
+def nodes(radii: np.ndarray, x: tuple[float, float], y: tuple[float, float]) -> tuple[int, int]:
+    """How many nodes a square lattice of spacing 2 max(radii) has along x and y of a rectangle [m]."""
+    spacing = 2.0 * float(np.max(radii))
+    nx, ny = (max(int(np.floor((b - a) / spacing + 1e-9)), 0) for a, b in (x, y))
+    return nx, ny
+
+
+def lattice(
+    radii: np.ndarray, x: tuple[float, float], y: tuple[float, float], seed: int, stream: int, first: int, end: int
+) -> np.ndarray:
+    """Nodes first .. end - 1 of this lattice, row by row from the lower left, a listed radius drawn at each.
 
     Returns (n, 3) f8 rows x, y, r [m]; every node keeps half a spacing from the edges.
     """
     radii = np.asarray(radii, dtype=np.float64)
     spacing = 2.0 * float(radii.max())
-    nx, ny = (int(np.floor((b - a) / spacing + 1e-9)) for a, b in (x, y))
-    gx = x[0] + spacing * (np.arange(max(nx, 0)) + 0.5)
-    gy = y[0] + spacing * (np.arange(max(ny, 0)) + 0.5)
-    points = np.array(np.meshgrid(gx, gy)).reshape(2, -1).T
-    draw = np.array([uniform(seed, stream, k) for k in range(len(points))])
+    row, column = np.divmod(np.arange(first, end), max(nodes(radii, x, y)[0], 1))
+    draw = np.array([uniform(seed, stream, k) for k in range(first, end)])
     chosen = radii[np.minimum((draw * len(radii)).astype(np.int64), len(radii) - 1)]
-    return np.column_stack([points, chosen])
+    return np.column_stack([x[0] + spacing * (column + 0.5), y[0] + spacing * (row + 0.5), chosen])

@@ -105,7 +105,7 @@ def main() -> None:
         both.advance(1)
         most = max(most, int(both.link.slot_on.sum()))
         searches.add(id(both.link))
-        where.update(rank for rank, rows in enumerate(both.link._back) if len(rows) and rank != both.comm.rank)
+        where.update(both.link._back.keys() - {both.comm.rank})
     found = state(both)
     most = int(both.comm.max_into(np.array([most]))[0])
     others = both.comm.allgather(sorted(where))

@@ -62,7 +62,7 @@ def clump(
         if not math.isfinite(value):
             raise CommandError(f"{name} must be a finite number, got {value:g}")
     rows, rigid = _members(bodies, x, y, angle, scale, sim.next_gid)
-    check_circles(rows)
+    check_circles(sim.comm, rows)
     first = sim.next_gid
     add(sim, rows, sim.group_number(group), color)
     p = sim.particles

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +13,10 @@ from hpcdem.commands.dem.properties import chosen
 from hpcdem.core import limits
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.selection import Selection
+from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import is_frame
 from hpcdem.io.files import write_sections
+from hpcdem.io.parts import read_lines, share
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.pre import packing
 from hpcdem.pre.rows import row
@@ -44,48 +48,68 @@ def load(
         if scale != 1.0:
             raise CommandError(f"scale {scale:g} is for files of x y r; {path} is a frame, with stiffnesses and forces")
         return load_frame(sim, path, x, y)
-    rows, groups = sim.comm.bcast(_read_xyr(sim, Path(path)))
+    if not scale > 0.0:
+        raise CommandError(f"scale must be positive, got {scale:g}")
+    comm = sim.comm
+    rows, names = _read_xyr(sim, Path(path))
     keep = np.ones(len(rows), bool)
     for bounds, column in ((x, rows[:, 0]), (y, rows[:, 1])):
         if bounds is not None:
             keep &= (column >= bounds[0]) & (column < bounds[1])
-    if not scale > 0.0:
-        raise CommandError(f"scale must be positive, got {scale:g}")
-    if not keep.any():
-        raise CommandError(f"none of the {len(rows)} particles of {path} lies within the bounds of x and y")
-    rows, names = rows[keep] * scale, [g for g, k in zip(groups, keep, strict=True) if k]
-    check_circles(rows)
-    if sim.log is not None and not keep.all():
-        sim.log.info(f"LOAD: {len(rows)} of {len(keep)} particles lie within the bounds")
+    of_file, rows, names = sim.count(len(rows)), rows[keep] * scale, names[keep]
+    kept = sim.count(len(rows))
+    if not kept:
+        raise CommandError(f"none of the {of_file} particles of {path} lies within the bounds of x and y")
+    check_circles(comm, rows)
+    if sim.log is not None and kept < of_file:
+        sim.log.info(f"LOAD: {kept} of {of_file} particles lie within the bounds")
     sim.clear()
-    numbers = {name: sim.group_number(name) for name in dict.fromkeys(names)}
-    return add(sim, rows, np.array([numbers[n] for n in names], np.int64), 0)
+    # Groups are numbered in the order of the file.
+    mine, first, group = np.unique(names, return_index=True, return_inverse=True)
+    in_order = np.argsort(first)
+    for part in comm.allgather(mine[in_order].tolist()):
+        for name in part:
+            sim.group_number(name)
+    numbers = np.array([sim.group_number(name) for name in mine.tolist()], np.int64)
+    add_part(sim, rows, comm.exscan(len(rows)), kept, numbers[group.reshape(-1)], 0)
+    return kept
 
 
-def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, list[str]] | None:
-    error, rows, groups = None, [], []
+def _read_xyr(sim: Simulation, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """This rank's share of a file of particles: rows x, y, r (n, 3), and groups (n,) str. Collective."""
+    size, error = 0, None
     if sim.comm.rank == 0:
         try:
-            for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
-                words = line.split("#")[0].split()
-                if not words:
-                    continue
-                try:
-                    x, y, r = map(float, words[:3])
-                    if len(words) > 4 or "_" in "".join(words[:3]) or not np.isfinite([x, y, r]).all() or r <= 0.0:
-                        raise ValueError
-                except ValueError:
-                    shown = "".join(c if c.isprintable() else " " for c in line.strip()[:60])
-                    error = f"{path}:{number}: read '{shown}', expected x y r [group] with r > 0"
-                    break
-                rows.append((x, y, r))
-                groups.append(words[3] if len(words) == 4 else NO_GROUP)
-            if not rows and error is None:
-                error = f"{path}: holds no particles, expected rows x y r [group]"
+            with path.open("rb") as file:
+                size = file.seek(0, os.SEEK_END)
         except OSError as problem:
             error = f"cannot read {path}: {problem.strerror}"
     _agree(sim, error)
-    return (np.array(rows), groups) if sim.comm.rank == 0 else None
+    try:
+        text = read_lines(sim.comm, path, 0, sim.comm.bcast(size))
+    except HpcdemError as problem:
+        raise CommandError(str(problem)) from None
+    lines = text.decode("utf-8", "replace").splitlines()
+    rows: list[tuple[float, float, float]] = []
+    groups: list[str] = []
+    for number, line in enumerate(lines, sim.comm.exscan(len(lines)) + 1):
+        words = line.split("#")[0].split()
+        if not words:
+            continue
+        try:
+            x, y, r = map(float, words[:3])
+            if len(words) > 4 or "_" in "".join(words[:3]) or not np.isfinite([x, y, r]).all() or r <= 0.0:
+                raise ValueError
+        except ValueError:
+            shown = "".join(c if c.isprintable() else " " for c in line.strip()[:60])
+            error = f"{path}:{number}: read '{shown}', expected x y r [group] with r > 0"
+            break
+        rows.append((x, y, r))
+        groups.append(words[3] if len(words) == 4 else NO_GROUP)
+    _agree(sim, error)
+    if not sim.count(len(rows)):
+        raise CommandError(f"{path}: holds no particles, expected rows x y r [group]")
+    return np.array(rows).reshape(-1, 3), np.array(groups, dtype=str)
 
 
 def _agree(sim: Simulation, error: str | None) -> None:
@@ -125,7 +149,7 @@ def gen(
     """
     limits.check_rectangle(radii, x, y, grid=False)
     limits.check_attempts(num, sim.settings.gentry)
-    existing = _everyone(sim)
+    existing = _near(sim, radii, x, y)
     factor = sim.settings.gentry
     ends = {"attempts": max(int(factor * num), num)} if factor > 0.0 else {"in_a_row": FAILURES}
     rows, tried = packing.insert_randomly(num, np.array(radii), x, y, existing, sim.settings.seed, sim.streams, **ends)
@@ -148,11 +172,13 @@ def gen_grid(
 ) -> int:
     """GEN GRID: a particle of a random listed radius at each node of a square lattice of spacing 2 max(r)."""
     limits.check_rectangle(radii, x, y, grid=True)
-    rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams)
+    total = math.prod(packing.nodes(np.array(radii), x, y))
+    first, end = share(total, sim.comm)
+    rows = packing.lattice(np.array(radii), x, y, sim.settings.seed, sim.streams, first, end)
     sim.streams += 1
     if idmin is not None and idmin < sim.next_gid and sim.count(len(sim.particles)):
         raise CommandError(f"idmin {idmin}: ids below {sim.next_gid} are taken or were once")
-    return add(sim, rows, sim.group_number(group), color, first_gid=idmin)
+    return add_part(sim, rows, first, total, sim.group_number(group), color, first_gid=idmin)
 
 
 def gline(
@@ -205,43 +231,65 @@ def export(sim: Simulation, path: Path | str, with_group: bool = False, where: S
     write_sections(path, sim.comm, lambda: [text.encode()])
 
 
-def check_circles(rows: np.ndarray) -> None:
-    """As limits.check_circle, for (n, 3) rows x, y, r."""
-    size = np.abs(rows[:, :2]).max(axis=1) / rows[:, 2]
-    for worst in {int(size.argmax()), int(rows[:, 2].argmin()), int(rows[:, 2].argmax())}:
-        limits.check_circle(*rows[worst])
+def check_circles(comm: SerialComm, rows: np.ndarray) -> None:
+    """As limits.check_circle, for (n, 3) rows x, y, r of all ranks. Collective."""
+
+    def worst(of: np.ndarray) -> np.ndarray:
+        if not len(of):
+            return of
+        size = np.abs(of[:, :2]).max(axis=1) / of[:, 2]
+        return of[[size.argmax(), of[:, 2].argmin(), of[:, 2].argmax()]]
+
+    for circle in worst(np.concatenate(comm.allgather(worst(rows)))):
+        limits.check_circle(*circle)
 
 
-def _everyone(sim: Simulation) -> np.ndarray:
-    """(n, 3) [x, y, r] of all particles on all ranks."""
+def _near(sim: Simulation, radii: list[float], x: tuple[float, float], y: tuple[float, float]) -> np.ndarray:
+    """(n, 3) [x, y, r] of the particles of all ranks that can touch one of these radii in this rectangle."""
     p = sim.particles
-    mine = np.column_stack([p["x"], p["y"], p["radius"]])
+    largest = float(sim.comm.max_into(np.array([p["radius"].max(initial=0.0)]))[0])
+    reach = max(largest, *radii) + max(radii)
+    near = (p["x"] > x[0] - reach) & (p["x"] < x[1] + reach) & (p["y"] > y[0] - reach) & (p["y"] < y[1] + reach)
+    mine = np.column_stack([p["x"][near], p["y"][near], p["radius"][near]])
     return np.concatenate(sim.comm.allgather(mine))
 
 
 def add(
     sim: Simulation,
     rows: np.ndarray,
+    group: int,
+    color: int,
+    first_gid: int | None = None,
+    material: int = 0,
+) -> int:
+    """New particles from (n, 3) rows x, y, r, the same on all ranks; each takes its share of them until the next cycle
+    sends them to their owners."""
+    first, end = share(len(rows), sim.comm)
+    return add_part(sim, rows[first:end], first, len(rows), group, color, first_gid, material)
+
+
+def add_part(
+    sim: Simulation,
+    rows: np.ndarray,
+    before: int,
+    total: int,
     group: np.ndarray | int,
     color: int,
     first_gid: int | None = None,
     material: int = 0,
 ) -> int:
-    """New particles from (n, 3) rows x, y, r, the same on all ranks; rank 0 takes them until the next cycle shares them
-    out."""
+    """The same for rows of which each rank has a part of its own: the `before`-th to the last of them, of `total`;
+    group: of all or (n,) i8 of each of these rows."""
     sim.open()
     first = sim.next_gid if first_gid is None else first_gid
-    sim.next_gid = max(sim.next_gid, first + len(rows))
+    sim.next_gid = max(sim.next_gid, first + total)
     sim.note_maker(first)
-    mine = slice(None) if sim.comm.rank == 0 else slice(0)
-    count = len(rows[mine])
-    if count:
-        groups = np.broadcast_to(np.asarray(group, np.int64), (len(rows),))[mine]
+    if len(rows):
         sim.particles.append(
-            x=rows[mine, 0], y=rows[mine, 1], radius=rows[mine, 2], gid=first + np.arange(count), group=groups,
+            x=rows[:, 0], y=rows[:, 1], radius=rows[:, 2], gid=first + before + np.arange(len(rows)), group=group,
             color=color, material=material, birth=sim.clock.step,
         )  # fmt: skip
-        sim.hist = sim.hist.extended(count)
+        sim.hist = sim.hist.extended(len(rows))
     sim.ownership.wanted = True
     sim.look_soon()
-    return len(rows)
+    return total

@@ -1,15 +1,14 @@
 """Who meets whom: discs near free faces, and the messages between those who own them, from one search to the next.
 
-The strips of the particles and those of the blocks stay what they are. At a search each rank tells the others the box
-of its discs, the free faces in a box go there, and the owners of discs answer which faces have a disc near. Every step
-the ends of these faces travel to the owners of the discs, who compute the contacts, and their forces travel back; the
-owner of a face adds them up in the order of gids. So sums know no ranks, and only those exchange messages who share a
-contact.
+The strips of the particles and those of the blocks stay what they are. At a search all ranks learn the boxes around
+each one's discs, the free faces in a box go there, and the owners of discs answer which faces have a disc near. Every
+step the ends of these faces travel to the owners of the discs, who compute the contacts, and their forces travel back;
+the owner of a face adds them up in the order of gids. So sums know no ranks, and only those exchange messages who share
+a contact.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -42,23 +41,6 @@ class Touching:
     def nothing() -> Touching:
         """No contact."""
         return Touching(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-
-    def take(self, which: np.ndarray) -> Touching:
-        """Some of them."""
-        return Touching(self.gid[which], self.face[which], self.friction[which])
-
-    def shared_out(self, mine: np.ndarray, comm: Any) -> Touching:
-        """Those of the discs `mine`, from all ranks. Collective."""
-        here = np.isin(self.gid, mine)
-        if comm.size == 1:
-            return self.take(here)
-        away = self.take(~here)
-        others = comm.allgather((away.gid, away.face, away.friction))
-        found = [np.concatenate(part) for part in zip((self.gid, self.face, self.friction), *others)]
-        every = Touching(*found)
-        keep = np.isin(every.gid, mine)
-        keep[: len(here)] = here
-        return every.take(keep)
 
 
 def face_frictions(blocks: Blocks) -> np.ndarray:
@@ -98,16 +80,28 @@ class Link:
 
     # ---- search ------------------------------------------------------------------------------------------------------
 
-    def _box(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom, top of the owned discs and the room around them [m]."""
-        hot = self.particles.particles.hot[self._rows]
-        if not len(hot):
-            return math.inf, -math.inf, math.inf, -math.inf
-        x, y, r = hot[:, X], hot[:, Y], hot[:, RADIUS] + self.room
-        return float((x - r).min()), float((x + r).max()), float((y - r).min()), float((y + r).max())
+    def _reached(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which rectangles from `low` to `high` (n, 2) [m] overlap the box of a rank's discs and the room around them:
+        rows (m,) and ranks (m,) i8, row by row. Collective.
 
-    def _boxes(self) -> list[tuple[float, float, float, float]]:
-        return self.comm.allgather(self._box())
+        Ranks own strips from left to right: to the left of those that can be meant all boxes end before the rectangle,
+        to their right all begin behind it.
+        """
+        comm, hot = self.comm, self.particles.particles.hot[self._rows]
+        box = np.full((comm.size, 4), -math.inf)  # -left, right, -bottom, top
+        if len(hot):
+            x, y, r = hot[:, X], hot[:, Y], hot[:, RADIUS] + self.room
+            box[comm.rank] = -(x - r).min(), (x + r).max(), -(y - r).min(), (y + r).max()
+        comm.max_into(box)
+        left, right, bottom, top = box.T * np.array([[-1.0], [1.0], [-1.0], [1.0]])
+        first = np.searchsorted(np.maximum.accumulate(right), low[:, 0], side="right")
+        end = np.searchsorted(np.minimum.accumulate(left[::-1])[::-1], high[:, 0])
+        number = np.maximum(end - first, 0)
+        row = np.repeat(np.arange(len(low)), number)
+        rank = np.arange(len(row)) + np.repeat(first - (np.cumsum(number) - number), number)
+        meets = (high[row, 0] > left[rank]) & (low[row, 0] < right[rank])
+        meets &= (high[row, 1] > bottom[rank]) & (low[row, 1] < top[rank])
+        return row[meets], rank[meets]
 
     def _faces_near(self) -> tuple[np.ndarray, np.ndarray]:
         """Free faces of all ranks in the box of this one: (n, 6) number, row of the table of laws, ends; and the rank
@@ -125,12 +119,9 @@ class Link:
         ends = np.column_stack([x[i, 2 * k], x[i, 2 * k + 1], x[i, 2 * k2], x[i, 2 * k2 + 1]]).reshape(-1, 4)
         table = np.column_stack([4 * number[i] + k, kinds(blocks, 4 * number[i] + k), ends]).reshape(-1, 6)
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
-        parts = [
-            table[(high[:, 0] > left) & (low[:, 0] < right) & (high[:, 1] > bottom) & (low[:, 1] < top)]
-            for left, right, bottom, top in self._boxes()
-        ]
-        arrived = self.comm.alltoallv(parts)
-        return np.concatenate(arrived), np.repeat(np.arange(len(arrived)), [len(part) for part in arrived])
+        row, rank = self._reached(low, high)
+        sources, arrived = self.comm.to_ranks(rank, table[row])
+        return arrived, sources
 
     def _discs_by_cells(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         """Discs near the rectangle around places (n, 2): rows in the order of cells, keys of these, side of a cell."""
@@ -189,7 +180,9 @@ class Link:
     def _remember(self, known: Touching) -> None:
         """Friction of contacts that touched before the search. Collective."""
         gids = self.particles.particles.ihot[self._rows, GID]
-        mine = known.shared_out(gids, self.comm)
+        trail = self.particles.trail
+        mine = Touching(*trail.follow(self.comm, gids, known.gid, known.face, known.friction))
+        trail.begin()
         at = np.flatnonzero(np.isin(self.slot_gid, mine.gid))
         slots = dict(zip(zip(self.slot_gid[at].tolist(), self.slot_number[at].tolist()), at.tolist()))
         for gid, face, friction in zip(mine.gid.tolist(), mine.face.tolist(), mine.friction.tolist()):
@@ -209,12 +202,12 @@ class Link:
         number = blocks.number[own]
         x = blocks.x[own][:, :8]
         table = np.column_stack([number, x])[blocks.alive[number]]
-        low, high = table[:, 1::2].min(axis=1, initial=math.inf), table[:, 1::2].max(axis=1, initial=-math.inf)
-        bottom, top = table[:, 2::2].min(axis=1, initial=math.inf), table[:, 2::2].max(axis=1, initial=-math.inf)
-        parts = [
-            table[(high > box[0]) & (low < box[1]) & (top > box[2]) & (bottom < box[3])] for box in self._boxes()
-        ]  # fmt: skip
-        arrived = np.concatenate(self.comm.alltoallv(parts))
+        low, high = (
+            np.column_stack([how(table[:, axis::2], axis=1, initial=far) for axis in (1, 2)])
+            for how, far in ((np.min, math.inf), (np.max, -math.inf))
+        )
+        row, rank = self._reached(low, high)
+        _, arrived = self.comm.to_ranks(rank, table[row])
         corners = np.ascontiguousarray(arrived[:, 1:])
         p = self.particles.particles
         rows, key, side = self._discs_by_cells(corners.reshape(-1, 2))
@@ -229,27 +222,25 @@ class Link:
     def _make_messages(self, faces: np.ndarray, sources: np.ndarray) -> None:
         """Agree with the others on what travels in each step."""
         blocks, comm = self.blocks, self.comm
-        number = faces[self._used, 0].astype(np.int64)
-        cuts = np.searchsorted(sources[self._used], np.arange(comm.size + 1))
-        wanted = comm.alltoallv([number[a:b] for a, b in itertools.pairwise(cuts)])
+        owner = sources[self._used]
+        askers, wanted = comm.to_ranks(owner, faces[self._used, 0].astype(np.int64))
         cells = blocks.the_mesh().cells
 
         def corners(of: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             e, k = np.divmod(of, 4)
             return blocks.where[e], k, (k + 1) % corner_counts(cells[e])
 
-        self._asked = [corners(of) for of in wanted]
-        self._told = [np.empty((len(of), ENDS)) for of in wanted]
-        self._ends = [self.ends[a:b] for a, b in itertools.pairwise(cuts)]
+        self._asked = {rank: corners(wanted[of]) for rank, of in _runs(askers).items()}
+        self._told = {rank: np.empty((len(rows), ENDS)) for rank, (rows, *_) in self._asked.items()}
+        self._ends = {rank: self.ends[of] for rank, of in _runs(owner).items()}
         # The way back: slots by the owner of their face.
-        owner = sources[self._used][self.slot_face]
-        self._slots = [np.flatnonzero(owner == rank) for rank in range(comm.size)]
-        names = comm.alltoallv([np.column_stack([self.slot_gid[s], self.slot_number[s]]) for s in self._slots])
-        self._back = [np.zeros((len(s), 4)) for s in self._slots]
-        each = np.cumsum([0] + [len(part) for part in names])
-        gid, face = np.concatenate(names).T
+        to = owner[self.slot_face]
+        by_owner = np.argsort(to, kind="stable")
+        self._slots = {rank: by_owner[of] for rank, of in _runs(to[by_owner]).items()}
+        self._back = {rank: np.zeros((len(slots), 4)) for rank, slots in self._slots.items()}
+        senders, gid, face = comm.to_ranks(to, self.slot_gid, self.slot_number)
         self._arrived = np.zeros((len(gid), 4))
-        self._pieces = [self._arrived[a:b] for a, b in itertools.pairwise(each)]
+        self._pieces = {rank: self._arrived[of] for rank, of in _runs(senders).items()}
         self._order = np.lexsort((gid, face))
         self.face_number, self._of_face = np.unique(face, return_inverse=True)
         self.face_row, self.face_k, self.face_k2 = corners(self.face_number)
@@ -261,21 +252,19 @@ class Link:
         for into, outof, incoming, tag in (
             (self._to_discs, self._told, self._ends, TO_DISCS), (self._to_faces, self._back, self._pieces, TO_FACES),
         ):  # fmt: skip
-            for rank in range(comm.size):
-                if rank == comm.rank:
-                    continue
-                if len(incoming[rank]):
+            others = (incoming.keys() | outof.keys()) - {comm.rank}
+            for rank in sorted(others):
+                if rank in incoming:
                     into.append(comm.mpi.Recv_init(_bytes(incoming[rank]), rank, tag))
-                if len(outof[rank]):
+                if rank in outof:
                     into.append(comm.mpi.Send_init(_bytes(outof[rank]), rank, tag))
 
-    def _travel(self, requests: list[Any], outof: list[np.ndarray], into: list[np.ndarray]) -> None:
+    def _travel(self, requests: list[Any], outof: dict[int, np.ndarray], into: dict[int, np.ndarray]) -> None:
         comm: Any = self.comm
         if requests:
-            from mpi4py import MPI
-
-            MPI.Prequest.Startall(requests)
-        into[comm.rank][:] = outof[comm.rank]
+            comm.start_all(requests)
+        if comm.rank in into:
+            into[comm.rank][:] = outof[comm.rank]
         if requests:
             comm.wait_all(requests)
 
@@ -284,9 +273,8 @@ class Link:
         x, v = self.blocks.x, self.blocks.v
         timers = self.blocks.timers
         with timers("couple"):
-            for (rows, k, k2), out in zip(self._asked, self._told):
-                if len(out):
-                    disc_faces.pack(rows, k, k2, x, v, out)
+            for rank, (rows, k, k2) in self._asked.items():
+                disc_faces.pack(rows, k, k2, x, v, self._told[rank])
         with timers("exchange"):
             self._travel(self._to_discs, self._told, self._ends)
 
@@ -294,8 +282,8 @@ class Link:
         """Forces of contacts to the owners of the faces, added up there by faces. Collective."""
         timers = self.blocks.timers
         with timers("couple"):
-            for slots, out in zip(self._slots, self._back):
-                np.take(self.slot_force, slots, axis=0, out=out)
+            for rank, slots in self._slots.items():
+                np.take(self.slot_force, slots, axis=0, out=self._back[rank])
         with timers("exchange"):
             self._travel(self._to_faces, self._back, self._pieces)
         with timers("couple"):
@@ -311,6 +299,12 @@ class Link:
         for request in self._to_discs + self._to_faces:
             request.Free()
         self._to_discs, self._to_faces = [], []
+
+
+def _runs(ranks: np.ndarray) -> dict[int, slice]:
+    """Where each rank stands in an ascending list."""
+    found, first, number = np.unique(ranks, return_index=True, return_counts=True)
+    return {rank: slice(a, a + n) for rank, a, n in zip(found.tolist(), first.tolist(), number.tolist())}
 
 
 def _bytes(rows: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import GID, X, Y
 from hpcdem.core.rebuild import CheckInterval
+from hpcdem.halo.migrate import Trail
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.physics.coupling import saving
 from hpcdem.physics.coupling.kernels import disc_faces
@@ -544,6 +545,7 @@ class Coupled:
         self.mesh_replaced()
         self.blocks.surface_loads.remove(self)
         self.particles.coupled = False
+        self.particles.trail = Trail()
 
 
 def _cuts(ends: np.ndarray, p1: np.ndarray, p2: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.io import checkpoint
-from hpcdem.io.slabs import to_slabs
+from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.coupling.links import Touching
 from hpcdem.physics.dem import saving as of_particles
 from hpcdem.physics.fdem import saving as of_blocks
@@ -40,16 +40,12 @@ def restore(both: Coupled, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`, progress of the particles included; returns `extra`. Collective.
     CommandError if the file is missing, foreign or damaged; both models are then as they were."""
     state, tables = of_blocks.read(both.comm, path, KIND, "particles and blocks together")
-    of_the_discs = None
-    if tables is not None:
-        of_the_discs = {name.removeprefix(PREFIX): t for name, t in tables.items() if name.startswith(PREFIX)}
+    of_the_discs = {name.removeprefix(PREFIX): t for name, t in tables.items() if name.startswith(PREFIX)}
     both.begin_restore()
-    known = Touching.nothing()
-    if tables is not None:
-        rows = tables[CONTACTS]
-        known = Touching(rows["gid"], rows["face"], rows["friction"])
-        tables = of_blocks.without_particles(tables)
-    of_blocks.put(both.blocks, state, tables)
+    gid, face, friction = (tables[CONTACTS][name] for name in ("gid", "face", "friction"))
+    to = holders(both.comm, of_the_discs["particles"]["gid"], gid)
+    known = Touching(*both.comm.to_ranks(to, gid, face, friction)[1:])
+    of_blocks.put(both.blocks, state, of_blocks.without_particles(tables))
     of_particles.apply_state(both.particles, state["particles"], of_the_discs)
     both.particles.progress = state["particles"]["progress"]
     both.end_restore(state["coupled"], known)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,11 @@ from hpcdem.core.fields import (
     OFFSET_Y,
     TORQUE,
 )
+from hpcdem.halo.comm import SerialComm
+from hpcdem.halo.migrate import Trail
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from hpcdem.io.slabs import to_slabs
+from hpcdem.io.slabs import ask, holders, order_of, to_slabs
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
@@ -159,22 +161,21 @@ def _clump_tables(sim: Simulation) -> dict[str, Table]:
     return {"clumps": to_slabs(sim.comm, ("id",), clumps), "clump_members": to_slabs(sim.comm, ("gid",), members)}
 
 
-def _take_clumps(sim: Simulation, tables: dict[str, dict[str, np.ndarray]] | None) -> None:
-    """The rows of clumps, on this rank, of the particles it has."""
-    p = sim.particles
+def _take_clumps(sim: Simulation, tables: checkpoint.Tables) -> None:
+    """The rows of clumps of the particles of this rank. Collective."""
+    p, comm = sim.particles, sim.comm
     p.rigid = free_rows(len(p))
-    if tables is None:
-        return
     clumps, members = tables["clumps"], tables["clump_members"]
-    at = np.searchsorted(p["gid"], members["gid"])
-    of = np.searchsorted(clumps["id"], members["clump"])
-    rows = np.zeros((len(at), CLUMP_WIDTH))
+    state = np.zeros((len(clumps["id"]), CLUMP_WIDTH))
     for name, k in CLUMP_STATE.items():
-        rows[:, k] = clumps[name][of]
+        state[:, k] = clumps[name]
+    numbers = state.view(np.int64)
+    numbers[:, CLUMP], numbers[:, MEMBERS] = clumps["id"], clumps["members"]
+    of = holders(comm, clumps["id"], members["clump"])
+    rows = ask(comm, of, members["clump"], lambda asked: state[np.searchsorted(clumps["id"], asked)])
     rows[:, OFFSET_X], rows[:, OFFSET_Y] = members["dx"], members["dy"]
-    numbers = rows.view(np.int64)
-    numbers[:, CLUMP], numbers[:, MEMBERS] = members["clump"], clumps["members"][of]
-    p.rigid[at] = rows
+    _, gid, rows = comm.to_ranks(holders(comm, p["gid"], members["gid"]), members["gid"], rows)
+    p.rigid[np.searchsorted(p["gid"], gid)] = rows
 
 
 def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
@@ -184,22 +185,13 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     CYC or IMPLE in which it was, or None); what to do with it is the caller's affair. CommandError if the file is
     missing, foreign or damaged; the simulation is then as it was.
     """
-    found = None
-    error = None
-    if sim.comm.rank == 0:
-        try:
-            found = checkpoint.read(path)
-            if "kind" in found[0]:
-                raise HpcdemError(f"{path} is a checkpoint, but not one of particles: a PCDC script can restore it")
-        except HpcdemError as problem:
-            found, error = None, str(problem)
     try:
-        sim.comm.agree(error)
+        state, tables = checkpoint.read(path, sim.comm)
     except HpcdemError as problem:
         raise CommandError(str(problem)) from None
-    state = sim.comm.bcast(None if found is None else json.dumps(found[0]))
-    state = json.loads(state)
-    apply_state(sim, state, found[1] if found is not None else None)
+    if "kind" in state:
+        raise CommandError(f"{path} is a checkpoint, but not one of particles: a PCDC script can restore it")
+    apply_state(sim, state, tables)
     return {name: state[name] for name in ("script", "position", "progress")}
 
 
@@ -229,8 +221,8 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
     return None
 
 
-def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[str, np.ndarray]] | None) -> None:
-    """Take a state that was read; tables: on rank 0, else None. Collective."""
+def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:
+    """Take a state that was read; tables: this rank's slabs, which are let go of. Collective."""
     sim.clear()
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
@@ -259,32 +251,49 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: dict[str, dict[s
         sim.breaks[:] = state["breaks"]
     for name, parameters in state.get("physics", []):
         add_physics(sim, name, parameters)
-    origin = np.empty((0, 2)) if tables is None else _take_particles(sim, tables)
+    origin = _take_particles(sim, tables)
+    sim.trail.begin()
     sim.clumps = Clumps(**state.get("clumps", {}))
     if sim.clumps:
         _take_clumps(sim, tables)
+    tables.clear()  # the close needs the room
     if state["closed"]:
         _close_as_it_was(sim, state, origin)
+    if not sim.coupled:
+        sim.trail = Trail()
     sim.rebuilds = state["rebuilds"]
 
 
-def _take_particles(sim: Simulation, tables: dict[str, dict[str, np.ndarray]]) -> np.ndarray:
-    """All particles and histories, on this rank; the first close shares them out. Returns their positions at the last
-    rebuild (n, 2) [m]."""
-    columns = dict(tables["particles"])
+def _take_particles(sim: Simulation, tables: checkpoint.Tables) -> np.ndarray:
+    """Slabs of particles and their histories; the first close sends them to their owners. Returns their positions at
+    the last rebuild (n, 2) [m]. Collective."""
+    columns, comm = tables["particles"], sim.comm
     sim.particles.append(**{name: columns[name] for name in (*FIELDS, *sim.particles.extra)})
-    pairs, walls = tables["pairs"], tables["wall_contacts"]
+    sim.hist = histories(comm, columns["gid"], tables["pairs"], tables["wall_contacts"])
+    return np.column_stack([columns["x0"], columns["y0"]])
+
+
+def histories(
+    comm: SerialComm, gid: np.ndarray, pairs: Mapping[str, np.ndarray], walls: Mapping[str, np.ndarray]
+) -> Histories:
+    """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
+
+    pairs: each pair once, on any rank: gid < partner, fs, extra, bond; walls: gid, wall, fs, extra (see `Histories`).
+    """
     none = np.zeros(len(walls["gid"]), np.int64)
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
-    partner = np.concatenate([pairs["partner"], pairs["gid"], -1 - walls["wall"]])
-    fs = np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]])
-    extra = np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]])
-    bond = np.concatenate([pairs["bond"], pairs["bond"], none]).astype(np.int32)
-    gid = columns["gid"]
-    order = np.argsort(owner, kind="stable")
+    entries = (
+        np.concatenate([pairs["partner"], pairs["gid"], -1 - walls["wall"]]),
+        np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]]),
+        np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]]),
+        np.concatenate([pairs["bond"], pairs["bond"], none]),
+    )
+    _, owner, partner, fs, extra, bond = comm.to_ranks(holders(comm, gid, owner), owner, *entries)
+    # Of each particle: pairs with higher ids, pairs with lower ones, walls.
+    kind = np.where(partner > owner, 0, np.where(partner < 0, 2, 1))
+    order = order_of([owner, kind])
     ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
-    sim.hist = Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order])
-    return np.column_stack([columns["x0"], columns["y0"]])
+    return Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order])
 
 
 def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray) -> None:
@@ -294,17 +303,17 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     saved_lattice = dataclasses.replace(sim.lattice)
     travel = walls.travel.copy()
     now = walls.p1.copy(), walls.p2.copy()
-    gid, forces = p["gid"].copy(), p.cold[:, FX : TORQUE + 1].copy()
-    # The present positions travel with their particles in columns that the close does not read.
-    p.cold[:, FX : FX + 2] = p.positions()
+    gid, moving = p["gid"].copy(), np.hstack([p.positions(), p.cold[:, FX : TORQUE + 1]])
     p["x"][:], p["y"][:] = origin.T
     walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
     sim._close(frozen=True)
     walls.p1, walls.p2, walls.travel = now[0], now[1], travel
     sim.lattice = saved_lattice
-    p["x"][:], p["y"][:] = p.cold[:, FX], p.cold[:, FX + 1]
-    all_gid, all_forces = sim.comm.bcast((gid, forces))
-    sim.lists.set_owned_forces(all_forces[np.searchsorted(all_gid, p["gid"])])
+    gid, moving = sim.trail.follow(sim.comm, p["gid"], gid, moving)
+    order = np.argsort(gid)
+    moving = moving[order[np.searchsorted(gid, p["gid"], sorter=order)]]
+    p["x"][:], p["y"][:] = moving[:, :2].T
+    sim.lists.set_owned_forces(moving[:, 2:])
     if sim.clumps:
         sim.clumps.sum_forces(p, sim.halo, sim.lists)
     sim.lists.tally[:, LONGEST2] = state["longest2"]

@@ -27,7 +27,7 @@ from hpcdem.core.timers import Timers
 from hpcdem.decomp import strips
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
-from hpcdem.halo.migrate import Migration
+from hpcdem.halo.migrate import Migration, Trail
 from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.dem import guards
 from hpcdem.physics.dem.clumps import Clumps
@@ -149,6 +149,7 @@ class Simulation:
         self._hist: Histories | None = Histories.empty(0)
         self._lists: neighbours.ContactLists | None = None
         self.ownership = Ownership(self.comm, self.balance_on)
+        self.trail = Trail()
         self.origin = np.empty((0, 2))
         self.rebuilds = 0
         self._longest2 = 0.0
@@ -586,6 +587,7 @@ class Simulation:
             leave = strips.strays(cell, self.ownership.borders, self.comm.rank)
             migration = Migration(self.comm, len(p), leave, self.ownership.owner_of(columns(cell[leave])))
             leave = migration.leave
+            self.trail.note(p["gid"][leave], migration.leave_to)
             hist = self.hist.take(leave)
             rows = [p.hot[leave], p.cold[leave], p.more[leave]] + ([p.rigid[leave]] if p.rigid is not None else [])
             arrived, counts, entries = migration.exchange(np.hstack(rows), hist.counts(), hist.rows)

@@ -198,10 +198,7 @@ class Petsc:
         product = np.column_stack([self._place[of_rows].astype(float), np.full(len(of_rows), -1.0), of_values])
         table = np.concatenate([table, product])
         if self.comm.size > 1:
-            to = self._owner[np.concatenate([rows, of_rows])]
-            order = np.argsort(to, kind="stable")
-            cuts = np.searchsorted(to[order], np.arange(1, self.comm.size))
-            table = np.concatenate(self.comm.alltoallv(np.split(table[order], cuts)))
+            _, table = self.comm.to_ranks(self._owner[np.concatenate([rows, of_rows])], table)
         mine, n = self._end - self._first, self.unknowns.count
         of_given = table[:, 1] < 0.0
         self._coupling = np.bincount(table[of_given, 0].astype(np.int64) - self._first, table[of_given, 2], mine)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from hpcdem.io.slabs import to_slabs
+from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.memories import WORDS, Memories
 from hpcdem.physics.fdem.mesh import Mesh
@@ -116,64 +115,46 @@ def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
 def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
     """Take the blocks of a checkpoint that holds particles as well (hpcdem/physics/coupling/saving.py), without the
     kernels of these; returns `extra`, or None if the file is not one of both. Collective."""
-    found = None
-    if sim.comm.rank == 0:
-        try:
-            found = checkpoint.read(path)
-        except HpcdemError:
-            found = None
-        if found is not None and found[0].get("kind") != checkpoint.BOTH:
-            found = None
-    text = sim.comm.bcast(None if found is None else json.dumps(found[0]))
-    if text is None:
+    try:
+        state, tables = checkpoint.read(path, sim.comm, _replicated)
+    except HpcdemError:
         return None
-    state = json.loads(text)
-    put(sim, state, without_particles(found[1]) if found is not None else None)
+    if state.get("kind") != checkpoint.BOTH:
+        return None
+    put(sim, state, without_particles(tables))
     return state["extra"]
 
 
-def without_particles(tables: dict[str, Any]) -> dict[str, Any]:
+def _replicated(table: str) -> bool:
+    """Whether all ranks have all of this table: what is said about the model, see scene.py."""
+    return table not in ("state", "memories", checkpoint.LINKS) and not table.startswith(checkpoint.OF_PARTICLES)
+
+
+def without_particles(tables: checkpoint.Tables) -> checkpoint.Tables:
     """Those of the blocks among the tables of a checkpoint of both."""
     others = checkpoint.OF_PARTICLES
     return {name: table for name, table in tables.items() if not name.startswith(others) and name != checkpoint.LINKS}
 
 
-def read(
-    comm: SerialComm, path: Path | str, kind: str, what: str
-) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]] | None]:
-    """The state in a checkpoint of this kind, on all ranks, and its tables, on rank 0. Collective. what: its name in
-    messages. CommandError if the file is missing, foreign or damaged."""
-    found, error = None, None
-    if comm.rank == 0:
-        try:
-            found = checkpoint.read(path)
-            if found[0].get("kind") != kind:
-                raise HpcdemError(f"{path} is a checkpoint, but not one of {what}")
-        except HpcdemError as problem:
-            error = str(problem)
+def read(comm: SerialComm, path: Path | str, kind: str, what: str) -> tuple[dict[str, Any], checkpoint.Tables]:
+    """The state in a checkpoint of this kind, and its tables: slabs of those of elements, contacts and particles, all
+    rows of the others. Collective. what: its name in messages. CommandError if the file is missing, foreign or damaged.
+    """
     try:
-        comm.agree(error)
+        state, tables = checkpoint.read(path, comm, _replicated)
     except HpcdemError as problem:
         raise CommandError(str(problem)) from None
-    state = json.loads(comm.bcast(None if found is None else json.dumps(found[0])))
-    return state, None if found is None else found[1]
+    if state.get("kind") != kind:
+        raise CommandError(f"{path} is a checkpoint, but not one of {what}")
+    return state, tables
 
 
-def put(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | None) -> None:
-    """Take a state that was read; tables: on rank 0, else None. Collective."""
-    shared = None
-    if tables is not None:
-        shared = {name: table for name, table in tables.items() if name not in ("state", "memories")}
-    _apply(sim, state, sim.comm.bcast(shared), tables)
-
-
-def _apply(
-    sim: Solving, state: dict[str, Any], shared: dict[str, dict[str, np.ndarray]], tables: dict[str, Any] | None
-) -> None:
+def put(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> None:
+    """Take a state and tables that were read. Collective."""
     sim.clear()
     if state["mesh"] is not None:
-        points = np.column_stack([shared["mesh_points"][c] for c in "xy"])
-        cells = np.column_stack([shared["mesh_cells"][f"corner_{k}"] for k in range(4)])
+        points = np.column_stack([tables["mesh_points"][c] for c in "xy"])
+        cells = np.column_stack([tables["mesh_cells"][f"corner_{k}"] for k in range(4)])
         about = state["mesh"]
         mesh = Mesh(
             points,
@@ -187,14 +168,14 @@ def _apply(
         for kind, names in ARRAYS.items():
             for name in names:
                 array = getattr(sim, name)
-                array[:] = shared[kind][name].astype(array.dtype)
-        if "stress0" in shared:
-            sim.stress0 = np.column_stack([shared["stress0"][f"s{k}"] for k in range(4)])
+                array[:] = tables[kind][name].astype(array.dtype)
+        if "stress0" in tables:
+            sim.stress0 = np.column_stack([tables["stress0"][f"s{k}"] for k in range(4)])
             # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
-            sim.stress0_row[:] = shared["stress0"].get("row", sim.element_row)
-        if "born" in shared:
-            born_at = np.column_stack([shared["born"][f"p{k}"] for k in range(8)])
-            sim.take_births(shared["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
+            sim.stress0_row[:] = tables["stress0"].get("row", sim.element_row)
+        if "born" in tables:
+            born_at = np.column_stack([tables["born"][f"p{k}"] for k in range(8)])
+            sim.take_births(tables["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
     sim.take_scene_state(state["scene"])
     sim.clock = Clock(**state["clock"])
     sim.untouched = sim.clock.step == 0
@@ -211,14 +192,10 @@ def _apply(
     sim.rebuilds = state["rebuilds"]
 
 
-def _take_rows(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | None) -> dict[str, np.ndarray]:
-    """All rows on rank 0; the first close shares them out. Returns positions when storage and lists were made."""
+def _take_rows(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> dict[str, np.ndarray]:
+    """Slabs of rows; the first close sends them to their owners. Returns positions when storage and lists were made.
+    Collective."""
     width, speed = sim.x.shape[1], sim.v.shape[1]
-    if tables is None:
-        sim.number, sim.x, sim.v = np.empty(0, np.int64), np.empty((0, width)), np.empty((0, speed))
-        sim.cold = {name: np.empty((0, n)) for name, n in state["columns"].items()}
-        sim.memories = Memories.empty(0)
-        return {name: np.empty((0, width)) for name in ("origin", "listed")}
     rows, kept = tables["state"], tables["memories"]
 
     def table(name: str, n: int) -> np.ndarray:
@@ -230,8 +207,8 @@ def _take_rows(sim: Solving, state: dict[str, Any], tables: dict[str, Any] | Non
     words.view(np.int64)[:, 0] = kept["key"]
     for c in range(1, words.shape[1]):
         words[:, c] = kept[f"m{c}"]
-    owner = np.searchsorted(sim.number, kept["number"])
-    sim.memories = Memories.of(len(sim.number), owner, words)
+    _, number, words = sim.comm.to_ranks(holders(sim.comm, sim.number, kept["number"]), kept["number"], words)
+    sim.memories = Memories.of(len(sim.number), np.searchsorted(sim.number, number), words)
     return {name: table(name, width) for name in ("origin", "listed")}
 
 
