@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpcdem.commands.fdem.histories import UNITS
+from hpcdem.commands.fdem.records import UNITS
 from hpcdem.lang.pcdc import table as t
 from hpcdem.lang.pcdc.reference import page
 from hpcdem.lang.pcdc.trial import MODELS, python

@@ -13,8 +13,15 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
-from hpcdem.lang.pcdc.statement import Pending
 from hpcdem.lang.zdem.nearest import hint
+
+
+@dataclass(frozen=True)
+class Pending:
+    """A value that depends on expressions: `make` takes the values of all expressions of the line and returns it, or
+    raises ValueError with what was read and what was expected."""
+
+    make: Callable[[tuple[Any, ...]], Any]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.lang.pcdc.kinds import TableName
-from hpcdem.lang.pcdc.statement import Pending
+from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.table import Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
