@@ -209,7 +209,8 @@ COHESIVE = Model(
         Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
         Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, otherwise="that of opening",
                  low_itself=False),
-        Property("penalty_shear", "Pa", "penalty of shear", optional=True, otherwise="that of opening", low_itself=False),
+        Property("penalty_shear", "Pa", "penalty of shear", optional=True, otherwise="that of opening",
+                 low_itself=False),
     ),
     lambda values: _cohesive(values),
 )  # fmt: skip
