@@ -96,23 +96,24 @@ def test_numbers_and_owners(tmp_path):
 
 def test_files_of_another_kind(tmp_path):
     """The three kinds of checkpoints are told apart, and a failed restore leaves both models as they were."""
-    from hpcdem.physics.dem import saving
+    from hpcdem.physics.coupling import saving
+    from hpcdem.physics.dem import saving as of_particles
 
     both = both_of(tmp_path)
     both.advance(5)
     paths = {name: tmp_path / f"{name}.sav" for name in ("both", "discs", "blocks")}
-    both.save(paths["both"], {"a": 1})
-    saving.save(both.particles, paths["discs"])
+    saving.save(both, paths["both"], {"a": 1})
+    of_particles.save(both.particles, paths["discs"])
     both.blocks.save(paths["blocks"])
     with pytest.raises(CommandError, match="not one of a model of blocks"):
         both.blocks.restore(paths["both"])
     with pytest.raises(CommandError, match="not one of particles"):
-        saving.restore(both.particles, paths["both"])
+        of_particles.restore(both.particles, paths["both"])
     for name in ("discs", "blocks"):
         with pytest.raises(CommandError, match="not one of particles and blocks together"):
-            both.restore(paths[name])
+            saving.restore(both, paths[name])
     both.advance(5)
-    assert both.restore(paths["both"]) == {"a": 1} and both.blocks.clock.step == both.particles.clock.step == 5
+    assert saving.restore(both, paths["both"]) == {"a": 1} and both.blocks.clock.step == both.particles.clock.step == 5
 
 
 def test_blocks_that_are_replaced(tmp_path):

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.commands.dem import clumps, particles, properties, running, settings, walls
 from hpcdem.lang.zdem.parser import parse_text
+from hpcdem.physics.coupling import saving
 from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem import observe
 from hpcdem.physics.dem.budget import Budget
@@ -90,7 +91,7 @@ def main() -> None:
     kind, threads, steps, out, *more = sys.argv[1:]
     if more[:1] == ["resume"]:
         both = empty(kind, int(threads))
-        assert both.restore(more[1]) == {"kind": kind}
+        assert saving.restore(both, more[1]) == {"kind": kind}
         both.prepare()
     else:
         both = make(kind, int(threads))
@@ -101,7 +102,7 @@ def main() -> None:
     most, searches, where = 0, set(), set()
     while both.blocks.clock.step < int(steps):
         if len(more) == 2 and more[0] != "resume" and both.blocks.clock.step == int(more[0]):
-            both.save(more[1], {"kind": kind})
+            saving.save(both, more[1], {"kind": kind})
         both.advance(1)
         most = max(most, int(both.link.slot_on.sum()))
         searches.add(id(both.link))

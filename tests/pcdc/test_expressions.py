@@ -21,6 +21,14 @@ SAMPLES: dict[str, tuple[str, object]] = {
 """By the pattern of a kind: as it is written, and as an expression gives it."""
 
 
+def fits(kind: kinds.Kind, value: object) -> bool:
+    try:
+        kind.check(value)
+    except kinds.Unfit:
+        return False
+    return True
+
+
 class Writer:
     """Writes a line, with every value as it is (expressions False) or as an expression, v[0], v[1], ..."""
 
@@ -29,6 +37,8 @@ class Writer:
 
     def value(self, kind: kinds.Kind) -> str:
         text, value = SAMPLES[kind.pattern] if kind.pattern in SAMPLES else (kind.words[0], kind.words[0])
+        if text == "0.25" and not fits(kind, value):
+            text, value = "1.5", 1.5
         if not self.expressions:
             return text
         self.values.append(value)

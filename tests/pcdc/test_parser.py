@@ -162,7 +162,7 @@ REFUSED = [
     ("element c-model mech-iso-x", "read 'mech-iso-x' after 'element c-model', expected one of"),
     ("element c-model mech-iso-e y 1 p-r 0.2", "lacks den{sity}"),
     ("element c-model mech-iso-e den 1 y 1", "needs young and poisson-ratio or shear and bulk"),
-    ("element c-model mech-iso-e den 1 y 1 p-r 0.5", "read '0.5', expected a number above -1 and below 0.5"),
+    ("element c-model mech-iso-e den 1 y 1 p-r 0.5", "read '0.5', expected a number above -1, at most 0.4999"),
     ("element c-model mech-iso-e den 1 y 1 p-r 0.2 colour 3", "after 'element c-model mechanical-iso-elastic'"),
     ("element c-model null density 3", "read 'density' after 'element c-model null'"),
     ("element-face c-model contact-m-c p 3", "it may mean penalty-normal (at least 'p-n'), penalty-shear"),

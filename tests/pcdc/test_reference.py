@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
-from hpcdem.commands.fdem.histories import UNITS
+import pytest
+
+from hpcdem.commands.fdem.records import UNITS
+from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import table as t
+from hpcdem.lang.pcdc import trial
+from hpcdem.lang.pcdc.kinds import Unfit
+from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.reference import page
 from hpcdem.lang.pcdc.trial import MODELS, python
 from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.properties import Property
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pcdc_reference.md"
 
@@ -59,6 +68,43 @@ def test_models_have_the_properties_of_the_simulation():
     for name, inner in MODELS.items():
         mine = {python(option.name) for option in rows[name].options}
         assert mine - {"np"} == {p.name for p in inner.properties}, name
+
+
+@pytest.mark.parametrize("model", [t.ISO_ELASTIC, t.CONTACT, t.COHESIVE], ids=lambda model: model.keyword.name)
+def test_properties_are_declared_once(model):
+    """Words and units are those of the simulation, and so are limits."""
+    for option in model.options:
+        if option.name == "np":
+            continue
+        one, (kind,) = model.of.property(python(option.name)), option.values
+        assert (option.doc, option.unit) == (one.doc, one.unit)
+        for bound, outside, itself in ((one.low, -math.inf, one.low_itself), (one.high, math.inf, True)):
+            for value, fits in ((bound, itself), (math.nextafter(bound, outside), False)):
+                if not fits or math.isinf(bound):
+                    with pytest.raises(Unfit):
+                        kind.check(value)
+                else:
+                    assert kind.check(value) == one.check(value) == value
+
+
+def test_a_new_property_is_a_word_of_the_language(monkeypatch):
+    """Declared with the model of the simulation it is parsed, limited, and told on the page, without a row here."""
+    new = Property("tip_toughness", "MPa m0.5", "toughness of the tip", 2.0, low=1.0, high=3.0)
+    inner = replace(t.COHESIVE.of, properties=(*t.COHESIVE.of.properties, new))
+    model = replace(t.COHESIVE, options=t.declared(inner, "c{ohesion}"), of=inner)
+    command = replace(t.PCDC.command("face-joint c-model"), models=(model,))
+    table = t.Table((command, t.PCDC.command("element c-model")), t.RANGE_TERMS)
+    monkeypatch.setitem(trial.MODELS, model.keyword.name, inner)
+
+    def read(value: str):
+        words = f"face-joint c-model c-i-c-i c 1 tensile-strength 1 gf1 1 gf2 1 tip-toughness {value}"
+        return parse(words, "a.sc", 1, words, table).arguments["properties"]
+
+    assert read("1.5")["tip-toughness"] == 1.5
+    with pytest.raises(ScriptError, match=r"read '3\.5', expected a number from 1 to 3 for 'tip-toughness'"):
+        read("3.5")
+    row = next(line for line in page(table).splitlines() if line.startswith("| `tip-toughness`"))
+    assert row.endswith("| MPa m0.5 | 2 | toughness of the tip |")
 
 
 def test_histories_record_what_the_verbs_can():

@@ -3,40 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.histories import find
 from hpcdem.commands.fdem.project import Project
+from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.files import write_sections
 
 FIGURES = (".png", ".pdf", ".svg")
-
-
-@dataclass
-class Curve:
-    """x, y: names of histories (x "": the time), with factors; or points (x, y). style: line or points."""
-
-    label: str
-    x: str = ""
-    y: str = ""
-    scale_x: float = 1.0
-    scale_y: float = 1.0
-    points: list[tuple[float, float]] = field(default_factory=list)
-    style: str = "line"
-
-
-@dataclass
-class Chart:
-    """A diagram and its curves."""
-
-    title: str = ""
-    x_label: str = ""
-    y_label: str = ""
-    curves: list[Curve] = field(default_factory=list)
 
 
 def create(project: Project, name: str, title: str = "", x_label: str = "", y_label: str = "") -> None:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.physics.fdem import saving
+from hpcdem.physics.fdem import saving as of_blocks
 
 if TYPE_CHECKING:
     from hpcdem.physics.coupling.model import Coupled
@@ -208,7 +208,9 @@ def take_up(project: Project) -> None:
     """A run that goes on from a checkpoint: both as they were when it was written, in the middle of a command."""
     both = project.coupled
     if both is not None and project.continues is not None:
-        both.restore(project.continues)
+        from hpcdem.physics.coupling import saving
+
+        saving.restore(both, project.continues)
         both.particles.edited, both.particles.resumed = False, True
         project.continues = None
 
@@ -225,10 +227,11 @@ def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
     """Write all that is stepped together. Collective."""
     if project.coupled is not None:
         from hpcdem.engine import output
+        from hpcdem.physics.coupling import saving
 
         take_up(project)
         output.secure_series(project.coupled.particles)
-        project.coupled.save(path, extra)
+        saving.save(project.coupled, path, extra)
     else:
         project.blocks.save(path, extra)
 
@@ -237,7 +240,9 @@ def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
     """Take the state of a file; begins: the script has still to run, particles are taken when it steps first after
     hpcdem.couple. Collective."""
     if project.coupled is not None:
-        of_both = project.coupled.restore(path)
+        from hpcdem.physics.coupling import saving
+
+        of_both = saving.restore(project.coupled, path)
         sim = project.coupled.particles
         sim.progress = None  # the command in which it was written is not taken up
         if sim.energy is not None and sim.energy.running:
@@ -245,7 +250,7 @@ def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
         return of_both
     if not begins:
         return project.blocks.restore(path)
-    found = saving.restore_part(project.blocks, path)
+    found = of_blocks.restore_part(project.blocks, path)
     if found is None:
         return project.blocks.restore(path)
     project.continues = path

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.io.columns import append_rows
-from hpcdem.physics.fdem.simulation import Crack
+from hpcdem.physics.fdem.state import Crack
 
 NAME = "cracks.csv"
 COLUMNS = {

@@ -2,142 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from hpcdem.commands.fdem.choosing import chosen, everything
 from hpcdem.commands.fdem.project import Project
+from hpcdem.commands.fdem.records import ENERGIES, MODEL, UNITS, History
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
-from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, Ids, Range
+from hpcdem.physics.fdem.groups import ELEMENT, NODE, Ids, Range
 
-if TYPE_CHECKING:
-    from hpcdem.physics.fdem.local import Local
-    from hpcdem.physics.fdem.model import Blocks
-    from hpcdem.physics.fdem.probes import Probe
-
-MODEL = "model"
-UNITS = {
-    NODE: {
-        "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
-        "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m",
-    },
-    ELEMENT: {"stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa"},
-    JOINT: {
-        "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
-        "normal_stress_largest": "Pa", "normal_stress_first": "Pa", "normal_stress_middle": "Pa",
-        "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
-        "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
-    },
-    MODEL: {
-        "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",
-        "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
-        "contact_energy": "J/m", "viscous_loss": "J/m", "gravity_work": "J/m", "outside_work": "J/m",
-        "disc_work": "J/m", "energy_error": "J/m",
-    },
-}  # fmt: skip
-"""What can be recorded of each kind of object, with its unit."""
-_FORCES = ("reaction_x", "reaction_y")
 FLUSH = 500
 """Records that wait at most before they go to the file."""
-
-
-def _of_joints(kind: int) -> Callable[[Any], float]:
-    return lambda blocks: float(blocks.joint_counts()[kind])
-
-
-def _energy(name: str) -> Callable[[Any], float]:
-    return lambda blocks: float(blocks.energies()[name])
-
-
-_OF_MODEL: dict[str, Callable[[Any], float]] = {
-    "time": lambda blocks: float(blocks.clock.time),
-    "cycle": lambda blocks: float(blocks.clock.step),
-    "ratio": lambda blocks: float(blocks.unbalanced_ratio()),
-    "intact_joints": _of_joints(0),
-    "yielded_joints": _of_joints(1),
-    "broken_joints": _of_joints(2),
-    "kinetic_energy": _energy("kinetic"),
-    "strain_energy": _energy("strain"),
-    "joint_energy": _energy("joints"),
-    "joint_loss": _energy("joints_lost"),
-    "contact_energy": _energy("contact"),
-    "viscous_loss": _energy("viscous_lost"),
-    "gravity_work": _energy("work_gravity"),
-    "outside_work": _energy("work_outside"),
-    "disc_work": _energy("work_discs"),
-    "energy_error": _energy("closing"),
-}
-ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")
-
-
-@dataclass
-class History:
-    """kind: of object, or MODEL; value: name of the quantity; numbers: of the objects; how: "", or sum, mean, minimum,
-    maximum of several; every: steps between two records; rows: (step, time, value); filed: rows that are in the
-    file."""
-
-    kind: str
-    value: str
-    numbers: list[int] = field(default_factory=list)
-    how: str = ""
-    every: int = 1
-    rows: list[tuple[int, float, float]] = field(default_factory=list)
-    filed: int = 0
-
-    def __post_init__(self) -> None:
-        self._probe: Probe | None = None
-        self._waits: tuple[int, float, Local, int] | None = None
-
-    @property
-    def unit(self) -> str:
-        return UNITS[self.kind][self.value]
-
-    @property
-    def waits(self) -> bool:
-        """Its record of this step comes with the forces of the next one."""
-        return self._waits is not None
-
-    def record(self, blocks: Blocks, goes_on: bool) -> None:
-        """Add the number of this step, once. goes_on: steps follow, in which the forces at the present positions are
-        computed anyway; those of supports are taken from there (`take`). Collective."""
-        clock = blocks.clock
-        if self.waits or (self.rows and self.rows[-1][0] == clock.step):
-            return
-        if goes_on and self.value in _FORCES:
-            probe = self._probe_of(blocks)
-            probe.find()
-            assert probe.local is not None
-            self._waits = int(clock.step), float(clock.time), probe.local, probe.local.passes
-        else:
-            self.rows.append((int(clock.step), float(clock.time), self.measure(blocks)))
-
-    def take(self, blocks: Blocks) -> None:
-        """Add the record that waits, if there is one. Collective."""
-        if self._waits is None:
-            return
-        step, time, local, passes = self._waits
-        self._waits = None
-        if local.passes == passes + 1:
-            self.rows.append((step, time, self._probe_of(blocks).reduced(self.how, local)))
-        elif step == blocks.clock.step:
-            self.rows.append((step, time, self.measure(blocks)))
-
-    def _probe_of(self, blocks: Blocks) -> Probe:
-        if self._probe is None or self._probe.sim is not blocks:
-            self._probe = blocks.probe(self.value, self.numbers)
-        return self._probe
-
-    def measure(self, blocks: Any) -> float:
-        """The number now. Collective, equal on all ranks."""
-        if self.kind == MODEL:
-            return _OF_MODEL[self.value](blocks)
-        return self._probe_of(blocks).reduced(self.how)
 
 
 def create(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from hpcdem.commands.fdem.choosing import chosen
-from hpcdem.commands.fdem.histories import ENERGIES
 from hpcdem.commands.fdem.project import Project
+from hpcdem.commands.fdem.records import ENERGIES
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
 

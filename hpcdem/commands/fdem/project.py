@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.commands.fdem.records import Chart, History
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.connectivity import Edges
 from hpcdem.physics.fdem.groups import ELEMENT, KINDS, NODE, Groups
@@ -18,8 +19,6 @@ from hpcdem.runtime import launch, run_folder
 
 if TYPE_CHECKING:
     from hpcdem.commands.dem.running import Due
-    from hpcdem.commands.fdem.charts import Chart
-    from hpcdem.commands.fdem.histories import History
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.fdem.model import Blocks
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from hpcdem.commands.fdem import coupling, frames
-from hpcdem.commands.fdem.charts import Chart, Curve
-from hpcdem.commands.fdem.histories import History, flush
+from hpcdem.commands.fdem.histories import flush
 from hpcdem.commands.fdem.project import Project
+from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
 from hpcdem.physics.fdem.groups import Groups
 from hpcdem.pre.mesh.geometry import Layers

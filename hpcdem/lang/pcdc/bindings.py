@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import TableName
-from hpcdem.lang.pcdc.statement import Statement
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
-
-if TYPE_CHECKING:
-    from hpcdem.lang.pcdc.execute import Interpreter
 
 Terms = tuple[tuple[str, Any], ...]
 
 
 class Call:
-    """A command on its way to its verb: arguments with all expressions evaluated, by name; where: its range."""
+    """A command on its way to its verb: arguments with all expressions evaluated, by name; where: its range;
+    restore_names: puts the names and functions of a checkpoint (of this file) into the script."""
 
     def __init__(
-        self, interpreter: Interpreter, statement: Statement, arguments: Mapping[str, Any], terms: Terms | None
-    ) -> None:
-        self.interpreter, self.statement = interpreter, statement
-        self.project: Any = interpreter.project
-        self.verbs: Any = interpreter.verbs
-        self.arguments: Mapping[str, Any] = arguments
+        self, project: Any, verbs: Any, arguments: Mapping[str, Any], terms: Terms | None,
+        restore_names: Callable[[Mapping[str, Any], str], None],
+    ) -> None:  # fmt: skip
+        self.project, self.verbs, self.arguments = project, verbs, arguments
+        self.restore_names = restore_names
         self.where: g.Range | None = where(terms)
 
     def __getitem__(self, name: str) -> Any:
@@ -80,7 +76,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
 
 def _restore(call: Call) -> None:
     found = call.verbs.saving.restore(call.project, call["file"])
-    call.interpreter.restore_names(found, call["file"])
+    call.restore_names(found, call["file"])
 
 
 # ---- geometry and mesh ---------------------------------------------------------------------------------------------

@@ -7,9 +7,8 @@ from collections import Counter
 
 from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import source
-from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
-from hpcdem.lang.pcdc.statement import Pending
 from hpcdem.physics.fdem.tables import Drawn, Over
 
 

@@ -182,7 +182,7 @@ class Interpreter:
         if asked and self.journal is not None:
             self.verbs.running.stop_here(self.project, asked)
         try:
-            VERBS[statement.command.name](Call(self, statement, arguments, terms))
+            VERBS[statement.command.name](Call(self.project, self.verbs, arguments, terms, self.restore_names))
         except HpcdemError as error:
             known = self._told_with_line(error, statement)
             if self.journal is not None:

@@ -13,8 +13,15 @@ from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
-from hpcdem.lang.pcdc.statement import Pending
 from hpcdem.lang.zdem.nearest import hint
+
+
+@dataclass(frozen=True)
+class Pending:
+    """A value that depends on expressions: `make` takes the values of all expressions of the line and returns it, or
+    raises ValueError with what was read and what was expected."""
+
+    make: Callable[[tuple[Any, ...]], Any]
 
 
 @dataclass(frozen=True)
@@ -131,7 +138,6 @@ FLOAT = Kind("<f>", "a number", number())
 POSITIVE = Kind("<f>", "a number above 0", number(0.0, above=True))
 PART = Kind("<f>", "a number above 0, at most 1", number(0.0, 1.0, above=True))
 NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
-POISSON = Kind("<f>", "a number above -1 and below 0.5", number(-1.0 + 1e-12, 0.5 - 1e-12))
 ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 1e-9))
 TABLED = Kind("<f>|table <s>", "a number or table 'name'", number(), tabled=True)
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
@@ -147,6 +153,18 @@ VECTOR = Kind("<v>", "a vector (x,y)", _vector)
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector, optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector, many=True)
 STRINGS = Kind("<s> ...", "texts in quotes", _string, many=True)
+
+
+def limited(low: float, high: float, low_itself: bool, unit: str = "") -> Kind:
+    """A number in [low, high] or ]low, high]."""
+    if math.isinf(high):
+        if low == 0.0:
+            return NOT_NEGATIVE if low_itself else POSITIVE
+        bounds = f", at least {low:g}" if low_itself else f" above {low:g}"
+    else:
+        bounds = f" from {low:g} to {high:g}" if low_itself else f" above {low:g}, at most {high:g}"
+    meaning = f"an angle{bounds} [degrees]" if unit == "degrees" else f"a number{bounds}"
+    return Kind("<f>", meaning, number(low, high, above=not low_itself))
 
 
 def choice(*words: str) -> Kind:

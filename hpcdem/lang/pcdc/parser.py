@@ -8,8 +8,9 @@ from typing import Any, NoReturn
 from hpcdem.core.errors import ScriptError
 from hpcdem.lang.pcdc import kinds, lexer, rules, trial
 from hpcdem.lang.pcdc.keywords import Keyword, Row, beginning, matching
+from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.lexer import Escape, Token, Word
-from hpcdem.lang.pcdc.statement import Pending, Statement, resolved, shown
+from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem.tables import Drawn, Over

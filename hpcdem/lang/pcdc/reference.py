@@ -11,7 +11,7 @@ from hpcdem.lang.pcdc.table import PCDC, RECORDED, Command, Model, Option, Table
 _TOP = """\
 # PCDC commands
 
-This page is made from the table in `hpcdem/lang/pcdc/table.py`; do not edit it
+This page is made from `hpcdem/lang/pcdc/table.py` and `hpcdem/physics/fdem/properties.py`; do not edit it
 (`python -m hpcdem.lang.pcdc.reference > docs/pcdc_reference.md`).
 
 ## How a script is read

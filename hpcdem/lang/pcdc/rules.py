@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hpcdem.lang.pcdc.statement import Pending
+from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.table import RECORDED, Command
 
 

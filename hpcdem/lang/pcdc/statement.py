@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hpcdem.core.errors import ScriptError
-
-if TYPE_CHECKING:
-    from hpcdem.lang.pcdc.table import Command
-
-
-@dataclass(frozen=True)
-class Pending:
-    """A value that depends on expressions: `make` takes the values of all expressions of the line and returns it, or
-    raises ValueError with what was read and what was expected."""
-
-    make: Callable[[tuple[Any, ...]], Any]
+from hpcdem.lang.pcdc import rules
+from hpcdem.lang.pcdc.kinds import Pending
+from hpcdem.lang.pcdc.table import Command
 
 
 @dataclass(frozen=True)
@@ -43,8 +35,6 @@ class Statement:
     def resolve(self, values: tuple[Any, ...]) -> tuple[dict[str, Any], tuple[tuple[str, Any], ...] | None]:
         """Arguments and range with the values of the expressions put in. ScriptError if one of them is of the wrong
         kind, or if they do not go together."""
-        from hpcdem.lang.pcdc import rules
-
         try:
             arguments = {name: resolved(value, values) for name, value in self.arguments.items()}
             terms = None if self.range is None else tuple((name, resolved(v, values)) for name, v in self.range)

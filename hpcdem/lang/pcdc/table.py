@@ -1,8 +1,9 @@
 """Every command, model and keyword of the PCDC language, in one table.
 
 Parsing, abbreviations, candidates in messages, completion in the console and the page docs/pcdc_reference.md are all
-made from the rows below; a new keyword is one new row. Words are in the manual's notation (`keywords`). A row with
-`later` is known, and refused with that sentence before anything runs.
+made from the rows below; a new keyword is one new row. Properties of elements, faces and joints are declared with the
+models of the simulation (physics/fdem/properties.py) and only get their spelling here. Words are in the manual's
+notation (`keywords`). A row with `later` is known, and refused with that sentence before anything runs.
 
 `manual` marks what the manual itself prints; the other commands are hpcdem's, since the manual refers to an online
 help for them. Spellings of the manual that are slips stand first where scripts may use them, the right ones beside
@@ -11,7 +12,7 @@ them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -29,7 +30,6 @@ from hpcdem.lang.pcdc.kinds import (
     OPTIONAL_VECTOR,
     PART,
     POINTS,
-    POISSON,
     POSITIVE,
     STRING,
     STRINGS,
@@ -39,8 +39,10 @@ from hpcdem.lang.pcdc.kinds import (
     ZERO_OR_MORE,
     Kind,
     choice,
+    limited,
     varied,
 )  # fmt: skip
+from hpcdem.physics.fdem import properties
 
 THREE_D = "this version computes in two dimensions"
 FLOW = "fluid in fractures comes later; this version computes mechanics"
@@ -84,7 +86,8 @@ class Option:
 @dataclass(frozen=True)
 class Model:
     """A constitutive model or boundary condition with its properties. number: of the manual's table; one_of: sets of
-    properties of which one must be complete; any_of: at least one property must be given."""
+    properties of which one must be complete; any_of: at least one property must be given; of: the model of the
+    simulation."""
 
     notation: str
     number: str
@@ -94,6 +97,7 @@ class Model:
     any_of: bool = False
     later: str = ""
     also: tuple[str, ...] = ()
+    of: properties.Model | None = None
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -158,25 +162,37 @@ SET = Option("set", (STRING,), "the set of the group", default="'default'")
 
 # ---- models of solids (tables 1 to 3, 12) --------------------------------------------------------------------------
 
-_DENSITY = Option("den{sity}", (varied(POSITIVE),), "density", "kg/m3", required=True)
-_YOUNG = Option("y{oung}", (varied(POSITIVE),), "Young's modulus E", "Pa")
-_POISSON = Option("p{oisson}-r{atio}", (varied(POISSON),), "Poisson's ratio", "1")
-_SHEAR = Option(
-    "s{hear}", (varied(POSITIVE),), "shear modulus, with bulk in the place of young and poisson-ratio", "Pa"
-)
-_BULK = Option("b{ulk}", (varied(POSITIVE),), "bulk modulus, with shear in the place of young and poisson-ratio", "Pa")
-_DAMP = Option("d{amp}-f{actor}", (varied(NOT_NEGATIVE),), "viscous damping, part of the critical; without effect in "
-               "static runs", "1", "0")  # fmt: skip
-_FRICTION = Option(
-    "fri{ction}", (varied(ANGLE),), "friction of its surfaces where they have no contact model", "degrees", "0"
-)
-_PENALTY = Option("pen{alty}", (varied(POSITIVE),), "contact penalty of its surfaces where they have no contact model",
-                  "Pa", "10 E")  # fmt: skip
+
+def declared(
+    model: properties.Model, *notations: str, also: Mapping[str, tuple[str, ...]] | None = None
+) -> tuple[Option, ...]:
+    """One option for each property of a model, with its limits, unit, text and default.
+
+    notations: of those that may be shortened, in the order of the page, others follow by their names; also: see
+    `Option`.
+    """
+    names = [Keyword(notation).name for notation in notations]
+    more = [name for one in model.properties if (name := one.name.replace("_", "-")) not in names]
+    options = []
+    for notation, name in zip((*notations, *more), (*names, *more)):
+        one = model.property(name.replace("-", "_"))
+        default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
+        kind = varied(limited(one.low, one.high, one.low_itself, one.unit))
+        required = not (default or one.optional)
+        options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
+    return tuple(options)
+
+
+_ELASTIC = declared(
+    properties.MECH_ISO_ELASTIC, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
+    "fri{ction}", "pen{alty}",
+)  # fmt: skip
+_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP, _FRICTION = _ELASTIC[:7]
 _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
 
 ISO_ELASTIC = Model(
     "mech{anical}-iso-e{lastic}", "1", "Isotropic, linear elastic, for large rotations.",
-    (_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP, _FRICTION, _PENALTY), one_of=_PAIRS,
+    _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC,
 )  # fmt: skip
 NULL = Model(
     "null", "", "The elements are taken out: excavated. Faces beside them become free. Another model in a range that "
@@ -271,27 +287,18 @@ CONST_HEAT = Model(
 CONTACT = Model(
     "c{ontact}-m{ohr}-c{oulomb}", "8",
     "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
-    (Option("f{riction}", (varied(ANGLE),), "friction angle", "degrees", "0"),
-     Option("p{enalty}-n{ormal}", (varied(POSITIVE),), "normal penalty; 10 to 100 E is usual", "Pa", "10 E"),
-     Option("p{enalty}-s{hear}", (varied(POSITIVE),), "shear penalty", "Pa", "10 E"),
-     Option("d{amping}-t", (varied(POSITIVE),), "stress from which contacts lose energy", "Pa", "never"),
-     Option("d{amping}-b", (varied(POSITIVE),), "exponent of that loss", "1", "1"),
-     Option("d{amping}-r{atio}", (varied(NOT_NEGATIVE),), "normal dashpot, part of the critical damping of two "
-            "elements; the larger of two surfaces counts; without effect in static runs", "1", "0")),
+    declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
+             "d{amping}-b", "d{amping}-r{atio}"),
+    of=properties.CONTACT_MOHR_COULOMB,
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
     "Cohesive joints between elements: they hold up to their strength, soften, break, and are contacts from then on.",
-    (Option("f{riction}", (varied(ANGLE),), "friction angle", "degrees", "0"),
-     Option("c{ohesion}", (varied(NOT_NEGATIVE),), "cohesion", "Pa", required=True),
-     Option("t{ensile}-s{trength}", (varied(NOT_NEGATIVE),), "tensile strength", "Pa", required=True),
-     Option("gf1", (varied(NOT_NEGATIVE),), "fracture energy, mode I", "N/m", required=True),
-     Option("gf2", (varied(NOT_NEGATIVE),), "fracture energy, mode II", "N/m", required=True),
-     Option("p{enalty}-o{verlay}", (varied(POSITIVE),), "penalty of a closed joint", "Pa", "10 E",
-            also=("p{enalty}-o{verlap}",)),
-     Option("p{enalty}-n{ormal}", (varied(POSITIVE),), "penalty of opening", "Pa", "10 E"),
-     Option("p{enalty}-s{hear}", (varied(POSITIVE),), "penalty of shear", "Pa", "10 E"),
+    (*declared(properties.COHESIVE, "f{riction}", "c{ohesion}", "t{ensile}-s{trength}", "gf1", "gf2",
+               "p{enalty}-o{verlay}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}",
+               also={"penalty-overlay": ("p{enalty}-o{verlap}",)}),
      Option("np", (POINTS,), "integration points", "1", "3")),
+    of=properties.COHESIVE,
 )  # fmt: skip
 _POROUS = (
     Option("f{luid}-den{sity}", (POSITIVE,), "", "kg/m3"), Option("f{luid}-b{ulk}", (POSITIVE,), "", "Pa"),

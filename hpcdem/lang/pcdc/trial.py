@@ -6,17 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.lang.pcdc.kinds import TableName
-from hpcdem.lang.pcdc.statement import Pending
-from hpcdem.lang.pcdc.table import Command
+from hpcdem.lang.pcdc.kinds import Pending, TableName
+from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
-MODELS = {
-    "mechanical-iso-elastic": properties.MECH_ISO_ELASTIC,
-    "contact-mohr-coulomb": properties.CONTACT_MOHR_COULOMB,
-    "classic-intrinsic-cohesive-interface": properties.COHESIVE,
-}
+MODELS = {model.keyword.name: model.of for model in (ISO_ELASTIC, CONTACT, COHESIVE) if model.of is not None}
 """Models of the language by their names in full."""
 _OF_COMMAND = {
     "element property": properties.MECH_ISO_ELASTIC,

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,7 +21,6 @@ from hpcdem.core.fields import GID, X, Y
 from hpcdem.core.rebuild import CheckInterval
 from hpcdem.halo.migrate import Trail
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
-from hpcdem.physics.coupling import saving
 from hpcdem.physics.coupling.kernels import disc_faces
 from hpcdem.physics.coupling.links import Link, Touching, face_frictions
 from hpcdem.physics.dem import observe
@@ -503,16 +501,7 @@ class Coupled:
             found["relative"] = abs(found["closing"]) / max(max(flows), 1e-300)
         return found
 
-    # ---- files -------------------------------------------------------------------------------------------------------
-
-    def save(self, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
-        """Write the state of both into one file, and `extra` (JSON values) with it. Reads only."""
-        saving.save(self, path, extra or {})
-
-    def restore(self, path: Path | str) -> dict[str, Any]:
-        """Take the state of both from a file, on any number of ranks and threads; returns `extra`. CommandError if the
-        file is missing, foreign or damaged; both are then as they were."""
-        return saving.restore(self, path)
+    # ---- state -------------------------------------------------------------------------------------------------------
 
     def known(self) -> Touching:
         """What contacts remember."""

@@ -8,22 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hpcdem.io import checkpoint
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.coupling.links import Touching
+from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem import saving as of_particles
 from hpcdem.physics.fdem import saving as of_blocks
-
-if TYPE_CHECKING:
-    from hpcdem.physics.coupling.model import Coupled
 
 KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LINKS
 
 
 def save(both: Coupled, path: Path | str, extra: Mapping[str, Any]) -> None:
-    """Write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
+    does not. Collective."""
     particles, blocks = both.particles, both.blocks
     with blocks.timers("checkpoint"):
         state = of_blocks.state_of(blocks, extra)

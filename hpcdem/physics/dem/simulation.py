@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -39,7 +39,6 @@ from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.walls import Walls
-from hpcdem.physics.particle_physics import ParticlePhysics
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
@@ -66,6 +65,36 @@ class Watcher:
 
     every: int
     call: Callable[[], object]
+
+
+class ParticlePhysics(Protocol):
+    """Physics on particles beside their motion, as the step sees them (physics/particle_physics.py).
+
+    fields: unit, meaning and initial value by name; energies: the diagnostics [J] that are columns of energy.csv.
+    """
+
+    name: ClassVar[str]
+    fields: ClassVar[Mapping[str, tuple[str, str, float]]]
+    energies: ClassVar[tuple[str, ...]]
+
+    def parameters(self) -> dict[str, float]:
+        """What it was made with, for checkpoints."""
+
+    def diagnostics(self) -> Mapping[str, tuple[str, Callable[[Simulation], float]]]:
+        """What HIST can follow: unit and function of the simulation (collective) by name."""
+
+    def prepare(self, sim: Simulation) -> None:
+        """Lists, masses or settings are others. Collective."""
+
+    def stable_time_step(self, sim: Simulation) -> float:
+        """The largest time step [s] it can bear with the present contacts. The model is closed. Collective."""
+
+    def advance(self, sim: Simulation) -> None:
+        """One step, after the forces at the new positions; ghosts have the values of its beginning. Not collective."""
+
+    @staticmethod
+    def warm_up(threads: int) -> None:
+        """Call every kernel once."""
 
 
 class Simulation:
@@ -274,8 +303,8 @@ class Simulation:
         self.lattice.soon()
 
     def add_physics(self, physics: ParticlePhysics) -> None:
-        """Take physics that act on the particles beside their motion (physics/particle_physics.py). CommandError if the
-        model has physics of this name, or fields of these names."""
+        """Take physics that act on the particles beside their motion. CommandError if the model has physics of this
+        name, or fields of these names."""
         known = {*FIELDS, *self.particles.extra}
         taken = [name for name in physics.fields if name in known]
         if taken or any(physics.name == other.name for other in self.physics):

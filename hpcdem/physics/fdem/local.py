@@ -14,13 +14,13 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity
 from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, MEMORY, NONE
-from hpcdem.physics.fdem.memories import FIRST, KEY, WORDS, Memories, joint_rows
+from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, MEMORY, NONE, YIELDED
+from hpcdem.physics.fdem.memories import FIRST, KEY, STATE, WORDS, Memories, place_joints
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.properties import Rows
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.simulation import Core
+    from hpcdem.physics.fdem.state import State
 
 ALPHA = 0.8
 """Local damping of the static mode."""
@@ -88,7 +88,7 @@ class Local:
     passes: how often the forces of a step were computed.
     """
 
-    def __init__(self, sim: Core) -> None:
+    def __init__(self, sim: State) -> None:
         self.sim = sim
         mesh, own = sim.the_mesh(), sim.owned
         quad = mesh.cells[sim.number[own], 3] >= 0
@@ -103,7 +103,7 @@ class Local:
         self.passes = 0
         self._make_constants()
         self._make_joints()
-        sim.memories.put_into_joints(self)
+        self._put_memories()
         self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
         self._make_loads()
         self._make_nodes()
@@ -174,6 +174,17 @@ class Local:
                 f"step {sim.clock.step}: {what} {found} spans more than a column of {sim.lattice.side:g} m; elements "
                 "move too far in a step: the time step is probably too large"
             )
+
+    def _put_memories(self) -> None:
+        """Joints behind their peak take their places; memories are in storage order."""
+        memories = self.sim.memories
+        key = memories.keys()
+        at = np.flatnonzero(key < 0)
+        slot = self.first_slot[memories.owners()[at]] - 1 - key[at]
+        place_joints(
+            slot, memories.rows[at], self.slots_of_triangles, self.slot_law, self.slot_state, self.slot_memory,
+            self.head, self.follow,
+        )  # fmt: skip
 
     def _make_loads(self) -> None:
         """Tractions on owned faces, and forces that die down."""
@@ -569,12 +580,23 @@ class Local:
 
         transfer: joints that are broken are left out; their friction is handed over to the contacts that follow them.
         """
-        parts = [joint_rows(self, transfer), self.pairs.memories(self.sim)]
+        parts = [self._joint_memories(transfer), self.pairs.memories(self.sim)]
         if transfer:
             parts.append(self.handed_over())
         return Memories.of(
             self.sim.n_own, np.concatenate([owner for owner, _ in parts]), np.concatenate([rows for _, rows in parts])
         )
+
+    def _joint_memories(self, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Owned element (0 ..) and row (memories.py) of each joint behind its peak; with `transfer` without those that
+        are broken."""
+        state = self.slot_state
+        slots = np.flatnonzero((state == YIELDED) if transfer else ((state == YIELDED) | (state == BROKEN)))
+        rows = np.zeros((len(slots), WORDS))
+        rows.view(np.int64)[:, KEY] = -1 - self.slot_face[slots] % 4
+        rows[:, STATE] = state[slots]
+        rows[:, FIRST : FIRST + MEMORY] = self.slot_memory[slots]
+        return self.slot_element(slots), rows
 
     def slot_element(self, slots: np.ndarray) -> np.ndarray:
         """Owned element (0 ..) of slots."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -15,11 +13,12 @@ from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
-from hpcdem.physics.fdem.local import Evaluation
-from hpcdem.physics.fdem.probes import Probe
+from hpcdem.physics.fdem.local import Evaluation, Local
+from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC
 from hpcdem.physics.fdem.scene import Numbers
-from hpcdem.physics.fdem.simulation import Core, Crack
+from hpcdem.physics.fdem.simulation import Core
+from hpcdem.physics.fdem.state import Crack
 
 
 @dataclass(frozen=True)
@@ -95,36 +94,16 @@ _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for 
 class Looking(Core):
     """Verbs of `Blocks` that only look."""
 
-    _known: dict[str, Any] | None = None
-
-    def evaluate(self) -> Evaluation:
-        """Forces at the present positions; leaves everything as it is. Collective."""
-        self.close_model()
-        return self._once("forces", self.local.evaluation)
-
-    @contextmanager
-    def one_moment(self) -> Iterator[None]:
-        """As long as this lasts the model is only looked at: forces and the energy budget are computed once, however
-        many ask for them."""
-        self._known = {}
-        try:
-            yield
-        finally:
-            self._known = None
-
-    def _once(self, what: str, make: Callable[[], Any]) -> Any:
-        if self._known is None:
-            return make()
-        if what not in self._known:
-            self._known[what] = make()
-        return self._known[what]
-
     # ---- quantities ------------------------------------------------------------------------------------------------
 
     def probe(self, name: str, numbers: Numbers = None) -> Probe:
         """A quantity of these elements, nodes or joints (None: all), to be asked for again and again. CommandError if
         there is no such quantity or number. Not collective."""
-        return Probe(self, name, numbers)
+        on = self.quantity(name).on
+        some = self.numbers_on(on, numbers)
+        if name.startswith(("reaction", "unbalanced")):
+            return ForceProbe(self, name, some)
+        return _ColumnProbe(self, name, on, some)
 
     def values(self, name: str, numbers: Numbers = None) -> np.ndarray:
         """A quantity of `QUANTITIES` for these elements, nodes or joints (None: all, in ascending order), on all ranks.
@@ -451,6 +430,22 @@ class Looking(Core):
         self.close_model()
         budget = self.budget
         return self._once("budget", lambda: budget.reading(self))
+
+
+class _ColumnProbe(Probe):
+    """A quantity that is a column of elements, nodes or joints."""
+
+    def __init__(self, sim: Looking, name: str, on: str, numbers: np.ndarray) -> None:
+        super().__init__(sim, numbers)
+        self.looking, self.name, self.on = sim, name, on
+        self._rows = np.empty(0, np.int64)
+
+    def _find(self) -> None:
+        self._at, self._rows = self.looking.rows_of(self.on, self.numbers)
+        self._n = len(self.numbers)
+
+    def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
+        return self.looking.columns_of(self.on, [self.name], self._rows)[self.name]
 
 
 def _corners(rows: np.ndarray, real: np.ndarray) -> np.ndarray:

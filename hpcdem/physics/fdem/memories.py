@@ -8,16 +8,11 @@ other body's number * 2 + half of this element, bodies being element * 2 + half 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numba import njit
 
 from hpcdem.physics.fdem.kernels import elements, joints
-from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
-
-if TYPE_CHECKING:
-    from hpcdem.physics.fdem.local import Local
 
 WORDS = 20
 KEY, STATE, FIRST = 0, 1, 2
@@ -92,17 +87,6 @@ class Memories:
         face = 4 * number[self.owners()] + np.where(key < 0, -1 - key, 0)
         return self.keep((key >= 0) | ~forget[face])
 
-    def put_into_joints(self, local: Local) -> None:
-        """Joints behind their peak take their places in the tables of a rebuild; `self` is in storage order."""
-        key = self.keys()
-        at = np.flatnonzero(key < 0)
-        edge = -1 - key[at]
-        slot = local.first_slot[self.owners()[at]] + edge
-        place_joints(
-            slot, self.rows[at], local.slots_of_triangles, local.slot_law, local.slot_state, local.slot_memory,
-            local.head, local.follow,
-        )  # fmt: skip
-
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place_joints(slot, rows, of_triangles, law, state, memory, head, follow):
@@ -118,15 +102,3 @@ def place_joints(slot, rows, of_triangles, law, state, memory, head, follow):
         if s < of_triangles:
             b = s // (3 * elements.BLOCK)
             follow[s], head[b] = head[b], s
-
-
-def joint_rows(local: Local, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Owned element (0 ..) and row of each joint behind its peak; with `transfer` without those that are broken."""
-    state = local.slot_state
-    slots = np.flatnonzero((state == YIELDED) if transfer else ((state == YIELDED) | (state == BROKEN)))
-    rows = np.zeros((len(slots), WORDS))
-    face = local.slot_face[slots]
-    rows.view(np.int64)[:, KEY] = -1 - face % 4
-    rows[:, STATE] = state[slots]
-    rows[:, FIRST : FIRST + joints.MEMORY] = local.slot_memory[slots]
-    return local.slot_element(slots), rows

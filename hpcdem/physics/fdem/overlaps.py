@@ -16,7 +16,8 @@ from hpcdem.physics.fdem.pairs import Bodies
 from hpcdem.physics.fdem.scene import REFUSE, RELAX
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.simulation import Core
+    from hpcdem.physics.fdem.local import Local
+    from hpcdem.physics.fdem.state import State
 
 ROUNDING = 1e-5
 """Overlap over the size of the smaller element that is put down to the rounding of coordinates."""
@@ -24,13 +25,13 @@ NAMED = 5
 """Places that a message names."""
 
 
-def check(sim: Core) -> None:
+def check(sim: State, local: Local) -> None:
     """At the first step of a new model: CommandError if bodies overlap and that was not asked for. The model is closed.
     Collective."""
     o = sim.options
     if not o.collision:
         return
-    found = deepest(sim)
+    found = deepest(sim, local)
     if not len(found):
         return
     places = "; ".join(
@@ -51,12 +52,12 @@ def check(sim: Core) -> None:
         sim.log.info(said)
 
 
-def deepest(sim: Core) -> np.ndarray:
+def deepest(sim: State, local: Local) -> np.ndarray:
     """Pairs of elements that overlap by more than rounding, on all ranks: (n, 5) depth [m], place [m], both numbers;
-    the deepest first. However deep they are: all elements count, not those at the surface alone. Collective."""
-    sim.close_model()
+    the deepest first. However deep they are: all elements count, not those at the surface alone. The model is closed.
+    Collective."""
     mesh, own = sim.the_mesh(), sim.owned
-    bodies = Bodies(sim, sim.local, np.arange(len(sim.number)), inner=True)
+    bodies = Bodies(sim, local, np.arange(len(sim.number)), inner=True)
     rows = np.empty((0, 5))
     if len(bodies.row):
         box, around = np.empty((len(bodies.row), 4)), np.empty((len(bodies.row), 4))

@@ -6,7 +6,7 @@ half. Of a quad's half the third edge lies inside.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
@@ -19,8 +19,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import Rows
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.local import Local
-    from hpcdem.physics.fdem.simulation import Core
+    from hpcdem.physics.fdem.state import State
 
 
 def cut_corner(mesh: Mesh) -> np.ndarray:
@@ -39,7 +38,7 @@ class Shapes:
     overlay: smallest overlay penalty of the element's joints [Pa], NaN without joints.
     """
 
-    def __init__(self, sim: Core, numbers: np.ndarray) -> None:
+    def __init__(self, sim: State, numbers: np.ndarray) -> None:
         mesh = sim.mesh
         assert mesh is not None
         cells = mesh.cells[numbers]
@@ -70,7 +69,7 @@ class Kinds(NamedTuple):
     alike: bool
 
     @staticmethod
-    def of(sim: Core) -> Kinds:
+    def of(sim: State) -> Kinds:
         """Of a model."""
 
         def kind(rows: Rows, *names: str) -> np.ndarray:
@@ -100,7 +99,7 @@ class Surfaces:
     NaN without joints; young [Pa], density [kg/m3].
     """
 
-    def __init__(self, sim: Core, shapes: Shapes, faces: np.ndarray, rows: np.ndarray) -> None:
+    def __init__(self, sim: State, shapes: Shapes, faces: np.ndarray, rows: np.ndarray) -> None:
         model, joint, element = sim.face_row[faces], sim.joint_row[faces], sim.element_row[faces // 4]
 
         def of_elements(name: str) -> np.ndarray:
@@ -171,6 +170,23 @@ class Surfaces:
         return out
 
 
+class ElementTables(Protocol):
+    """What contact asks of the tables of elements (local.py). triangle_of_row (n_own,): place of an owned element among
+    the triangles, -1: none; quad_rows: storage rows of the quads; head: one word per block of triangles."""
+
+    triangle_of_row: np.ndarray
+    quad_rows: np.ndarray
+    head: np.ndarray
+
+    @property
+    def shapes(self) -> Shapes:
+        """Of the elements held here, by storage row."""
+
+    @property
+    def kinds(self) -> Kinds:
+        """What tells properties of faces in contact apart."""
+
+
 class Bodies:
     """Triangles, or halves of quads, of the elements in storage rows `rows` that have a corner on the surface; inner:
     of all of them.
@@ -180,7 +196,7 @@ class Bodies:
     -1: none; several: 1 if it can be touched at faces of several kinds.
     """
 
-    def __init__(self, sim: Core, local: Local, rows: np.ndarray, inner: bool = False) -> None:
+    def __init__(self, sim: State, tables: ElementTables, rows: np.ndarray, inner: bool = False) -> None:
         mesh = sim.mesh
         assert mesh is not None
         e = sim.number[rows]
@@ -192,7 +208,7 @@ class Bodies:
         start = np.where(quad[of_row], sim.cut[element] + 2 * half, 0)
         free, face, several = (np.empty(len(element), np.int64) for _ in range(3))
         if len(element):
-            args = *_topology(sim, local, element, start), free, face, several, np.empty((0, 5))
+            args = *_topology(sim, tables, element, start), free, face, several, np.empty((0, 5))
             touched_faces(*args)
         keep = (face >= 0) | inner  # the half of a quad may be away from the surface
         self.element, self.row, self.half, self.quad = (a[keep] for a in (element, rows[of_row], half, quad[of_row]))
@@ -202,19 +218,21 @@ class Bodies:
         self.x_place, self.v_place = self.row * width_x + 2 * self.start, self.row * width_v + 2 * self.start
 
 
-def _topology(sim: Core, local: Local, element: np.ndarray, start: np.ndarray) -> Any:
+def _topology(sim: State, tables: ElementTables, element: np.ndarray, start: np.ndarray) -> Any:
     """The first arguments of `touched_faces`."""
     mesh = sim.mesh
     assert mesh is not None
     return (
-        element, start, mesh.points, mesh.cells, sim.partner, sim.closed_faces(), *local.kinds,
+        element, start, mesh.points, mesh.cells, sim.partner, sim.closed_faces(), *tables.kinds,
     )  # fmt: skip
 
 
 class ContactPairs(Bodies):
     """Rows of pairs of bodies near each other, in ascending order of their numbers; empty without collision."""
 
-    def __init__(self, sim: Core, local: Local, low: np.ndarray, high: np.ndarray, values: np.ndarray) -> None:
+    def __init__(
+        self, sim: State, tables: ElementTables, low: np.ndarray, high: np.ndarray, values: np.ndarray
+    ) -> None:
         """low, high (k,), values (k, 18): numbers of two bodies and what the pair remembers."""
         self.threads = sim.threads
         mesh = sim.mesh
@@ -225,14 +243,14 @@ class ContactPairs(Bodies):
             surface_points(mesh.cells, sim.alive, sim.closed_faces(), on_surface)
             touched_rows(sim.number, mesh.cells, on_surface, flags)
             rows = np.flatnonzero(flags)
-        super().__init__(sim, local, rows)
+        super().__init__(sim, tables, rows)
         own = sim.owned
         owned = (self.row >= own.start) & (self.row < own.stop)
-        self._make_list(sim, local, owned)
+        self._make_list(sim, tables, owned)
         self._put_memories(low, high, values)
-        self._make_entries(sim, local, owned)
+        self._make_entries(sim, tables, owned)
 
-    def _make_list(self, sim: Core, local: Local, owned: np.ndarray) -> None:
+    def _make_list(self, sim: State, tables: ElementTables, owned: np.ndarray) -> None:
         """Pairs that may touch, and their properties."""
         mesh = sim.mesh
         assert mesh is not None
@@ -245,14 +263,14 @@ class ContactPairs(Bodies):
             box, around, self.element, self.number, owned, mesh.cells, sim.partner, closed
         )  # fmt: skip
         code = self.quad[first] + 2 * self.quad[second] + 4 * self.free[first] + 32 * self.free[second]
-        bodies = Surfaces(sim, local.shapes, self.face, self.row)
+        bodies = Surfaces(sim, tables.shapes, self.face, self.row)
         shared, overlay = self._shared_faces(sim, self.element[first], self.element[second])
         laws = bodies.of_pairs(first, bodies, second, shared, overlay)
         self.chosen, self.choice_begin = np.zeros(0, np.int64), np.zeros(1, np.int64)
         self.choices = np.zeros((0, contact.CHOICE))
         varied = (self.several[first] | self.several[second]) > 0
         if varied.any():
-            pair, code, laws = self._vary(sim, local, first, second, code, laws, shared, overlay, varied)
+            pair, code, laws = self._vary(sim, tables, first, second, code, laws, shared, overlay, varied)
             first, second = first[pair], second[pair]
         self.first, self.second = first, second
         m = len(first)
@@ -271,12 +289,12 @@ class ContactPairs(Bodies):
         self.out = np.zeros((m, 12))
 
     def _vary(
-        self, sim: Core, local: Local, first: np.ndarray, second: np.ndarray, code: np.ndarray, laws: np.ndarray,
-        shared: np.ndarray, overlay: np.ndarray, varied: np.ndarray,
+        self, sim: State, tables: ElementTables, first: np.ndarray, second: np.ndarray, code: np.ndarray,
+        laws: np.ndarray, shared: np.ndarray, overlay: np.ndarray, varied: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
         """Rows of the list where faces of a pair differ: pair (m,), code and properties. Edges of a pair that meet the
         same properties stay together; one that meets a body with faces of several kinds has choices."""
-        mesh, shapes = sim.mesh, local.shapes
+        mesh, shapes = sim.mesh, tables.shapes
         assert mesh is not None
         at = np.flatnonzero(varied)
         which, edge = np.nonzero(code[at][:, None] >> np.arange(2, 8) & 1)
@@ -289,7 +307,7 @@ class ContactPairs(Bodies):
         targets, place = np.unique(other, return_inverse=True)
         scratch = [np.empty(len(targets), np.int64) for _ in range(3)]
         known = np.empty((MOST_FACES * len(targets), 1 + contact.PROPERTIES))
-        args = *_topology(sim, local, self.element[targets], self.start[targets]), *scratch, known
+        args = *_topology(sim, tables, self.element[targets], self.start[targets]), *scratch, known
         touched_faces(*args)
         known = known.reshape(len(targets), MOST_FACES, -1)[place]
         each, k = np.nonzero(known[:, :, 0] >= 0.0)
@@ -324,7 +342,7 @@ class ContactPairs(Bodies):
         return pairs[order], codes[order], made[order]
 
     @staticmethod
-    def _shared_faces(sim: Core, e: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _shared_faces(sim: State, e: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Length squared (m,) [m2] of the face that elements e and f have in common in the mesh, 0 without one, and the
         overlay penalty [Pa] of the joint that was there, NaN without one."""
         mesh = sim.mesh
@@ -379,12 +397,12 @@ class ContactPairs(Bodies):
         return np.minimum(own, other), np.maximum(own, other), rows[:, FIRST:]
 
     @staticmethod
-    def remembered(sim: Core) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def remembered(sim: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same from the memories of the owned elements."""
         at = np.flatnonzero(sim.memories.keys() >= 0)
         return ContactPairs.named(sim.number[sim.owned][sim.memories.owners()[at]], sim.memories.rows[at])
 
-    def _make_entries(self, sim: Core, local: Local, owned: np.ndarray) -> None:
+    def _make_entries(self, sim: State, tables: ElementTables, owned: np.ndarray) -> None:
         """Owned elements of the pairs, and which pairs act on each of them, in the order of partners."""
         m = len(self)
         pair = np.repeat(np.arange(m), 2)
@@ -403,17 +421,17 @@ class ContactPairs(Bodies):
         self.corners = np.where(mesh.cells[sim.number[rows], 3] >= 0, 4, 3)
         self.pushed = np.zeros((max(len(rows), 1), elements.FORCE))
         # Which lane of which block of triangles, and which quads, take them.
-        of_triangle = local.triangle_of_row[rows - sim.n_left] if len(rows) else rows
+        of_triangle = tables.triangle_of_row[rows - sim.n_left] if len(rows) else rows
         at = np.flatnonzero(of_triangle >= 0)
         block, lane = of_triangle[at] // elements.BLOCK, of_triangle[at] % elements.BLOCK
         self.lane, self.slot = lane, at
-        self.block_begin = np.concatenate(([0], np.cumsum(np.bincount(block, minlength=len(local.head))))).astype(
+        self.block_begin = np.concatenate(([0], np.cumsum(np.bincount(block, minlength=len(tables.head))))).astype(
             np.int64
         )
-        self.quad_slot = np.full(len(local.quad_rows), -1, np.int64)
+        self.quad_slot = np.full(len(tables.quad_rows), -1, np.int64)
         if len(rows):
             others = np.flatnonzero(of_triangle < 0)
-            self.quad_slot[np.searchsorted(local.quad_rows, rows[others])] = others
+            self.quad_slot[np.searchsorted(tables.quad_rows, rows[others])] = others
 
     def forces(self, x: np.ndarray, v: np.ndarray, dt: float) -> None:
         """Contact forces at the present positions; histories move on by dt."""
@@ -430,7 +448,7 @@ class ContactPairs(Bodies):
             self.threads, self.begin, self.entry, self.entry_start, self.corners, self.touching, self.out, self.pushed
         )
 
-    def memories(self, sim: Core) -> tuple[np.ndarray, np.ndarray]:
+    def memories(self, sim: State) -> tuple[np.ndarray, np.ndarray]:
         """Owned element (0 ..) and row (memories.py) of each pair that remembers something, for both its elements."""
         low, high, values = self.known()
         owners, parts = [], []

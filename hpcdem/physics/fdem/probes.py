@@ -7,50 +7,101 @@ each number comes from the one rank that has it, sums are rounded once.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcdem.halo.comm import SerialComm
 from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem.simulation import Core
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Evaluation, Local
-    from hpcdem.physics.fdem.looking import Looking
-    from hpcdem.physics.fdem.scene import Numbers
 
 _NAN = np.array([np.nan]).view(np.int64)[0]
 
 
-class Probe:
-    """A quantity of `looking.QUANTITIES` at numbers (n,) of elements, nodes or joints. Every method is collective."""
+class Probe(ABC):
+    """A quantity at numbers (n,) of elements, nodes or joints. Every method is collective."""
 
-    def __init__(self, sim: Looking, name: str, numbers: Numbers) -> None:
-        """CommandError if there is no such quantity or number. Not collective."""
-        self.sim, self.name = sim, name
-        self.on = sim.quantity(name).on
-        self.numbers = sim.numbers_on(self.on, numbers)
-        self.of_forces = name.startswith(("reaction", "unbalanced"))
+    def __init__(self, sim: Core, numbers: np.ndarray) -> None:
+        """Not collective."""
+        self.sim, self.numbers = sim, numbers
         self.local: Local | None = None
-        self._at = self._rows = self._place = np.empty(0, np.int64)
-        self._nodes, self._corners = np.empty(0, np.int64), (np.empty(0, np.int64), np.empty(0, np.int64))
-        self._nothing = np.empty(0)
-        self._n = 0
+        self._at, self._n = np.empty(0, np.int64), 0
 
     def find(self) -> None:
         """Find the objects in the present storage."""
-        sim = self.sim
-        sim.close_model()
-        if self.local is sim.local:
-            return
-        self.local = sim.local
-        if self.of_forces:
-            self._find_corners()
-        else:
-            self._at, self._rows = sim.rows_of(self.on, self.numbers)
-            self._n = len(self.numbers)
+        self.sim.close_model()
+        if self.local is not self.sim.local:
+            self.local = self.sim.local
+            self._find()
 
-    def _find_corners(self) -> None:
+    @abstractmethod
+    def _find(self) -> None:
+        """Set `_at`: places (k,) of what this rank has among the `_n` values of all ranks."""
+
+    @abstractmethod
+    def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
+        """What this rank has of it (k,), see `_at`."""
+
+    def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:
+        """(n,) on all ranks; NaN for what is not there. seen: forces that are known already (of the storage in which
+        the objects were found last); None: as they are now."""
+        if seen is None:
+            self.find()
+        return self._gathered(self._mine(seen))
+
+    def _gathered(self, mine: np.ndarray) -> np.ndarray:
+        """(n,) of all ranks. Bits are added up as integers, of which all but one rank's are zero."""
+        comm = self.sim.comm
+        bits = np.zeros(self._n, np.int64)
+        bits[self._at] = np.ascontiguousarray(mine, np.float64).view(np.int64) - _NAN
+        return (comm.sum_into(bits) + _NAN).view(np.float64)
+
+    def total(self, seen: Evaluation | Local | None = None) -> float:
+        """Sum of those that are there, rounded once."""
+        if seen is None:
+            self.find()
+        mine = self._mine(seen)
+        return exact_sum(mine[~np.isnan(mine)], self.sim.comm)
+
+    def _parts(self, seen: Evaluation | Local | None) -> tuple[Any, np.ndarray]:
+        """Values that are combined over the ranks of a communicator: each rank has some of them."""
+        if seen is None:
+            self.find()
+        return self.sim.comm, self._mine(seen)
+
+    def reduced(self, how: str, seen: Evaluation | Local | None = None) -> float:
+        """sum, mean, minimum or maximum of those that are there, or of "" the first of all; NaN where there is none."""
+        if how == "":
+            return float(self.values(seen)[0])
+        comm, mine = self._parts(seen)
+        mine = mine[~np.isnan(mine)]
+        count = int(comm.sum_into(np.array([len(mine)], np.int64))[0])
+        if not count:
+            return math.nan
+        if how == "minimum":
+            return float(comm.min_into(np.array([mine.min(initial=math.inf)]))[0])
+        if how == "maximum":
+            return float(comm.max_into(np.array([mine.max(initial=-math.inf)]))[0])
+        total = exact_sum(mine, comm)
+        return total / count if how == "mean" else total
+
+
+class ForceProbe(Probe):
+    """A component of reaction or unbalanced force [N/m] of nodes: a sum over corners that several ranks may have."""
+
+    def __init__(self, sim: Core, name: str, nodes: np.ndarray) -> None:
+        """Not collective."""
+        super().__init__(sim, nodes)
+        self.name = name
+        self._place = np.empty(0, np.int64)
+        self._nodes, self._corners = np.empty(0, np.int64), (np.empty(0, np.int64), np.empty(0, np.int64))
+        self._nothing = np.empty(0)
+
+    def _find(self) -> None:
         """The nodes that have these points, each with the owner of its lowest corner, in the order of corners."""
         sim, local = self.sim, self.sim.local
         cells = sim.the_mesh().cells
@@ -75,10 +126,7 @@ class Probe:
         self._nothing = np.where(sim.node_exists()[self.numbers], 0.0, np.nan)
 
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
-        """What this rank has of it, see `_at`."""
         sim = self.sim
-        if not self.of_forces:
-            return sim.columns_of(self.on, [self.name], self._rows)[self.name]
         seen = sim.evaluate() if seen is None else seen
         axis = 0 if self.name.endswith("x") else 1
         found = seen.outside[self._nodes, axis]
@@ -88,50 +136,13 @@ class Probe:
         return found
 
     def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:
-        """(n,) on all ranks; NaN for what is not there. seen: forces that are known already (of the storage in which
-        the objects were found last); None: as they are now."""
-        if seen is None:
-            self.find()
-        found = self._gathered(self._mine(seen))
-        if not self.of_forces:
-            return found
+        found = super().values(seen)
         out = self._nothing.copy()
         np.add.at(out, self._place, found)
         return out
 
-    def _gathered(self, mine: np.ndarray) -> np.ndarray:
-        """(n,) of all ranks. Bits are added up as integers, of which all but one rank's are zero."""
-        comm = self.sim.comm
-        bits = np.zeros(self._n, np.int64)
-        bits[self._at] = np.ascontiguousarray(mine, np.float64).view(np.int64) - _NAN
-        return (comm.sum_into(bits) + _NAN).view(np.float64)
-
-    def total(self, seen: Evaluation | Local | None = None) -> float:
-        """Sum of those that are there, rounded once."""
-        if seen is None:
-            self.find()
-        mine = self._mine(seen)
-        return exact_sum(mine[~np.isnan(mine)], self.sim.comm)
+    def _parts(self, seen: Evaluation | Local | None) -> tuple[Any, np.ndarray]:
+        return SerialComm(), self.values(seen)
 
     def reduced(self, how: str, seen: Evaluation | Local | None = None) -> float:
-        """sum, mean, minimum or maximum of those that are there, or of "" the first of all; NaN where there is none."""
-        if how == "":
-            return float(self.values(seen)[0])
-        if self.of_forces and how == "sum":
-            return self.total(seen)
-        comm = self.sim.comm
-        if self.of_forces:  # a node's force is the sum of what several ranks may have
-            comm, mine = SerialComm(), self.values(seen)
-        else:
-            self.find()
-            mine = self._mine(seen)
-        mine = mine[~np.isnan(mine)]
-        count = int(comm.sum_into(np.array([len(mine)], np.int64))[0])
-        if not count:
-            return math.nan
-        if how == "minimum":
-            return float(comm.min_into(np.array([mine.min(initial=math.inf)]))[0])
-        if how == "maximum":
-            return float(comm.max_into(np.array([mine.max(initial=-math.inf)]))[0])
-        total = exact_sum(mine, comm)
-        return total / count if how == "mean" else total
+        return self.total(seen) if how == "sum" else super().reduced(how, seen)

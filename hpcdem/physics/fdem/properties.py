@@ -1,4 +1,5 @@
 """Models of elements, faces and joints: which properties they have, in which units, and what values they can take.
+Languages and their reference pages take units, limits, words and defaults from here.
 
 Names are Python's (``poisson_ratio``); languages put their own spelling on top. A model is given a dictionary of
 values and hands back a complete one, or a CommandError that names the property.
@@ -32,6 +33,8 @@ class Property:
     """The lowest value is allowed itself."""
     optional: bool = False
     """May be left out without a default: it then follows from others."""
+    otherwise: str = ""
+    """What counts where it is left out, if that is no number; commands see to what does not follow from others."""
 
     def check(self, value: float) -> float:
         """The value as a float; CommandError if it cannot be."""
@@ -150,57 +153,64 @@ def _penalties(values: dict[str, Any]) -> None:
     values.setdefault("penalty_shear", values["penalty_normal"])
 
 
-_FRICTION = Property("friction", "deg", "angle of friction", 0.0, high=89.0)
-_POSITIVE = {"low_itself": False}
+def _friction(doc: str) -> Property:
+    return Property("friction", "degrees", doc, 0.0, high=89.0)
+
 
 MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
     ELEMENT,
     "isotropic, elastic, large rotations",
     (
-        Property("density", "kg/m3", "density", **_POSITIVE),
-        Property("young", "Pa", "Young's modulus", optional=True, **_POSITIVE),
+        Property("density", "kg/m3", "density", low_itself=False),
+        Property("young", "Pa", "Young's modulus E", optional=True, low_itself=False),
         Property("poisson_ratio", "1", "Poisson's ratio", optional=True, low=-1.0, high=0.4999, low_itself=False),
-        Property("shear", "Pa", "shear modulus", optional=True, **_POSITIVE),
-        Property("bulk", "Pa", "bulk modulus", optional=True, **_POSITIVE),
-        Property("damp_factor", "1", "viscous damping over 2 L sqrt(rho E), dynamic mode only", 0.0),
-        _FRICTION,
-        Property(
-            "penalty", "Pa", "contact penalty where a face has no contact model; 0: from the joints, or 10 E", 0.0
-        ),
+        Property("shear", "Pa", "shear modulus, with the bulk modulus in the place of E and Poisson's ratio",
+                 optional=True, low_itself=False),
+        Property("bulk", "Pa", "bulk modulus, with the shear modulus in the place of E and Poisson's ratio",
+                 optional=True, low_itself=False),
+        Property("damp_factor", "1", "viscous damping, part of the critical 2 L sqrt(rho E); without effect in static "
+                 "runs", 0.0),
+        _friction("friction angle of its surfaces where they have no contact model"),
+        Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
+                 "joints, or 10 E", 0.0),
     ),
     _elastic,
-)
+)  # fmt: skip
 
 CONTACT_MOHR_COULOMB = Model(
     "contact_mohr_coulomb",
     FACE,
     "penalty contact with Coulomb friction",
     (
-        _FRICTION,
-        Property("penalty_normal", "Pa", "normal penalty", **_POSITIVE),
-        Property("penalty_shear", "Pa", "shear penalty; as penalty_normal", optional=True),
-        Property("damping_t", "Pa", "largest normal stress while surfaces approach", math.inf, **_POSITIVE),
-        Property("damping_b", "1", "exponent of the overlap while they part", 1.0, low=1.0),
-        Property("damping_ratio", "1", "normal dashpot, part of the critical of two elements; dynamic mode only", 0.0),
+        _friction("friction angle"),
+        Property("penalty_normal", "Pa", "normal penalty; 10 to 100 E is usual", otherwise="10 E", low_itself=False),
+        Property("penalty_shear", "Pa", "shear penalty", optional=True, otherwise="the normal penalty"),
+        Property("damping_t", "Pa", "largest normal stress while surfaces approach; contacts that reach it lose energy",
+                 math.inf, otherwise="never", low_itself=False),
+        Property("damping_b", "1", "exponent of the overlap while surfaces part; above 1 contacts lose energy", 1.0,
+                 low=1.0),
+        Property("damping_ratio", "1", "normal dashpot, part of the critical damping of two elements; the larger of "
+                 "two surfaces counts; without effect in static runs", 0.0),
     ),
     _penalties,
-)
+)  # fmt: skip
 
 COHESIVE = Model(
     "classic_intrinsic_cohesive_interface",
     JOINT,
     "cohesive zone that breaks in tension, in shear, or both",
     (
-        _FRICTION,
-        Property("cohesion", "Pa", "cohesion; 0: pure friction"),
+        _friction("friction angle"),
+        Property("cohesion", "Pa", "cohesion; 0: friction alone"),
         Property("tensile_strength", "Pa", "tensile strength; 0: none"),
-        Property("gf1", "N/m", "fracture energy of mode I"),
-        Property("gf2", "N/m", "fracture energy of mode II"),
-        Property("penalty_normal", "Pa", "penalty when it opens", **_POSITIVE),
-        Property("penalty_overlay", "Pa", "penalty when it is pressed together; as penalty_normal", optional=True,
-                 **_POSITIVE),
-        Property("penalty_shear", "Pa", "penalty when it slides; as penalty_normal", optional=True, **_POSITIVE),
+        Property("gf1", "N/m", "fracture energy, mode I"),
+        Property("gf2", "N/m", "fracture energy, mode II"),
+        Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
+        Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, otherwise="that of opening",
+                 low_itself=False),
+        Property("penalty_shear", "Pa", "penalty of shear", optional=True, otherwise="that of opening",
+                 low_itself=False),
     ),
     lambda values: _cohesive(values),
 )  # fmt: skip

@@ -17,7 +17,7 @@ from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.memories import WORDS, Memories
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Crack
+from hpcdem.physics.fdem.state import Crack
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm

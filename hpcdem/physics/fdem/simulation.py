@@ -1,11 +1,11 @@
-"""The simulation of blocks: state, one step, and the rebuild of the lists. The page on which the method can be read.
+"""The simulation of blocks: one step, and the rebuild of the lists. The page on which the method can be read.
 
 An element owns its corners: their positions, velocities, and what the joints on its edges and its contacts remember.
 Corners that move as one node (nothing lies between their elements) carry equal copies. So all there is to a model is
 rows of elements; they are shared out among the ranks in strips, as particles are, and travel with what they remember.
 
-State is either *closed* (sorted, ghosts in place, tables of the kernels made: ready to step) or *open* (owned elements
-and their memories only). Assignments open it; the next step closes it again.
+State (state.py) is either *closed* (sorted, ghosts in place, tables of the kernels made: ready to step) or *open*
+(owned elements and their memories only). Assignments open it; the next step closes it again.
 
 Every sum over elements that share something is taken in the order of their numbers in the mesh. So the bits depend
 neither on ranks and threads nor on when the lists were rebuilt.
@@ -14,21 +14,17 @@ neither on ranks and threads nor on when the lists were rebuilt.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
 from hpcdem.core.cells import columns, keys
-from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.memory import aligned
-from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
-from hpcdem.core.timers import Timers
+from hpcdem.core.rebuild import LONGEST_WAIT
 from hpcdem.decomp import strips
-from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
@@ -36,16 +32,14 @@ from hpcdem.physics.fdem import build, connectivity, overlaps
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
-from hpcdem.physics.fdem.local import Local
+from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.memories import Memories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
-from hpcdem.physics.fdem.scene import Fading, Numbers, Scene
-from hpcdem.physics.fdem.surface_loads import SurfaceLoads
+from hpcdem.physics.fdem.scene import Numbers
+from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, Lattice, State
 from hpcdem.physics.fdem.tables import Value
 
-NARROW, WIDE = 0.1, 0.3
-"""Buffer of the contact search over the mean edge, at rest and in fast motion."""
 ROOM = 0.6
 """How far elements may go, both together, before storage and ghosts are made anew; over the mean edge."""
 SHORT_LIVED, LONG_LIVED = 60, 400
@@ -56,109 +50,11 @@ AUTO = 100
 """Steps after which an automatic time step is estimated anew."""
 
 
-@dataclass
-class Lattice(RebuildState):
-    """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
-    dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
-    made; dt is the same since then.
-    """
+class Core(State):
+    """Step and rebuild; `Blocks` adds the verbs. Every method is collective unless it says otherwise."""
 
-    skin_factor: float = NARROW
-    stored: int = 0
-    dt: float = 0.0
-    estimated: int = 0
-    step: int = 0
-    time: float = 0.0
-
-
-class Crack(NamedTuple):
-    """A joint that broke. joint: its number; mode: from 1 (opened) to 2 (slid); step, time [s]: of the positions at
-    which it broke; kinetic: energy of the two elements then [J/m]; peak_step, peak_kinetic: when it had passed its
-    strength (-1 and NaN in checkpoints of earlier versions)."""
-
-    joint: int
-    mode: float
-    step: int
-    kinetic: float
-    time: float
-    peak_step: int = -1
-    peak_kinetic: float = math.nan
-
-
-class Core(Scene):
-    """State, step and rebuild; `Blocks` adds the verbs. Every method is collective unless it says otherwise."""
-
-    number: np.ndarray
-    """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
-    x: np.ndarray
-    """Corners [m], see elements.py."""
-    v: np.ndarray
-    """Their velocities at the last half step [m/s]."""
-    cold: dict[str, np.ndarray]
-    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
-    memories: Memories
     local: Local
-    halo: Any
-    surface_loads: SurfaceLoads
-    n_left: int
-    n_own: int
-    where: np.ndarray
-    """(ne,) storage row of each element of the model, -1: not held here."""
-    origin: np.ndarray
-    """Positions of the owned elements when the storage was made."""
-    listed: np.ndarray
-    """Positions of the owned elements when the contact lists were made."""
-
-    def __init__(
-        self,
-        comm: Any = None,
-        threads: int = 1,
-        outdir: Path | str = "data",
-        log: Any = None,
-        stop: Any = None,
-        balance_on: bool = True,
-    ) -> None:
-        self.comm = comm if comm is not None else SerialComm()
-        self.threads = threads
-        self.outdir = Path(outdir)
-        self.log, self.stop = log, stop
-        self.balance_on = balance_on
-        self.timers = Timers()
-        self.halo = None
-        self.surface_loads = SurfaceLoads()
-        super().__init__()
-        self.clear()
-
-    def clear(self) -> None:
-        """Start a new model: no mesh, step 0, default options."""
-        self.release()
-        self.clear_scene()
-        self.clock = Clock()
-        self.lattice = Lattice()
-        self.ownership = Ownership(self.comm, self.balance_on)
-        self.rebuilds = 0
-        self.event_rows: list[Crack] = []
-        self.closed = False
-        self.budget: Any = None
-        self._topology_stale = True
-        self._longest = 0.0
-        self._mean_edge = 0.0
-        self.untouched = True
-        """Nothing has moved since there is this mesh."""
-        self._told_step = 0.0
-        self._empty()
-
-    def _empty(self) -> None:
-        self.number = np.empty(0, np.int64)
-        self.x, self.v = np.empty((0, 8)), np.empty((0, 6))
-        self.cold = {}
-        self.memories = Memories.empty(0)
-
-    def release(self) -> None:
-        """Give back what MPI holds for this simulation. Not collective."""
-        if self.halo is not None:
-            self.halo.close()
-        self.halo = None
+    _known: dict[str, Any] | None = None
 
     # ---- mesh ----------------------------------------------------------------------------------------------------
 
@@ -202,30 +98,12 @@ class Core(Scene):
         self.cold = {}
         self.memories = Memories.empty(len(self.number))
 
-    @property
-    def wide(self) -> bool:
-        """There are quads: rows of positions and velocities have twelve columns."""
-        return self.x.shape[1] == 12
-
-    def the_mesh(self) -> Mesh:
-        """The mesh; CommandError if there is none."""
-        return self._mesh()
-
-    @property
-    def owned(self) -> slice:
-        """Storage rows of the owned elements."""
-        return slice(self.n_left, self.n_left + self.n_own) if self.closed else slice(0, len(self.number))
-
     def _before_change(self) -> None:
         if self.budget is not None and self.closed:
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)
         self.open_model()
-
-    def masses_change(self) -> bool:
-        """Masses or the time step will be others with the next lists."""
-        return self.lattice.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
 
     def _changed(self, topology: bool = False, stiffness: bool = True) -> None:
         self._topology_stale |= topology
@@ -300,7 +178,7 @@ class Core(Scene):
         """CommandError if nothing has moved yet and bodies overlap, unless that was asked for; the model is closed.
         Collective."""
         if self.untouched:
-            overlaps.check(self)
+            overlaps.check(self, self.local)
 
     def _drift(self, first: int, last: int) -> None:
         """Move the owned elements first : last by dt."""
@@ -372,6 +250,30 @@ class Core(Scene):
             f"step {self.clock.step}: {what} ({total} elements); the time step {self.clock.dt:g} s is probably too "
             f"large, or loads are\n{text}"
         )
+
+    # ---- forces without a step -------------------------------------------------------------------------------------
+
+    def evaluate(self) -> Evaluation:
+        """Forces at the present positions; leaves everything as it is. Collective."""
+        self.close_model()
+        return self._once("forces", self.local.evaluation)
+
+    @contextmanager
+    def one_moment(self) -> Iterator[None]:
+        """As long as this lasts the model is only looked at: forces and the energy budget are computed once, however
+        many ask for them."""
+        self._known = {}
+        try:
+            yield
+        finally:
+            self._known = None
+
+    def _once(self, what: str, make: Callable[[], Any]) -> Any:
+        if self._known is None:
+            return make()
+        if what not in self._known:
+            self._known[what] = make()
+        return self._known[what]
 
     # ---- open and closed -----------------------------------------------------------------------------------------
 
@@ -596,11 +498,6 @@ class Core(Scene):
             halo.keep_fresh(self.v)
         self.where[self.number] = np.arange(n)
 
-    def has_faded(self, one: Fading) -> bool:
-        """Forces left behind are gone, or belong to the other mode."""
-        now = float(self.clock.step) if one.in_steps else self.clock.time
-        return now >= one.begin + one.span or one.in_steps == self.options.dynamic
-
     def _warn_of_snap_back(self) -> None:
         """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening."""
         if self.log is None or not len(self.joint_rows) > 1:
@@ -629,29 +526,6 @@ class Core(Scene):
                 f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
                 f"elastic way, {elastic[worst]:.3g} m at an edge of {longest[row]:.3g} m: what the body stores is set "
                 "free at once; smaller elements or a higher penalty help",
-            )
-
-    def tell_time_step(self, dt: float, critical: float, added: float) -> None:
-        """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
-        that mass scaling adds, over the true mass. A step that is followed (auto) is told again when it has changed by
-        a tenth."""
-        o = self.options
-        if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
-            return
-        self._told_step = dt
-        limit = critical / o.safety
-        scaled = f"by mass scaling, which adds {added:.3g} times the mass"
-        how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
-        self.log.info(
-            f"time step {dt:.4g} s ({how}), {dt / limit:.2f} of the stability limit {limit:.4g} s; safety factor "
-            f"{o.safety:g}: {critical:.4g} s"
-        )
-        if dt > critical * (1.0 + 1e-9):
-            self.log.warn_once(
-                f"critical time step {dt > limit}",
-                f"the time step {dt:g} s is {dt / limit:.2f} of the stability limit {limit:.4g} s, more than the "
-                f"safety factor {o.safety:g} allows ({critical:.4g} s); a run that blows up should be repeated with a "
-                "smaller one",
             )
 
 

@@ -1,0 +1,191 @@
+"""The state of a model of blocks as a rank holds it: elements with their corners and memories, clock, ownership.
+
+Its parts say what is in it; the step that moves it, and the rebuild of lists and ghosts, are in `simulation.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hpcdem.core.clock import Clock
+from hpcdem.core.rebuild import RebuildState
+from hpcdem.core.timers import Timers
+from hpcdem.halo.comm import SerialComm
+from hpcdem.halo.ownership import Ownership
+from hpcdem.physics.fdem.memories import Memories
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.scene import Fading, Scene
+from hpcdem.physics.fdem.surface_loads import SurfaceLoads
+
+NARROW, WIDE = 0.1, 0.3
+"""Buffer of the contact search over the mean edge, at rest and in fast motion."""
+
+
+@dataclass
+class Lattice(RebuildState):
+    """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
+    dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
+    made; dt is the same since then.
+    """
+
+    skin_factor: float = NARROW
+    stored: int = 0
+    dt: float = 0.0
+    estimated: int = 0
+    step: int = 0
+    time: float = 0.0
+
+
+class Crack(NamedTuple):
+    """A joint that broke. joint: its number; mode: from 1 (opened) to 2 (slid); step, time [s]: of the positions at
+    which it broke; kinetic: energy of the two elements then [J/m]; peak_step, peak_kinetic: when it had passed its
+    strength (-1 and NaN in checkpoints of earlier versions)."""
+
+    joint: int
+    mode: float
+    step: int
+    kinetic: float
+    time: float
+    peak_step: int = -1
+    peak_kinetic: float = math.nan
+
+
+class State(Scene):
+    """Scene, positions, velocities and memories of the elements that a rank holds."""
+
+    number: np.ndarray
+    """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
+    x: np.ndarray
+    """Corners [m], see elements.py."""
+    v: np.ndarray
+    """Their velocities at the last half step [m/s]."""
+    cold: dict[str, np.ndarray]
+    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
+    memories: Memories
+    halo: Any
+    surface_loads: SurfaceLoads
+    n_left: int
+    n_own: int
+    where: np.ndarray
+    """(ne,) storage row of each element of the model, -1: not held here."""
+    areas: np.ndarray
+    """Of the elements of the model [m2]."""
+    cut: np.ndarray
+    """Along which diagonal quads are cut for contact, see `pairs.cut_corner`."""
+    node: np.ndarray
+    """(4 ne,) which corners move as one node; -1: none."""
+    node_sizes: np.ndarray
+    """Corners of each node."""
+    member_begin: np.ndarray
+    """Where the corners of each node of several begin in `member`."""
+    member: np.ndarray
+    point_corners: np.ndarray
+    """(np,) corners of elements that are there at each point of the mesh."""
+    unused: np.ndarray
+    """Scratch of the tables, one word per node, -1 between calls."""
+    origin: np.ndarray
+    """Positions of the owned elements when the storage was made."""
+    listed: np.ndarray
+    """Positions of the owned elements when the contact lists were made."""
+
+    def __init__(
+        self,
+        comm: Any = None,
+        threads: int = 1,
+        outdir: Path | str = "data",
+        log: Any = None,
+        stop: Any = None,
+        balance_on: bool = True,
+    ) -> None:
+        self.comm = comm if comm is not None else SerialComm()
+        self.threads = threads
+        self.outdir = Path(outdir)
+        self.log, self.stop = log, stop
+        self.balance_on = balance_on
+        self.timers = Timers()
+        self.halo = None
+        self.surface_loads = SurfaceLoads()
+        super().__init__()
+        self.clear()
+
+    def clear(self) -> None:
+        """Start a new model: no mesh, step 0, default options."""
+        self.release()
+        self.clear_scene()
+        self.clock = Clock()
+        self.lattice = Lattice()
+        self.ownership = Ownership(self.comm, self.balance_on)
+        self.rebuilds = 0
+        self.event_rows: list[Crack] = []
+        self.closed = False
+        self.budget: Any = None
+        self._topology_stale = True
+        self._longest = 0.0
+        self._mean_edge = 0.0
+        self.untouched = True
+        """Nothing has moved since there is this mesh."""
+        self._told_step = 0.0
+        self._empty()
+
+    def _empty(self) -> None:
+        self.number = np.empty(0, np.int64)
+        self.x, self.v = np.empty((0, 8)), np.empty((0, 6))
+        self.cold = {}
+        self.memories = Memories.empty(0)
+
+    def release(self) -> None:
+        """Give back what MPI holds for this simulation. Not collective."""
+        if self.halo is not None:
+            self.halo.close()
+        self.halo = None
+
+    @property
+    def wide(self) -> bool:
+        """There are quads: rows of positions and velocities have twelve columns."""
+        return self.x.shape[1] == 12
+
+    def the_mesh(self) -> Mesh:
+        """The mesh; CommandError if there is none."""
+        return self._mesh()
+
+    @property
+    def owned(self) -> slice:
+        """Storage rows of the owned elements."""
+        return slice(self.n_left, self.n_left + self.n_own) if self.closed else slice(0, len(self.number))
+
+    def masses_change(self) -> bool:
+        """Masses or the time step will be others with the next lists."""
+        return self.lattice.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
+
+    def has_faded(self, one: Fading) -> bool:
+        """Forces left behind are gone, or belong to the other mode."""
+        now = float(self.clock.step) if one.in_steps else self.clock.time
+        return now >= one.begin + one.span or one.in_steps == self.options.dynamic
+
+    def tell_time_step(self, dt: float, critical: float, added: float) -> None:
+        """A line in the log about the time step [s]; critical: stability limit times safety factor [s]; added: mass
+        that mass scaling adds, over the true mass. A step that is followed (auto) is told again when it has changed by
+        a tenth."""
+        o = self.options
+        if self.log is None or (o.auto and abs(dt - self._told_step) < 0.1 * self._told_step):
+            return
+        self._told_step = dt
+        limit = critical / o.safety
+        scaled = f"by mass scaling, which adds {added:.3g} times the mass"
+        how = "given" if o.dt else scaled if o.mass_scaling else "estimated"
+        self.log.info(
+            f"time step {dt:.4g} s ({how}), {dt / limit:.2f} of the stability limit {limit:.4g} s; safety factor "
+            f"{o.safety:g}: {critical:.4g} s"
+        )
+        if dt > critical * (1.0 + 1e-9):
+            self.log.warn_once(
+                f"critical time step {dt > limit}",
+                f"the time step {dt:g} s is {dt / limit:.2f} of the stability limit {limit:.4g} s, more than the "
+                f"safety factor {o.safety:g} allows ({critical:.4g} s); a run that blows up should be repeated with a "
+                "smaller one",
+            )
