@@ -116,3 +116,50 @@ def test_tension_comes_before_shear(tensile, shear, friction):
     """Both limits passed: counted as a tensile break."""
     args = (tensile, shear, friction, 1.0)
     assert laws.bond_failure(ELASTIC_BOND, -1.1 * tensile, 1.1 * shear, *args) == BREAKS_IN_TENSION
+
+
+# ---- the state of a pair ---------------------------------------------------------------------------------------------
+
+E, G, TWO_RT, LENGTH, U_MADE = 2e8, 8e7, 0.9, 1.8, 3e-3
+
+
+def state(model: int, kind: int, u: float, spheres: bool = True) -> tuple[float, float, float, float]:
+    return laws.pair_state(kind, model, 5e7, 3e7, E, G, TWO_RT, LENGTH, spheres, U_MADE, u)
+
+
+@pytest.mark.parametrize("model", [laws.LINEAR, laws.HERTZ])
+@pytest.mark.parametrize("kind", [0, ELASTIC_BOND, CONTACT_BOND])
+def test_a_pair_that_touches_has_the_state_of_its_contact(model, kind):
+    """Bonded or not, also at no overlap."""
+    for u in (0.0, 1e-6, 0.01):
+        fn, ks, kn, energy = state(model, kind, u)
+        assert (fn, ks) == laws.contact(model, 5e7, 3e7, TWO_RT, u)
+        assert kn == laws.tangent_normal_stiffness(model, 5e7, TWO_RT, u)
+        assert energy == laws.normal_energy(model, fn, u)
+
+
+@pytest.mark.parametrize("model", [laws.LINEAR, laws.HERTZ])
+def test_a_pair_that_is_apart_has_the_state_of_its_bond(model):
+    u = -0.02
+    assert state(model, 0, u) == (0.0, 0.0, 0.0, 0.0)
+    for spheres in (True, False):
+        area = laws.bond_area(TWO_RT, spheres)
+        assert state(model, ELASTIC_BOND, u, spheres)[:2] == laws.elastic_bond(E, G, area, LENGTH, u)
+    assert state(model, CONTACT_BOND, u)[:2] == laws.contact_bond(model, 5e7, 3e7, TWO_RT, U_MADE, u)
+
+
+@pytest.mark.parametrize("model", [laws.LINEAR, laws.HERTZ])
+@pytest.mark.parametrize("kind, u", [(0, 0.01), (ELASTIC_BOND, -0.02), (CONTACT_BOND, -0.02), (CONTACT_BOND, 0.01)])
+def test_stiffness_and_energy_belong_to_the_force(model, kind, u):
+    """kn = dFn/dU, Fn = dE/dU, by central differences."""
+    h = 1e-5
+    (low, _, _, less), (high, _, _, more) = state(model, kind, u - h), state(model, kind, u + h)
+    fn, _, kn, _ = state(model, kind, u)
+    assert (high - low) / (2.0 * h) == pytest.approx(kn, rel=1e-6)
+    assert (more - less) / (2.0 * h) == pytest.approx(fn, rel=1e-6)
+
+
+def test_the_geometry_of_a_pair():
+    """Normal, overlap and 2 Rt of a 3-4-5 triangle; two discs in one place are pushed apart along x."""
+    assert laws.pair_geometry(3.0, -4.0, 2.0, 4.0) == pytest.approx((25.0, 0.6, -0.8, 1.0, 16.0 / 3.0))
+    assert laws.pair_geometry(0.0, 0.0, 1.0, 1.0) == (0.0, 1.0, 0.0, 2.0, 2.0)

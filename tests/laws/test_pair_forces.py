@@ -1,12 +1,11 @@
 """The force loop against the laws taken pair by pair, and against itself cut into other blocks.
 
-The loop works on a hundred pairs at a time in lanes; the reference below is the plain sum over all pairs of the list,
-with the laws as Python functions of floats.
+The loop works on a hundred pairs at a time in lanes; the reference (physics/dem/reference.py) is the plain sum over
+all pairs of the list.
 """
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +13,11 @@ import pytest
 from numba import njit
 
 from hpcdem.commands.dem import bonds, particles, properties, running
-from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.core.fields import MATERIAL
 from hpcdem.core.selection import Interval
 from hpcdem.numerics import lanes
 from hpcdem.numerics.lanes import U
-from hpcdem.physics.dem.kernels import laws
+from hpcdem.physics.dem import reference
 from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
@@ -59,62 +58,27 @@ def slots(sim: Simulation, t: int) -> range:
     return range(lists.ptr[poff[t]], lists.ptr[poff[t] + max(cut[t + 1] - lo[t], 0)])
 
 
-def reference(sim: Simulation) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[int]]:
-    """Force rows (n, 3), shear forces and bond types per slot, and breaks [tension, shear] of a model of one block."""
-    lists, hot, ihot, dt = sim.lists, sim.particles.hot, sim.particles.ihot, sim.settings.dt
-    force, fs, bond, broken = np.zeros((len(hot), 3)), lists.fs.copy(), lists.bond.copy(), [0, 0]
-    table = sim.bond_types.as_floats()
-    for k in slots(sim, 0):
-        i, j = lists.row[k], lists.partner[k]
-        dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
-        d, ri, rj = math.hypot(dx, dy), hot[i, RADIUS], hot[j, RADIUS]
-        u, two_rt, kind = ri + rj - d, 4.0 * ri * rj / (ri + rj), bond[k]
-        if u < 0.0 and kind == 0:
-            fs[k] = 0.0
-            continue
-        nx, ny, la, lb = dx / d, dy / d, ri - 0.5 * u, rj - 0.5 * u
-        vs = ny * (hot[i, VX] - hot[j, VX]) + nx * (hot[j, VY] - hot[i, VY]) - hot[i, SPIN] * la - hot[j, SPIN] * lb
-        model, a, b, mu = sim.pair_laws[ihot[i, MATERIAL] * len(sim.materials) + ihot[j, MATERIAL]]
-        which, e, g, tensile, shear, _ = table[kind]
-        area = laws.bond_area.py_func(two_rt, True)
-        if u >= 0.0:
-            fn, ks = laws.contact.py_func(model, a, b, two_rt, u)
-        elif which == laws.ELASTIC_BOND:
-            fn, ks = laws.elastic_bond.py_func(e, g, area, ri + rj, u)
-        else:
-            fn, ks = laws.contact_bond.py_func(model, a, b, two_rt, lists.u_made[k], u)
-        s = fs[k] + ks * vs * dt
-        if kind:
-            failure = laws.bond_failure.py_func(which, fn, s, tensile, shear, mu, area)
-            if failure:
-                broken[failure - 1] += 1
-                bond[k], fn = 0, max(fn, 0.0)
-        if not bond[k]:
-            s = max(-mu * fn, min(mu * fn, s))
-        fs[k] = s
-        f = np.array([-s * ny - fn * nx, s * nx - fn * ny])
-        force[i] += *f, s * la
-        force[j] += *-f, s * lb
-    return force, fs, bond, broken
-
-
 @pytest.mark.parametrize("bonded", BONDS)
 @pytest.mark.parametrize("law", ["hertz", "linear"])
 def test_against_the_laws_pair_by_pair(tmp_path: Path, law: str, bonded: str) -> None:
     """Same forces, histories, bonds and breaks to rounding; there is something of every kind to be seen."""
     sim = heap(tmp_path, law, bonded)
-    force, fs, bond, broken = reference(sim)
-    assert len(slots(sim, 0)) > 5 * lanes.CAPACITY
+    lists, p, n_mat = sim.lists, sim.particles, len(sim.materials)
+    used = np.array(slots(sim, 0))
+    pairs = np.column_stack([lists.row[used], lists.partner[used]])
+    force, fs, bond, broken = reference.pair_forces(
+        p.hot, p.ihot[:, MATERIAL], pairs, lists.fs[used], lists.bond[used], lists.u_made[used],
+        sim.pair_laws.reshape(n_mat, n_mat, 4), sim.bond_laws, True, sim.settings.dt,
+    )  # fmt: skip
+    assert len(used) > 5 * lanes.CAPACITY
     sim._forces()
-    lists = sim.lists
-    used = slots(sim, 0)
     scale = np.abs(force).max()
     assert lists.owned_forces() == pytest.approx(force, rel=1e-11, abs=1e-12 * scale)
-    assert lists.fs[used] == pytest.approx(fs[used], rel=1e-10, abs=1e-12 * scale)
-    assert np.array_equal(lists.bond[used], bond[used])
+    assert lists.fs[used] == pytest.approx(fs, rel=1e-10, abs=1e-12 * scale)
+    assert np.array_equal(lists.bond[used], bond)
     assert list(sim.uncollected_breaks()) == broken
     if bonded != "none":
-        assert min(broken) > 0 and (bond[used] > 0).sum() > 50
+        assert min(broken) > 0 and (bond > 0).sum() > 50
         d = lists.row[used], lists.partner[used]
         d2 = ((sim.particles.hot[d[0], :2] - sim.particles.hot[d[1], :2]) ** 2).sum(axis=1)
         was_bonded = (heap(tmp_path, law, bonded).lists.bond[used]) > 0

@@ -210,12 +210,12 @@ def contacts(
                 continue
             law = laws_table[face_model[slot_face[k]] * n_mat + ihot[i, MATERIAL]]
             u = s[OVERLAP]
-            fn, ks = laws.contact(law[MODEL], law[A], law[B], 4.0 * r, u)
+            fn, ks, _, energy = laws.contact_state(law[MODEL], law[A], law[B], 4.0 * r, u)
             part = _weight(k - first, last - first, seen)
             out[n, 0], out[n, 1] = part * fn, part * slot_fs[k]
             out[n, 2], out[n, 3] = x + s[DISTANCE] * s[NX], y + s[DISTANCE] * s[NY]
             out[n, 4] = u
-            out[n, 5] = part * (laws.normal_energy(law[MODEL], fn, u) + laws.shear_energy(slot_fs[k], ks))
+            out[n, 5] = part * (energy + laws.shear_energy(slot_fs[k], ks))
             at[n, 0], at[n, 1] = k, d
             n += 1
     return n

@@ -7,6 +7,7 @@ see is counted by the one that owns the earlier partner.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,13 +23,41 @@ KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
 LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 
 
-@njit(cache=True, error_model="numpy")
-def _direction(dx, dy, d):
-    """Unit vector from the earlier to the later partner; +x if both centres are in one place (rows from one corner)."""
-    if d == 0.0:
-        return 1.0, 0.0
-    inverse = 1.0 / d
-    return dx * inverse, dy * inverse
+@njit(cache=True, error_model="numpy", forceinline=True)
+def pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u):
+    """laws.pair_state of the particles in storage rows i and j with a bond of table row `row` (0: none), at overlap
+    u [m]: (Fn, ks, kn, energy of Fn)."""
+    q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
+    return laws.pair_state(
+        bonds[row, KIND], pairs[q, MODEL], pairs[q, A], pairs[q, B], bonds[row, E_MOD], bonds[row, G_MOD], two_rt,
+        hot[i, RADIUS] + hot[j, RADIUS], spheres, u_made, u,
+    )  # fmt: skip
+
+
+class PairState(NamedTuple):
+    """A pair as it lies: whether it touches or is bonded (if not, all is zero), normal from the earlier to the later
+    partner, overlap and 2 Rt [m], and what laws.pair_state says of it [N, N/m, N/m, J]."""
+
+    active: bool
+    nx: float
+    ny: float
+    u: float
+    two_rt: float
+    fn: float
+    ks: float
+    kn: float
+    energy: float
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def pair_state(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres):
+    """The state of a pair; arguments as `pair_law`."""
+    dx, dy, ri, rj = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y], hot[i, RADIUS], hot[j, RADIUS]
+    if row == 0 and dx * dx + dy * dy > (ri + rj) * (ri + rj):  # most pairs: neither root nor division
+        return PairState(False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    _, nx, ny, u, two_rt = laws.pair_geometry(dx, dy, ri, rj)
+    fn, ks, kn, energy = pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u)
+    return PairState(True, nx, ny, u, two_rt, fn, ks, kn, energy)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -44,72 +73,26 @@ def report(t, hot, ihot, blocks, ptr, partner, fs, bond, u_made, pairs, bonds, n
     for i in range(cut[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
-            dx = hot[j, X] - hot[i, X]
-            dy = hot[j, Y] - hot[i, Y]
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            reach = ri + rj
-            d2 = dx * dx + dy * dy
-            kind = bond[k]
-            if kind == 0 and d2 > reach * reach:
+            at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pairs, bonds, n_mat, spheres)
+            if not at.active:
                 continue
-            d = math.sqrt(d2)
-            nx, ny = _direction(dx, dy, d)
-            u = reach - d
-            two_rt = 4.0 * ri * rj / reach
-            q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-            if u >= 0.0:
-                fn, _ = laws.contact(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u)
-                stiffness = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u)
-            elif bonds[kind, KIND] == laws.ELASTIC_BOND:
-                area = laws.bond_area(two_rt, spheres)
-                fn, _ = laws.elastic_bond(bonds[kind, E_MOD], bonds[kind, G_MOD], area, reach, u)
-                stiffness = bonds[kind, E_MOD] * area / reach
-            else:
-                fn, _ = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
-                stiffness = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u_made[k])
-            s = fs[k]
-            ax = s * -ny - fn * nx
-            ay = s * nx - fn * ny
-            la = ri - 0.5 * u
+            ax = fs[k] * -at.ny - at.fn * at.nx
+            ay = fs[k] * at.nx - at.fn * at.ny
+            arm = hot[i, RADIUS] - 0.5 * at.u
             swap = ihot[i, GID] > ihot[j, GID]
-            out[n, 0] = fn
-            out[n, 1] = s
+            out[n, 0] = at.fn
+            out[n, 1] = fs[k]
             out[n, 2] = -ax if swap else ax
             out[n, 3] = -ay if swap else ay
-            out[n, 4] = hot[i, X] + la * nx
-            out[n, 5] = hot[i, Y] + la * ny
-            out[n, 6] = u
-            out[n, 7] = stiffness
+            out[n, 4] = hot[i, X] + arm * at.nx
+            out[n, 5] = hot[i, Y] + arm * at.ny
+            out[n, 6] = at.u
+            out[n, 7] = at.kn
             iout[n, 0] = ihot[j, GID] if swap else ihot[i, GID]
             iout[n, 1] = ihot[i, GID] if swap else ihot[j, GID]
-            iout[n, 2] = kind
+            iout[n, 2] = bond[k]
             n += 1
     return n
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def stiffness(t, hot, ihot, blocks, ptr, partner, pairs, n_mat, n_left, out):
-    """Add the tangent normal stiffness of every touching pair of block t to its owned particles, out (n_own,) f8
-    [N/m]."""
-    cut, lo, _, poff, _ = blocks
-    a, b = cut[t], cut[t + 1]
-    p = poff[t] - lo[t]
-    for i in range(lo[t], b):
-        for k in range(ptr[p + i], ptr[p + i + 1]):
-            j = partner[k]
-            dx = hot[j, X] - hot[i, X]
-            dy = hot[j, Y] - hot[i, Y]
-            reach = hot[i, RADIUS] + hot[j, RADIUS]
-            u = reach - math.sqrt(dx * dx + dy * dy)
-            if u < 0.0:
-                continue
-            q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-            two_rt = 4.0 * hot[i, RADIUS] * hot[j, RADIUS] / reach
-            kn = laws.tangent_normal_stiffness(pairs[q, MODEL], pairs[q, A], two_rt, u)
-            if a <= i:
-                out[i - n_left] += kn
-            if a <= j < b:
-                out[j - n_left] += kn
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -126,18 +109,14 @@ def make_bonds(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, n_mat, c
     for i in range(lo[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
-            dx = hot[j, X] - hot[i, X]
-            dy = hot[j, Y] - hot[i, Y]
-            d2 = dx * dx + dy * dy
+            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
+            d2, _, _, u, two_rt = laws.pair_geometry(hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y], ri, rj)
             if chosen[i] and chosen[j]:
-                reach = hot[i, RADIUS] + hot[j, RADIUS]
-                d = math.sqrt(d2)
                 if bond[k] != 0:
                     bond[k] = renewed[bond[k]]
-                elif d - reach * rext <= tolerate:
+                elif math.sqrt(d2) - (ri + rj) * rext <= tolerate:
                     bond[k] = fresh
-                    two_rt = 4.0 * hot[i, RADIUS] * hot[j, RADIUS] / reach
-                    u_made[k] = max(reach - d, 0.5e-3 * two_rt)
+                    u_made[k] = max(u, 0.5e-3 * two_rt)
                     if i >= cut[t]:
                         made += 1
             if bond[k] != 0:
@@ -170,27 +149,17 @@ def overstretched(t, hot, ihot, blocks, ptr, partner, bond, u_made, pairs, bonds
     p = poff[t] - lo[t]
     for i in range(cut[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
-            j, kind = partner[k], bond[k]
-            if kind == 0 or not (chosen[i] and chosen[j]):
+            j, row = partner[k], bond[k]
+            if row == 0 or not (chosen[i] and chosen[j]):
                 continue
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            reach = ri + rj
-            u = reach - math.sqrt((hot[j, X] - hot[i, X]) ** 2 + (hot[j, Y] - hot[i, Y]) ** 2)
-            two_rt = 4.0 * ri * rj / reach
-            area = laws.bond_area(two_rt, spheres)
-            law = bonds[kind]
-            if law[KIND] == laws.ELASTIC_BOND:
-                fn, _ = laws.elastic_bond(law[E_MOD], law[G_MOD], area, reach, u)
-                limit = law[TENSILE] * area
-            else:
-                q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-                fn, _ = laws.contact_bond(pairs[q, MODEL], pairs[q, A], pairs[q, B], two_rt, u_made[k], u)
-                limit = law[TENSILE]
-            if u < 0.0 and laws.bond_failure(law[KIND], fn, 0.0, law[TENSILE], law[SHEAR], 0.0, area) == (
+            at = pair_state(i, j, row, u_made[k], hot, ihot, pairs, bonds, n_mat, spheres)
+            law, area = bonds[row], laws.bond_area(at.two_rt, spheres)
+            limit = law[TENSILE] * area if law[KIND] == laws.ELASTIC_BOND else law[TENSILE]
+            if at.u < 0.0 and laws.bond_failure(law[KIND], at.fn, 0.0, law[TENSILE], law[SHEAR], 0.0, area) == (
                 laws.BREAKS_IN_TENSION
             ):
                 number += 1
-                widest = max(widest, limit * u / fn)
+                widest = max(widest, limit * at.u / at.fn)
     return number, widest
 
 

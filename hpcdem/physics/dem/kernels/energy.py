@@ -14,19 +14,15 @@ is what a leap-frog keeps constant together with the energy of linear springs.)
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
 from numba import njit
 
 from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.numerics.exact_sum import add_to_bins
 from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.dem.kernels import laws
-from hpcdem.physics.dem.kernels import walls as wall_kernels
-from hpcdem.physics.dem.kernels.contacts import E_MOD, G_MOD, KIND, MODEL, A, B
+from hpcdem.physics.dem.kernels.contacts import MODEL, A, B, pair_law, pair_state
 from hpcdem.physics.dem.kernels.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
-from hpcdem.physics.dem.kernels.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY
+from hpcdem.physics.dem.kernels.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY, end_of_slots, meeting, wall_state
 
 # Flows [J], the rows of bins (9, 2, 2112): work done on the model, then what it loses.
 GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS = range(9)
@@ -109,21 +105,6 @@ def kinetic(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, whole_step,
 # ---- pairs ---------------------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, error_model="numpy")
-def _springs(kind, u, two_rt, length, law, bond, u_made, spheres):
-    """Of a pair with a bond of this kind (0: none) at overlap u: (Fn, ks, energy of the normal force); zeros apart."""
-    if u >= 0.0:
-        fn, ks = laws.contact(law[MODEL], law[A], law[B], two_rt, u)
-        return fn, ks, laws.normal_energy(law[MODEL], fn, u)
-    if kind == 0:
-        return 0.0, 0.0, 0.0
-    if kind == laws.ELASTIC_BOND:
-        fn, ks = laws.elastic_bond(bond[E_MOD], bond[G_MOD], laws.bond_area(two_rt, spheres), length, u)
-    else:
-        fn, ks = laws.contact_bond(law[MODEL], law[A], law[B], two_rt, u_made, u)
-    return fn, ks, laws.normal_energy(laws.LINEAR, fn, u)
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def pair_losses(
     t, hot, ihot, cut, lo, poff, ptr, partner, fs, bond, u_made, fs_before, bond_before, pairs, bonds, n_mat, dt,
@@ -150,31 +131,22 @@ def pair_losses(
             j = partner[k]
             dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
             dvx, dvy = hot[j, VX] - hot[i, VX], hot[j, VY] - hot[i, VY]
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            d2 = dx * dx + dy * dy
-            d = math.sqrt(d2)
-            inverse = 1.0 / d
-            nx = dx * inverse if d != 0.0 else 1.0
-            ny = dy * inverse if d != 0.0 else 0.0
-            reach = ri + rj
-            u = reach - d
-            two_rt = 4.0 * ri * rj / reach
+            ri, rj, made = hot[i, RADIUS], hot[j, RADIUS], u_made[k]
+            d2, nx, ny, u, two_rt = laws.pair_geometry(dx, dy, ri, rj)
             arm_i, arm_j = ri - 0.5 * u, rj - 0.5 * u
-            sliding = nx * dvy - ny * dvx - hot[i, SPIN] * arm_i - hot[j, SPIN] * arm_j
-            law = pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
-            kind = np.int64(bonds[tied, KIND])
-            u_before = reach - math.sqrt((dx - dvx * dt) ** 2 + (dy - dvy * dt) ** 2)
-            _, ks_before, _ = _springs(kind, u_before, two_rt, reach, law, bonds[tied], u_made[k], spheres)
-            if kind == 0 and d2 > reach * reach:
+            sliding = laws.sliding_speed(nx, ny, dvx, dvy, hot[i, SPIN], hot[j, SPIN], arm_i, arm_j)
+            _, _, _, u_before, _ = laws.pair_geometry(dx - dvx * dt, dy - dvy * dt, ri, rj)
+            _, ks_before, _, _ = pair_law(i, j, tied, made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u_before)
+            if tied == 0 and d2 > (ri + rj) * (ri + rj):
                 _book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
                 continue
-            fn, ks, energy = _springs(kind, u, two_rt, reach, law, bonds[tied], u_made[k], spheres)
-            if kind == 0 or bond[k] == 0:  # a bond that holds does not slip
+            fn, ks, _, energy = pair_law(i, j, tied, made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u)
+            if tied == 0 or bond[k] == 0:  # a bond that holds does not slip
                 slip = (before + ks * sliding * dt - now) / ks if ks > 0.0 else sliding * dt
                 loss = 0.5 * (before + now) * slip
-                if kind != 0 and u < 0.0:  # strained up to now; its force has not pulled in the rest of the last step
+                if tied != 0 and u < 0.0:  # strained up to now; its force has not pulled in the rest of the last step
                     loss += energy - 0.5 * fn * (u - u_before)
-                _book(bins, FRICTION if kind == 0 else BONDS, loss)
+                _book(bins, FRICTION if tied == 0 else BONDS, loss)
             _book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
 
 
@@ -187,34 +159,18 @@ def pair_energy(
     for i in range(cut[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
-            dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            reach = ri + rj
-            d2 = dx * dx + dy * dy
-            kind = np.int64(bonds[bond[k], KIND])
-            if kind == 0 and d2 > reach * reach:
+            at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pairs, bonds, n_mat, spheres)
+            if not at.active:
                 continue
-            u = reach - math.sqrt(d2)
-            law = pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
-            _, ks, energy = _springs(kind, u, 4.0 * ri * rj / reach, reach, law, bonds[bond[k]], u_made[k], spheres)
-            shear = laws.shear_energy(fs[k], ks)
-            if u >= 0.0:
-                _book(stored, NORMAL, energy)
+            shear = laws.shear_energy(fs[k], at.ks)
+            if at.u >= 0.0:
+                _book(stored, NORMAL, at.energy)
                 _book(stored, SHEAR, shear)
             else:
-                _book(stored, BONDED, energy + shear)
+                _book(stored, BONDED, at.energy + shear)
 
 
 # ---- walls ---------------------------------------------------------------------------------------------------------
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _last_slot(slot_row, first):
-    """One past the last slot of the particle of slot `first`."""
-    last = first + 1
-    while last < len(slot_row) and slot_row[last] == slot_row[first]:
-        last += 1
-    return last
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -222,17 +178,15 @@ def wall_work(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_ta
     """Work that moving walls do in `span` [s] with the present forces: that on the particle times the wall's speed."""
     first = 0
     while first < len(slot_row):
-        last = _last_slot(slot_row, first)
+        last = end_of_slots(slot_row, first, len(slot_row))
         for k in range(first, last):
             wall = walls[slot_wall[k]]
             if wall[WVX] == 0.0 and wall[WVY] == 0.0:
                 continue
-            where, _, nx, ny, _, fn, _, _ = wall_kernels.contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
-            )
-            if where != NONE:
-                s = slot_fs[k]
-                _book(bins, WALLS, ((s * -ny - fn * nx) * wall[WVX] + (s * nx - fn * ny) * wall[WVY]) * span)
+            at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
+            if at.where != NONE:
+                fx, fy = slot_fs[k] * -at.ny - at.fn * at.nx, slot_fs[k] * at.nx - at.fn * at.ny
+                _book(bins, WALLS, (fx * wall[WVX] + fy * wall[WVY]) * span)
         first = last
 
 
@@ -245,11 +199,11 @@ def _jump(where, u, way, law, two_r, was, u_before, way_before):
         return 0.0
     loss = 0.0
     if was != NONE:
-        fn, _ = laws.contact(law[MODEL], law[A], law[B], two_r, u_before)
-        loss += laws.normal_energy(law[MODEL], fn, u_before) + 0.5 * fn * way_before
+        fn, _, _, energy = laws.contact_state(law[MODEL], law[A], law[B], two_r, u_before)
+        loss += energy + 0.5 * fn * way_before
     if where != NONE:
-        fn, _ = laws.contact(law[MODEL], law[A], law[B], two_r, u)
-        loss -= laws.normal_energy(law[MODEL], fn, u) - 0.5 * fn * way
+        fn, _, _, energy = laws.contact_state(law[MODEL], law[A], law[B], two_r, u)
+        loss -= energy - 0.5 * fn * way
     return loss
 
 
@@ -266,17 +220,17 @@ def wall_losses(
         before_walls[w, P2Y] -= walls[w, WVY] * dt
     first = 0
     while first < len(slot_row):
-        last = _last_slot(slot_row, first)
+        last = end_of_slots(slot_row, first, len(slot_row))
         i = slot_row[first]
         x, y, r = hot[i, X], hot[i, Y], hot[i, RADIUS]
         for k in range(first, last):
             before, now, wall = fs_before[k], slot_fs[k], walls[slot_wall[k]]
             vx, vy = hot[i, VX] - wall[WVX], hot[i, VY] - wall[WVY]
             law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-            was, _, mx, my, u_before = wall_kernels.meeting(
+            was, _, mx, my, u_before = meeting(
                 k, first, last, x - hot[i, VX] * dt, y - hot[i, VY] * dt, r, before_walls, slot_wall, side_before
             )
-            where, _, nx, ny, u = wall_kernels.meeting(k, first, last, x, y, r, walls, slot_wall, side_before)
+            where, _, nx, ny, u = meeting(k, first, last, x, y, r, walls, slot_wall, side_before)
             if was == NONE and where == NONE:
                 continue
             way, way_before = (nx * vx + ny * vy) * dt, (mx * vx + my * vy) * dt
@@ -301,13 +255,10 @@ def wall_energy(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_
     """Elastic energy of the contacts with walls."""
     first = 0
     while first < len(slot_row):
-        last = _last_slot(slot_row, first)
+        last = end_of_slots(slot_row, first, len(slot_row))
         for k in range(first, last):
-            where, _, _, _, u, fn, ks, _ = wall_kernels.contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
-            )
-            if where != NONE:
-                law = laws_table[slot_wall[k] * n_mat + ihot[slot_row[k], MATERIAL]]
-                _book(stored, NORMAL, laws.normal_energy(law[MODEL], fn, u))
-                _book(stored, SHEAR, laws.shear_energy(slot_fs[k], ks))
+            at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
+            if at.where != NONE:
+                _book(stored, NORMAL, at.energy)
+                _book(stored, SHEAR, laws.shear_energy(slot_fs[k], at.ks))
         first = last

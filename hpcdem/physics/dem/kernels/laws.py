@@ -27,6 +27,28 @@ def series_stiffness(ka, kb):
     return ka * kb / (ka + kb)
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def pair_geometry(dx, dy, ri, rj):
+    """Of two discs, the centre of the second at (dx, dy) from that of the first: (distance squared [m^2], n_x, n_y,
+    overlap U [m], 2 Rt [m]).
+
+    The normal is +x if both centres are in one place (rows from one corner).
+    """
+    d2 = dx * dx + dy * dy
+    d = math.sqrt(d2)
+    inverse = 1.0 / d
+    nx = dx * inverse if d != 0.0 else 1.0
+    ny = dy * inverse if d != 0.0 else 0.0
+    reach = ri + rj
+    return d2, nx, ny, reach - d, 4.0 * ri * rj / reach
+
+
+@njit(cache=True, error_model="numpy")
+def sliding_speed(nx, ny, dvx, dvy, wi, wj, arm_i, arm_j):
+    """Speed [m/s] at which the shear spring of a pair is strained: (dv . t) - w_i arm_i - w_j arm_j."""
+    return nx * dvy - ny * dvx - wi * arm_i - wj * arm_j
+
+
 @njit(cache=True, error_model="numpy")
 def hertz_normal_factor(g, nu):
     """Factor A of Fn = A sqrt(2 Rt U) U [Pa]: A = 2 G / (3 (1 - nu)), mean moduli of the pair."""
@@ -113,6 +135,34 @@ def contact_bond(model, a, b, two_rt, u_made, u):
         s = math.sqrt(two_rt * u_made)
         return 1.5 * a * s * u, b * s
     return a * u, b
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def contact_state(model, a, b, two_rt, u):
+    """Of a touching pair (u >= 0) or wall contact: (Fn [N], shear stiffness ks, dFn/dU [N/m], energy of Fn [J])."""
+    fn, ks = contact(model, a, b, two_rt, u)
+    return fn, ks, tangent_normal_stiffness(model, a, two_rt, u), normal_energy(model, fn, u)
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def pair_state(kind, model, a, b, e, g, two_rt, length, spheres, u_made, u):
+    """The same of any pair at overlap u: of its contact if it touches, else of its bond, zeros if there is neither.
+
+    kind: of the bond, 0: none; model, a, b: see `contact`; e, g, length (Ra + Rb) and spheres: see `elastic_bond` and
+    `bond_area`; u_made: see `contact_bond`. Everything that asks for the state of a pair asks here.
+    """
+    if u >= 0.0:
+        return contact_state(model, a, b, two_rt, u)
+    if kind == ELASTIC_BOND:
+        area = bond_area(two_rt, spheres)
+        fn, ks = elastic_bond(e, g, area, length, u)
+        kn = e * area / length
+    elif kind == CONTACT_BOND:
+        fn, ks = contact_bond(model, a, b, two_rt, u_made, u)
+        kn = tangent_normal_stiffness(model, a, two_rt, u_made)
+    else:
+        return 0.0, 0.0, 0.0, 0.0
+    return fn, ks, kn, normal_energy(LINEAR, fn, u)
 
 
 @njit(cache=True, error_model="numpy")

@@ -10,16 +10,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from hpcdem.core.fields import GID, MATERIAL, RADIUS, X, Y
+from hpcdem.core.fields import GID, MATERIAL, RADIUS
 from hpcdem.numerics.rng import uniform
-from hpcdem.physics.dem.kernels import laws
-from hpcdem.physics.dem.kernels import walls as wall_kernels
-from hpcdem.physics.dem.kernels.contacts import E_MOD, G_MOD, KIND, MODEL, MU, A, B
+from hpcdem.physics.dem.kernels.contacts import MU, pair_state
 from hpcdem.physics.dem.kernels.motion import INERTIA, KICK_X, MASS
-from hpcdem.physics.dem.kernels.walls import NONE
+from hpcdem.physics.dem.kernels.walls import NONE, end_of_slots, wall_state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -63,32 +60,13 @@ def pairs(
     for i in range(lo[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
-            dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            reach = ri + rj
-            d2 = dx * dx + dy * dy
-            kind = np.int64(bonds[bond[k], KIND])
-            if kind == 0 and d2 > reach * reach:
+            at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pair_laws, bonds, n_mat, spheres)
+            if not at.active:
                 continue
-            d = math.sqrt(d2)
-            nx, ny = (dx / d, dy / d) if d != 0.0 else (1.0, 0.0)
-            overlap, two_rt = reach - d, 4.0 * ri * rj / reach
-            law = pair_laws[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]]
-            if overlap >= 0.0:
-                kn = laws.tangent_normal_stiffness(law[MODEL], law[A], two_rt, overlap)
-                _, ks = laws.contact(law[MODEL], law[A], law[B], two_rt, overlap)
-                if kind == 0 and law[MU] == 0.0:
-                    ks = 0.0
-            elif kind == laws.ELASTIC_BOND:
-                fn, ks = laws.elastic_bond(
-                    bonds[bond[k], E_MOD], bonds[bond[k], G_MOD], laws.bond_area(two_rt, spheres), reach, overlap
-                )
-                kn = fn / overlap
-            else:
-                fn, ks = laws.contact_bond(law[MODEL], law[A], law[B], two_rt, u_made[k], overlap)
-                kn = fn / overlap
-            arm = 0.5 * overlap
-            _spring(force, i, j, nx, ny, kn, ks, ri - arm, rj - arm, u, shift + i, shift + j)
+            slips = bond[k] == 0 and pair_laws[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL], MU] == 0.0
+            arm_i, arm_j = hot[i, RADIUS] - 0.5 * at.u, hot[j, RADIUS] - 0.5 * at.u
+            ks = 0.0 if slips else at.ks
+            _spring(force, i, j, at.nx, at.ny, at.kn, ks, arm_i, arm_j, u, shift + i, shift + j)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -96,22 +74,16 @@ def walls(hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat, n_
     """Add K u of the contacts with walls to the owned particles, out (n_own, 3) f8."""
     first = 0
     while first < len(slot_row):
-        last = first + 1
-        while last < len(slot_row) and slot_row[last] == slot_row[first]:
-            last += 1
+        last = end_of_slots(slot_row, first, len(slot_row))
         i = slot_row[first]
         c = i - n_left
         for k in range(first, last):
-            where, _, nx, ny, overlap, _, ks, mu = wall_kernels.contact(
-                k, first, last, hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat
-            )
-            if where == NONE:
+            at = wall_state(k, first, last, hot, ihot, table, slot_row, slot_wall, slot_side, wall_laws, n_mat)
+            if at.where == NONE:
                 continue
-            law = wall_laws[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-            arm = hot[i, RADIUS] - 0.5 * overlap
-            fn = laws.tangent_normal_stiffness(law[MODEL], law[A], 2.0 * hot[i, RADIUS], overlap)
-            fn *= nx * u[i, 0] + ny * u[i, 1]
-            fs = (ks if mu > 0.0 else 0.0) * (nx * u[i, 1] - ny * u[i, 0] + u[i, 2] * arm)
+            nx, ny, arm = at.nx, at.ny, hot[i, RADIUS] - 0.5 * at.u
+            fn = at.kn * (nx * u[i, 0] + ny * u[i, 1])
+            fs = (at.ks if at.mu > 0.0 else 0.0) * (nx * u[i, 1] - ny * u[i, 0] + u[i, 2] * arm)
             out[c, 0] += fn * nx - fs * ny
             out[c, 1] += fn * ny + fs * nx
             out[c, 2] += fs * arm

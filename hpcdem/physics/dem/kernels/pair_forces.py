@@ -16,8 +16,6 @@ cache:
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit, prange
 
@@ -114,22 +112,14 @@ def _gather(n, tied, slots, hot, ihot, row, partner, ibits, bond, u_made, pairs,
 
 @njit(cache=True, error_model="numpy")
 def _geometry(lanes, e):
-    """Of pair e: (distance squared, n_x, n_y, overlap, 2 Rt, arms of i and j, sliding speed).
-
-    The normal is +x if both centres are in one place (rows from one corner).
-    """
-    dx, dy = lanes[DX + e], lanes[DY + e]
+    """laws.pair_geometry of pair e, arms of i and j, sliding speed."""
     ri, rj = lanes[RADIUS_I + e], lanes[RADIUS_J + e]
-    d2 = dx * dx + dy * dy
-    d = math.sqrt(d2)
-    inverse = 1.0 / d
-    nx = dx * inverse if d != 0.0 else 1.0
-    ny = dy * inverse if d != 0.0 else 0.0
-    reach = ri + rj
-    u = reach - d
+    d2, nx, ny, u, two_rt = laws.pair_geometry(lanes[DX + e], lanes[DY + e], ri, rj)
     arm_i, arm_j = ri - 0.5 * u, rj - 0.5 * u
-    sliding = nx * lanes[DVY + e] - ny * lanes[DVX + e] - lanes[SPIN_I + e] * arm_i - lanes[SPIN_J + e] * arm_j
-    return d2, nx, ny, u, 4.0 * ri * rj / reach, arm_i, arm_j, sliding
+    sliding = laws.sliding_speed(
+        nx, ny, lanes[DVX + e], lanes[DVY + e], lanes[SPIN_I + e], lanes[SPIN_J + e], arm_i, arm_j
+    )
+    return d2, nx, ny, u, two_rt, arm_i, arm_j, sliding
 
 
 @njit(cache=True, error_model="numpy")
@@ -164,20 +154,15 @@ def _bond_lanes(n, lanes, dt, spheres, springs, longest):
     for e in range(U(n)):
         d2, nx, ny, u, two_rt, arm_i, arm_j, sliding = _geometry(lanes, e)
         model, a, b, mu = lanes[MODEL + e], lanes[A + e], lanes[B + e], lanes[MU + e]
-        bonded, elastic, touches = lanes[TENSILE + e] >= 0.0, lanes[E + e] >= 0.0, u >= 0.0
+        bonded, elastic = lanes[TENSILE + e] >= 0.0, lanes[E + e] >= 0.0
         area = laws.bond_area(two_rt, spheres)
-        # All laws for all pairs, then a choice: cheaper than jumps. What a law makes of a case not its own is dropped.
-        fn, ks = laws.contact(model, a, b, two_rt, u)
         length = lanes[RADIUS_I + e] + lanes[RADIUS_J + e]
-        fn_open, ks_open = laws.elastic_bond(lanes[E + e], lanes[G + e], area, length, u)
-        if springs:
-            fn_spring, ks_spring = laws.contact_bond(model, a, b, two_rt, lanes[U_MADE + e], u)
-            fn_open = fn_open if elastic else fn_spring
-            ks_open = ks_open if elastic else ks_spring
-        fn = fn if touches else fn_open
-        ks = ks if touches else ks_open
+        # `springs` is the same for all pairs: without contact bonds their law is left out of the loop.
+        kind = laws.CONTACT_BOND if springs and not elastic else laws.ELASTIC_BOND
+        fn, ks, _, _ = laws.pair_state(
+            kind, model, a, b, lanes[E + e], lanes[G + e], two_rt, length, spheres, lanes[U_MADE + e], u
+        )
         fs = lanes[FS + e] + ks * sliding * dt
-        kind = laws.ELASTIC_BOND if elastic else laws.CONTACT_BOND
         failure = laws.bond_failure(kind, fn, fs, lanes[TENSILE + e], lanes[SHEAR + e], mu, area)
         failure = failure if bonded else laws.HOLDS
         free = (failure != laws.HOLDS) | (not bonded)

@@ -8,10 +8,9 @@ import math
 import numpy as np
 from numba import njit
 
-from hpcdem.core.fields import FIX, FIX_X, FIX_Y, GID, MATERIAL, RADIUS, SPIN, VX, VY, X, Y
+from hpcdem.core.fields import FIX, FIX_X, FIX_Y, GID, RADIUS, SPIN, VX, VY
 from hpcdem.numerics.exact_sum import add_to_bins
-from hpcdem.physics.dem.kernels import laws
-from hpcdem.physics.dem.kernels.contacts import E_MOD, G_MOD, KIND, MODEL, A, B
+from hpcdem.physics.dem.kernels.contacts import pair_state
 from hpcdem.physics.dem.kernels.motion import CLUMPED, INERTIA, MASS
 
 _ROOM = 256
@@ -40,38 +39,22 @@ def pairs(t, hot, ihot, blocks, ptr, partner, bond, u_made, pair_laws, bonds, n_
     for i in range(lo[t], b):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
-            dx = hot[j, X] - hot[i, X]
-            dy = hot[j, Y] - hot[i, Y]
-            ri, rj = hot[i, RADIUS], hot[j, RADIUS]
-            reach = ri + rj
-            d2 = dx * dx + dy * dy
-            kind = bond[k]
-            if kind == 0 and d2 > reach * reach:
+            at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pair_laws, bonds, n_mat, spheres)
+            if not at.active:
                 continue
-            u = reach - math.sqrt(d2)
-            two_rt = 4.0 * ri * rj / reach
-            q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-            if u >= 0.0:
-                fn, _ = laws.contact(pair_laws[q, MODEL], pair_laws[q, A], pair_laws[q, B], two_rt, u)
-                kn = laws.tangent_normal_stiffness(pair_laws[q, MODEL], pair_laws[q, A], two_rt, u)
+            if at.u >= 0.0:
                 if a <= i:
-                    stiffness[i - n_left] += kn
+                    stiffness[i - n_left] += at.kn
                 if a <= j < b:
-                    stiffness[j - n_left] += kn
-            elif bonds[kind, KIND] == laws.ELASTIC_BOND:
-                fn, _ = laws.elastic_bond(
-                    bonds[kind, E_MOD], bonds[kind, G_MOD], laws.bond_area(two_rt, spheres), reach, u
-                )
-            else:
-                fn, _ = laws.contact_bond(pair_laws[q, MODEL], pair_laws[q, A], pair_laws[q, B], two_rt, u_made[k], u)
+                    stiffness[j - n_left] += at.kn
             if a <= i:
                 if n == _ROOM:
                     _empty_into(bins, n, bits)
                     n = 0
-                forces[n] = abs(fn)
+                forces[n] = abs(at.fn)
                 n += 1
                 count += 1
-                deepest = max(deepest, u / min(ri, rj))
+                deepest = max(deepest, at.u / min(hot[i, RADIUS], hot[j, RADIUS]))
     _empty_into(bins, n, bits)
     return count, deepest
 

@@ -10,6 +10,7 @@ force of the floor equals the weight above it).
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -96,17 +97,42 @@ def meeting(k, first, last, x, y, r, walls, slot_wall, slot_side):
     return where, side, nx, ny, u
 
 
+class WallState(NamedTuple):
+    """The contact of a wall slot as it lies: where (NONE: no contact, the rest is zero), side, normal from particle to
+    wall, overlap [m], what laws.contact_state says of it [N, N/m, N/m, J], and friction."""
+
+    where: int
+    side: float
+    nx: float
+    ny: float
+    u: float
+    fn: float
+    ks: float
+    kn: float
+    energy: float
+    mu: float
+
+
 @njit(cache=True, error_model="numpy")
-def contact(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
-    """Geometry and law of wall slot k: (where, side, n_x, n_y, U, Fn, ks, friction)."""
+def wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat):
+    """The state of wall slot k, of a particle with the slots first : last."""
     i = slot_row[k]
     r = hot[i, RADIUS]
     where, side, nx, ny, u = meeting(k, first, last, hot[i, X], hot[i, Y], r, walls, slot_wall, slot_side)
     if where == NONE:
-        return where, side, nx, ny, u, 0.0, 0.0, 0.0
+        return WallState(where, side, nx, ny, u, 0.0, 0.0, 0.0, 0.0, 0.0)
     law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-    fn, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
-    return where, side, nx, ny, u, fn, ks, law[MU]
+    fn, ks, kn, energy = laws.contact_state(law[MODEL], law[A], law[B], 2.0 * r, u)
+    return WallState(where, side, nx, ny, u, fn, ks, kn, energy, law[MU])
+
+
+@njit(cache=True, error_model="numpy")
+def end_of_slots(slot_row, first, stop):
+    """One past the last slot, before `stop`, of the particle of slot `first`."""
+    last = first + 1
+    while last < stop and slot_row[last] == slot_row[first]:
+        last += 1
+    return last
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -121,27 +147,22 @@ def _block(
     k = wptr[t]
     while k < wptr[t + 1]:
         i = slot_row[k]
-        first = k
-        last = k + 1
-        while last < wptr[t + 1] and slot_row[last] == i:
-            last += 1
+        first, last = k, end_of_slots(slot_row, k, wptr[t + 1])
         vx, vy, w, r = hot[i, VX], hot[i, VY], hot[i, SPIN], hot[i, RADIUS]
         for k in range(first, last):
-            where, side, nx, ny, u, fn, ks, mu = contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
-            )
-            new_side[k] = side
-            if where == NONE:
+            at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
+            new_side[k] = at.side
+            if at.where == NONE:
                 slot_fs[k] = 0.0
                 continue
             wall = walls[slot_wall[k]]
-            la = r - 0.5 * u
-            vs = ny * (vx - wall[WVX]) + nx * (wall[WVY] - vy) - w * la
-            s = laws.coulomb(slot_fs[k] + ks * vs * dt, mu * fn)
+            arm = r - 0.5 * at.u
+            vs = at.ny * (vx - wall[WVX]) + at.nx * (wall[WVY] - vy) - w * arm
+            s = laws.coulomb(slot_fs[k] + at.ks * vs * dt, at.mu * at.fn)
             slot_fs[k] = s
-            force[shift + i, 0] += s * -ny - fn * nx
-            force[shift + i, 1] += s * nx - fn * ny
-            force[shift + i, 2] += s * la
+            force[shift + i, 0] += s * -at.ny - at.fn * at.nx
+            force[shift + i, 1] += s * at.nx - at.fn * at.ny
+            force[shift + i, 2] += s * arm
         for k in range(first, last):
             slot_side[k] = new_side[k]
         k = last
@@ -174,28 +195,21 @@ def report(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_table
     n = 0
     k = 0
     while k < len(slot_row):
-        first = k
-        last = k + 1
-        while last < len(slot_row) and slot_row[last] == slot_row[first]:
-            last += 1
+        first, last = k, end_of_slots(slot_row, k, len(slot_row))
         for k in range(first, last):
-            where, _, nx, ny, u, fn, _, _ = contact(
-                k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat
-            )
-            if where == NONE:
+            at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
+            if at.where == NONE:
                 continue
-            i = slot_row[k]
-            law = laws_table[slot_wall[k] * n_mat + ihot[i, MATERIAL]]
-            s = slot_fs[k]
-            la = hot[i, RADIUS] - 0.5 * u
-            out[n, 0] = fn
+            i, s = slot_row[k], slot_fs[k]
+            arm = hot[i, RADIUS] - 0.5 * at.u
+            out[n, 0] = at.fn
             out[n, 1] = s
-            out[n, 2] = s * -ny - fn * nx
-            out[n, 3] = s * nx - fn * ny
-            out[n, 4] = hot[i, X] + la * nx
-            out[n, 5] = hot[i, Y] + la * ny
-            out[n, 6] = u
-            out[n, 7] = laws.tangent_normal_stiffness(law[MODEL], law[A], 2.0 * hot[i, RADIUS], u)
+            out[n, 2] = s * -at.ny - at.fn * at.nx
+            out[n, 3] = s * at.nx - at.fn * at.ny
+            out[n, 4] = hot[i, X] + arm * at.nx
+            out[n, 5] = hot[i, Y] + arm * at.ny
+            out[n, 6] = at.u
+            out[n, 7] = at.kn
             iout[n, 0] = ihot[i, GID]
             iout[n, 1] = slot_wall[k]
             n += 1

@@ -1,0 +1,104 @@
+"""What elements.py, joints.py and nodes.py compute, written plainly for one element, joint or node, in small matrices.
+To be read beside them; tests hold the two against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hpcdem.physics.fdem.kernels.elements import PARTS
+
+ONE = np.eye(2)
+
+
+class Solid(NamedTuple):
+    """Lame's lambda, 2 mu [Pa], viscosity [Pa s], initial stress (2, 2) [Pa], and whether strains are small."""
+
+    lame: float
+    two_mu: float
+    eta: float
+    stress0: np.ndarray
+    small: bool
+
+
+class Deformation(NamedTuple):
+    """Of a triangle: strain U - 1 and its rate [1/s] in the turned frame, rotation R, all (2, 2), and gradients (3, 2)
+    [1/m] of the shape functions and area [m2], both of the present triangle, or of the mesh if strains are small."""
+
+    strain: np.ndarray
+    rate: np.ndarray
+    rotation: np.ndarray
+    gradients: np.ndarray
+    area: float
+
+
+def deformation(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, small: bool) -> Deformation:
+    """From the corners (3, 2) of a triangle in the mesh and now [m] and their velocities [m/s]: F = R U."""
+    per_mesh = np.linalg.inv((mesh[1:] - mesh[0]).T)
+    f, df = (x[1:] - x[0]).T @ per_mesh, (v[1:] - v[0]).T @ per_mesh
+    left, _, right = np.linalg.svd(f)
+    r = ONE if small else left @ right
+    strain, rate = r.T @ f - ONE, r.T @ df
+    edges = ((mesh if small else x)[1:] - (mesh if small else x)[0]).T
+    gradients = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]) @ np.linalg.inv(edges)
+    return Deformation(
+        0.5 * (strain + strain.T), 0.5 * (rate + rate.T), r, gradients, 0.5 * float(np.linalg.det(edges))
+    )
+
+
+def forces_of_strain(d: Deformation, strain: np.ndarray, rate: np.ndarray, solid: Solid) -> np.ndarray:
+    """Forces (3, 2) [N/m] on the corners: f_l = -A sigma grad N_l, sigma = R (sigma_0 + lambda tr(e) + 2 mu e + eta
+    de/dt) R^T."""
+    sigma = solid.stress0 + solid.lame * np.trace(strain) * ONE + solid.two_mu * strain + solid.eta * rate
+    return -d.area * d.gradients @ (d.rotation @ sigma @ d.rotation.T)
+
+
+def triangle_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
+    """Forces (3, 2) [N/m] of the stress of a constant-strain triangle on its corners; mesh, x, v (3, 2)."""
+    d = deformation(mesh, x, v, solid.small)
+    return forces_of_strain(d, d.strain, d.rate, solid)
+
+
+def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
+    """The same (4, 2) of a quad: the mean of two overlays of two triangles, in each of which the volume strain (and its
+    rate) is the mean by area in the mesh (Marti & Cundall 1982)."""
+    force = np.zeros((4, 2))
+    for overlay in (PARTS[:2], PARTS[2:]):
+        parts = [deformation(mesh[k], x[k], v[k], solid.small) for k in overlay]
+        areas = [0.5 * float(np.linalg.det(mesh[k][1:] - mesh[k][0])) for k in overlay]
+        volume = np.average([np.trace(d.strain) for d in parts], weights=areas)
+        swell = np.average([np.trace(d.rate) for d in parts], weights=areas)
+        for k, d in zip(overlay, parts):
+            strain = d.strain + 0.5 * (volume - np.trace(d.strain)) * ONE
+            rate = d.rate + 0.5 * (swell - np.trace(d.rate)) * ONE
+            force[k] += 0.5 * forces_of_strain(d, strain, rate, solid)
+    return force
+
+
+def joint_forces(
+    a: np.ndarray, b: np.ndarray, p: np.ndarray, q: np.ndarray, stresses: Callable[[int, float, float, float], tuple]
+) -> np.ndarray:
+    """Forces (2, 2) [N/m] on the ends a and b of this side of a joint; p is opposite b, q opposite a (2,) [m].
+
+    stresses: (sigma, tau) [Pa] at Gauss point 0, 1, 2 from its opening and slip and the length of the joint [m]:
+    laws.intact_point or, past the peak, laws.yielded_point.
+    """
+    along = 0.5 * ((b + p) - (a + q))
+    length = float(np.linalg.norm(along))
+    t = along / length
+    n = np.array([t[1], -t[0]])
+    force = np.zeros((2, 2))
+    for point, (xi, weight) in enumerate(zip(*np.polynomial.legendre.leggauss(3))):
+        shape = 0.5 * np.array([1.0 - xi, 1.0 + xi])
+        jump = shape[0] * (q - a) + shape[1] * (p - b)
+        sigma, tau = stresses(point, float(jump @ n), float(jump @ t), length)
+        force += 0.5 * weight * length * np.outer(shape, sigma * n + tau * t)
+    return force
+
+
+def node_velocity(v: np.ndarray, force: np.ndarray, mass: float, alpha: float, dt: float) -> np.ndarray:
+    """Velocity (2,) [m/s] of a node after the kick of the forces (k, 2) [N/m] of its corners, with local damping."""
+    total = force.sum(axis=0)
+    return v + dt / mass * (total - alpha * np.abs(total) * np.sign(v))
