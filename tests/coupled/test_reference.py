@@ -1,4 +1,4 @@
-"""Contacts of discs with faces against the plain loop of physics/disc_faces_reference.py, in random states."""
+"""Contacts of discs with faces against the plain loop of physics/coupling/reference.py, in random states."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hpcdem.commands.dem import properties
 from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.core.selection import Interval
-from hpcdem.physics import disc_faces_reference as reference
+from hpcdem.physics.coupling import reference
 from hpcdem.physics.fdem.mesh import Mesh
 from tests.blocks.support import joined, rectangle, shaken
 from tests.coupled.support import body, discs, together
