@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError
+from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frames import read_frame
 from hpcdem.physics.dem import observe, saving
@@ -110,6 +110,29 @@ def test_the_limit_of_the_time_step(tmp_path):
     assert limit == pytest.approx(2.0 * MASS / 6.0, rel=1e-12)
     sim.settings.dt = 1.01 * limit
     with pytest.raises(CommandError, match="is beyond the stability limit of diffusion"):
+        running.prepare(sim)
+
+
+def test_a_limit_that_falls_in_mid_run_stops_it(tmp_path):
+    """Discs come together: with two neighbours each in place of none the step is too large."""
+    sim = row_of_discs(tmp_path)
+    sim.particles["x"][:] *= 1.5
+    sim.settings.dt = sim.clock.dt = 1.0
+    sim.close()
+    sim.step()
+    sim.particles["x"][:] /= 1.5
+    with pytest.raises(PhysicsError, match=r"time step 1 s is beyond the stability limit of diffusion, 0\.52"):
+        sim.rebuild()
+
+
+def test_particles_without_mass_are_refused(tmp_path):
+    from hpcdem.commands.dem import properties, running
+    from hpcdem.core.selection import Ids
+
+    sim = row_of_discs(tmp_path)
+    properties.prop(sim, Ids(2, 4), density=0.0)
+    properties.fix(sim, ("x", "y", "spin"), where=Ids(2, 4))
+    with pytest.raises(CommandError, match="diffusion: 3 particles have no mass"):
         running.prepare(sim)
 
 

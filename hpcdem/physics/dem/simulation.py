@@ -347,6 +347,13 @@ class Simulation:
                 self._drift = fast.drift(p.hot, p.n_left, p.n_own, self.origin, age)
             self._open_lists()
         self._close()
+        for physics in self.physics:
+            limit = physics.stable_time_step(self)
+            if self.clock.dt > limit:
+                raise PhysicsError(
+                    f"step {self.clock.step}: the time step {self.clock.dt:g} s is beyond the stability limit of "
+                    f"{physics.name}, {limit:g} s: particles touch more neighbours than at the start"
+                )
 
     def open(self) -> None:
         """Make the model free to be changed: owned particles, their histories and forces only."""

@@ -56,9 +56,12 @@ class Diffusion:
         return exact_sum(sim.particles["heat_given"].copy(), sim.comm)
 
     def prepare(self, sim: Simulation) -> None:
-        """CommandError if there are clumps, whose discs have no contacts with each other."""
+        """CommandError if there are clumps, whose discs have no contacts with each other, or particles without mass."""
         if sim.clumps:
             raise CommandError("diffusion: no heat would flow inside clumps; it needs a model without them")
+        light = sim.count(int((sim.body[:, 0] <= 0.0).sum()))
+        if light:
+            raise CommandError(f"diffusion: {light} particles have no mass, so they can hold no heat (PROP density)")
 
     def _inflow(self, sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
         """Into the owned particles: heat from neighbours (n,) [W], and from how many."""
