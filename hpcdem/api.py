@@ -529,7 +529,7 @@ class Simulation:
             p[name][:] = engine.clumps.of_first_members(p, p[name], engine.comm)
             if name in ("vx", "vy", "spin"):
                 engine.clumps.set_motion(p, np.ones(len(p), bool), **{name: p[name].copy()})
-        engine.look_soon()
+        engine.check_soon()
         if name in ("radius", "fix"):
             engine.tables_changed()
 

@@ -71,11 +71,11 @@ class Halo:
             mpi.Isend(to_right, self.right, TO_RIGHT),
         )
 
-    def keep_fresh(self, rows: np.ndarray) -> None:
+    def add_ghost_field(self, rows: np.ndarray) -> None:
         """From now on `refresh` renews the ghost rows of this array; its memory must stay where it is."""
         self.requests += self._persistent(rows, 0)
 
-    def keep_too(self, rows: np.ndarray) -> None:
+    def add_late_ghost_field(self, rows: np.ndarray) -> None:
         """The same of a second array, renewed by `refresh_more`."""
         self.more += self._persistent(rows, BACK)
 
@@ -84,7 +84,7 @@ class Halo:
         out = aligned((self.n_left + self.n_own + self.n_right, rows.shape[1]))
         out[self.n_left : self.n_left + self.n_own] = rows
         self.fill(out)
-        self.keep_fresh(out)
+        self.add_ghost_field(out)
         return out
 
     def _persistent(self, rows: np.ndarray, shift: int) -> list:
@@ -152,5 +152,5 @@ def connect(
     storage = aligned((halo.n_left + len(order) + halo.n_right, hot.shape[1]))
     take_rows(hot, order, storage[halo.n_left : halo.n_left + len(order)], threads)
     halo.fill(storage)
-    halo.keep_fresh(storage)
+    halo.add_ghost_field(storage)
     return storage, halo

@@ -162,7 +162,7 @@ def join(sim: Simulation, where: Selection | None = None, group: str | None = No
     if color is not None:
         p["color"][members] = color
     sim.ownership.wanted = True
-    sim.look_soon()
+    sim.check_soon()
     return len(gid)
 
 

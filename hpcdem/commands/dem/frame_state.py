@@ -70,7 +70,7 @@ def load_frame(
     longest = contacts["length"][contacts["bond"] > 0]
     sim._longest2 = float(comm.max_into(np.array([np.max(longest, initial=0.0)]))[0]) ** 2
     sim.ownership.wanted = True
-    sim.look_soon()
+    sim.check_soon()
     _tell(sim, path, p, kept, unknown)
     return kept
 

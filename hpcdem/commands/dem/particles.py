@@ -291,5 +291,5 @@ def add_part(
         )  # fmt: skip
         sim.hist = sim.hist.extended(len(rows))
     sim.ownership.wanted = True
-    sim.look_soon()
+    sim.check_soon()
     return total

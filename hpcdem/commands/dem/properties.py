@@ -102,7 +102,7 @@ def prop(
     if group is not None:
         p["group"][which] = sim.group_number(group)
     if xv is not None or yv is not None or (motion and sim.clumps):
-        sim.look_soon()
+        sim.check_soon()
 
 
 def fix(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:

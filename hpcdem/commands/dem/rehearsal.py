@@ -31,7 +31,7 @@ def rehearse(threads: int = 1) -> None:
     sim.step()
     sim.particles["x"][0] += 0.1  # much faster than all others
     sim.rebuild()
-    sim.look_soon()
+    sim.check_soon()
     sim.step()
     bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
     bonds.break_bonds(sim, Ids(0, 1))

@@ -108,7 +108,7 @@ def prepare(sim: Simulation, dt_known: bool = False) -> None:
     if dt != sim.clock.dt:
         sim.clock.dt = dt
         sim.tables_changed()
-        sim.look_soon()
+        sim.check_soon()
     sim.refresh_tables()
     check_time_step(sim)
 

@@ -42,7 +42,7 @@ def wall(
     for axis, value in enumerate((xv, yv)):
         if value is not None:
             sim.walls.v[at, axis] = value
-    sim.look_soon()
+    sim.check_soon()
 
 
 def box(

@@ -320,7 +320,7 @@ class Coupled:
         if particles.clock.dt != dt:
             particles.clock.dt = dt
             particles.tables_changed()
-            particles.look_soon()
+            particles.check_soon()
             particles.refresh_tables()
         if blocks.options.dt != dt:
             blocks.time_step(value=dt)

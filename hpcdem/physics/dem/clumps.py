@@ -66,7 +66,7 @@ class Clumps:
         if halo.n_left + halo.n_right + len(halo.border):
             self._far = aligned((len(p.hot), 4))
             self._far[:] = 0.0
-            halo.keep_too(self._far)
+            halo.add_late_ghost_field(self._far)
 
     def rows(self, p: Particles) -> np.ndarray | None:
         """The rows of the owned particles (n_own, 12), with the present state; None without clumps."""

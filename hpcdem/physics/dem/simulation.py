@@ -298,7 +298,7 @@ class Simulation:
         """Speed of the fastest wall [m/s]."""
         return float(np.hypot(self.walls.v[:, 0], self.walls.v[:, 1]).max()) if len(self.walls) else 0.0
 
-    def look_soon(self) -> None:
+    def check_soon(self) -> None:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
         self.lattice.soon()
 
@@ -524,7 +524,7 @@ class Simulation:
         self.fast, lattice.columns, self._drift = Fast.none(), 1, None
         if drift is None or first_class is None:
             if before:
-                self.look_soon()
+                self.check_soon()
             return
         which, classes = fast.classes(drift, limit)
         which = which[classes >= first_class]

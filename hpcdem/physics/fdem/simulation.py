@@ -495,7 +495,7 @@ class Core(State):
         halo.fill(self.number)
         halo.fill(self.v)
         if self.options.collision:
-            halo.keep_fresh(self.v)
+            halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
 
     def _warn_of_snap_back(self) -> None:

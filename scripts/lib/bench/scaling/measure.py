@@ -324,7 +324,7 @@ def exchange(comm: Any, rows: int) -> Any:
     halo = Halo(comm, 2 * rows, first, last)
     table = aligned((halo.n_left + 2 * rows + halo.n_right, 8))
     table[:] = 0.0
-    halo.keep_fresh(table)
+    halo.add_ghost_field(table)
     return halo.refresh
 
 
