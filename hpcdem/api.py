@@ -1,4 +1,4 @@
-"""The Python interface: the verbs of the ZDEM language as methods, the state as numpy arrays.
+"""The Python interface: the commands of the ZDEM language as methods, the state as numpy arrays.
 
 Everything ends in the functions of `hpcdem.commands`, as a script does, so both give the same results to the last
 bit. Under mpiexec or srun every rank runs the same program, and every method is collective: call it on all ranks.
@@ -19,7 +19,7 @@ from hpcdem import session
 from hpcdem.core.errors import CommandError, ScriptError, UsageError
 from hpcdem.core.fields import FIELDS, FIX_BITS
 from hpcdem.core.selection import Selection
-from hpcdem.lang.zdem.execute import Interpreter, Verbs, find, tell_warnings
+from hpcdem.lang.zdem.execute import Commands, Interpreter, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
 from hpcdem.physics.dem.materials import MATERIAL
@@ -41,8 +41,8 @@ def _place() -> tuple[str, int]:
     return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
 
 
-def _verb(method: Method, edits: bool = True) -> Method:
-    """Errors of a verb leave with file and line of the program; values of a wrong kind too. edits: it may change the
+def _command(method: Method, edits: bool = True) -> Method:
+    """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
     particles."""
 
     @functools.wraps(method)
@@ -68,8 +68,8 @@ def _verb(method: Method, edits: bool = True) -> Method:
 
 
 def _look(method: Method) -> Method:
-    """A verb that changes nothing."""
-    return _verb(method, edits=False)
+    """A command that changes nothing."""
+    return _command(method, edits=False)
 
 
 def _raised_by_the_user(error: BaseException) -> bool:
@@ -130,7 +130,7 @@ class Simulation:
         self.engine = self._session.simulation(folder, self._session.log if log else None)
         self.engine.outdir = self.engine.outdir.resolve()
         self.engine.goes_on_with = "Simulation.resume()"
-        self._do = Verbs()
+        self._do = Commands()
         self._seen_alone = ""
         self._asked(("Simulation", outdir, log), lambda: None, again=True)
 
@@ -143,13 +143,13 @@ class Simulation:
 
     # ---- who is there ----------------------------------------------------------------------------------------------
 
-    @_verb
+    @_command
     def start(self) -> None:
         """START: forget everything and begin a new, empty model."""
         self._refuse_coupled("start")
         self._do.particles.start(self.engine)
 
-    @_verb
+    @_command
     def box(
         self,
         left: float,
@@ -163,7 +163,7 @@ class Simulation:
         """BOX: four walls around the space of the model; particles that leave it are deleted."""
         self._do.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
 
-    @_verb
+    @_command
     def wall(
         self,
         id: int,
@@ -179,20 +179,20 @@ class Simulation:
         """WALL: make a wall from node to node, or change the one with this id."""
         self._do.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
 
-    @_verb
+    @_command
     def ball(
         self, x: float, y: float, rad: float, id: int | None = None, color: str | int = 0, group: str = "***"
     ) -> None:
         """BALL: one particle; without an id it gets the next free one."""
         self._do.particles.ball(self.engine, id, x, y, rad, _color(color), group)
 
-    @_verb
+    @_command
     def gen(self, num: int, rad: Iterable[float], x: Point, y: Point, color: str | int = 0, group: str = "***") -> int:
         """GEN num: random insertion without overlap into the rectangle x, y, radii drawn from `rad`; how many fitted
         in."""
         return self._do.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
 
-    @_verb
+    @_command
     def gen_grid(
         self,
         rad: Iterable[float],
@@ -205,7 +205,7 @@ class Simulation:
         """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad); how many were made."""
         return self._do.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
 
-    @_verb
+    @_command
     def gline(
         self,
         p1: Point,
@@ -222,14 +222,14 @@ class Simulation:
         """GLINE: a row of particles from p1 towards p2, their distance over the sum of radii is `cratio`; how many."""
         return self._do.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
 
-    @_verb
+    @_command
     def load(self, file: str | Path, scale: float = 1.0, x: Point | None = None, y: Point | None = None) -> int:
         """LOAD: a new model from rows ``x y r [group]``, or from a frame all_<step>.dat; x, y: window in the numbers of
         the file; how many."""
         self._refuse_coupled("load")
         return self._do.particles.load(self.engine, self._existing(file), scale, x, y)
 
-    @_verb
+    @_command
     def clump(
         self,
         file: str | Path,
@@ -244,12 +244,12 @@ class Simulation:
         by (x, y); how many bodies."""
         return self._do.clumps.clump(self.engine, self._existing(file), x, y, angle, scale, _color(color), group)
 
-    @_verb
+    @_command
     def join(self, where: Where, group: str | None = None, color: str | int | None = None) -> int:
         """CLUMP RANGE: make one rigid clump of the chosen particles; of how many."""
         return self._do.clumps.join(self.engine, _selection(where), group, _color(color))
 
-    @_verb
+    @_command
     def delete(self, where: Where = None) -> int:
         """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
         return self._do.particles.delete(self.engine, _selection(where))
@@ -261,7 +261,7 @@ class Simulation:
 
     # ---- what it is made of ----------------------------------------------------------------------------------------
 
-    @_verb
+    @_command
     def prop(
         self,
         where: Where = None,
@@ -288,7 +288,7 @@ class Simulation:
             hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
         )  # fmt: skip
 
-    @_verb
+    @_command
     def bond(
         self,
         where: Where = None,
@@ -310,29 +310,29 @@ class Simulation:
             n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
         )  # fmt: skip
 
-    @_verb
+    @_command
     def break_bonds(self, where: Where = None) -> int:
         """BOND break: remove the bonds with both ends in `where`; how many."""
         return self._do.bonds.break_bonds(self.engine, _selection(where))
 
-    @_verb
+    @_command
     def fix(self, *dofs: str, where: Where = None) -> None:
         """FIX: these of "x", "y", "spin" keep the velocity they have."""
         self._do.properties.fix(self.engine, _degrees(dofs), where=_selection(where))
 
-    @_verb
+    @_command
     def free(self, *dofs: str, where: Where = None) -> None:
         """FREE: undo `fix`."""
         self._do.properties.free(self.engine, _degrees(dofs), where=_selection(where))
 
-    @_verb
+    @_command
     def add_physics(self, name: str, **parameters: float) -> None:
         """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
         contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
         [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
         self._do.physics.add(self.engine, name, **parameters)
 
-    @_verb
+    @_command
     def set(self, **options: Any) -> None:
         """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, outdir,
         and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
@@ -344,12 +344,12 @@ class Simulation:
 
     # ---- running ---------------------------------------------------------------------------------------------------
 
-    @_verb
+    @_command
     def cycle(self, n: int) -> None:
         """CYC: n steps, with output at the SET intervals."""
-        self._do.running.cycle(self.engine, int(n))
+        self._do.cycles.cycle(self.engine, int(n))
 
-    @_verb
+    @_command
     def imple(
         self,
         wall: int,
@@ -362,7 +362,7 @@ class Simulation:
         vtk: float | None = None,
     ) -> None:
         """IMPLE: step until the wall has gone this far [m]; outputs at these ways of the wall [m]."""
-        self._do.running.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
+        self._do.cycles.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
         """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
@@ -387,26 +387,26 @@ class Simulation:
     @_look
     def save(self, file: str | Path) -> None:
         """SAV: the whole state to a checkpoint."""
-        self._do.saving.save(self.engine, self.directory / file)
+        self._do.checkpoints.save(self.engine, self.directory / file)
 
-    @_verb
+    @_command
     def restore(self, file: str | Path) -> None:
         """RES: the whole state of a checkpoint, written on any number of ranks."""
         self._refuse_coupled("restore")
-        self._do.saving.restore(self.engine, self._existing(file))
+        self._do.checkpoints.restore(self.engine, self._existing(file))
 
-    @_verb
+    @_command
     def resume(self) -> bool:
         """Take up the newest whole checkpoint of `outdir` and finish the cycle in which it was written; False if there
         is none. Functions of `every` must have been given before."""
-        from hpcdem.physics.dem import saving
+        from hpcdem.physics.dem import saved_state
 
         self._refuse_coupled("resume")
-        found = saving.restore_newest(self.engine, [self.engine.outdir])
+        found = saved_state.restore_newest(self.engine, [self.engine.outdir])
         if found is None:
             return False
         self.engine.progress = found["progress"]
-        self._do.running.resume(self.engine)
+        self._do.cycles.resume(self.engine)
         return True
 
     @_look
@@ -420,7 +420,7 @@ class Simulation:
         """PLOT: at `finish`, write history y against history x."""
         self._do.history.plot_hist(self.engine, y, x)
 
-    @_verb
+    @_command
     def command(self, text: str) -> None:
         """Carry out lines of the ZDEM language on this model."""
         begins = text.split()[:1] and text.split()[0][:3].lower() in ("sta", "res", "loa")
@@ -440,7 +440,7 @@ class Simulation:
     def finish(self) -> None:
         """The end: histories closed, the table of stages printed, the last frame drawn. Without it, all this happens
         when the program ends."""
-        self._do.running.stop(self.engine)
+        self._do.cycles.stop(self.engine)
         self._session.finish(self.engine)
 
     # ---- output of one moment --------------------------------------------------------------------------------------
@@ -601,28 +601,28 @@ class Simulation:
     @_look
     def wall_force(self, id: int) -> Point:
         """Force on a wall (x, y) [N], exactly summed."""
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         row = self.engine.walls.row(id)
         self._ready()
-        return _point(observe.wall_forces(self.engine)[row])
+        return _point(diagnostics.wall_forces(self.engine)[row])
 
     @_look
     def wall_forces(self) -> dict[int, Point]:
         """Force on every wall by id (x, y) [N]: one pass over the contacts for all of them."""
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         self._ready()
-        force = observe.wall_forces(self.engine)
+        force = diagnostics.wall_forces(self.engine)
         return {int(i): _point(f) for i, f in zip(self.engine.walls.id, force, strict=True)}
 
     @_look
     def kinetic_energy(self) -> float:
         """Sum of (m v^2 + I w^2) / 2 [J], exactly summed."""
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         self._ready()
-        return observe.kinetic_energy(self.engine)
+        return diagnostics.kinetic_energy(self.engine)
 
     @_look
     def energy(self) -> dict[str, float]:
@@ -658,10 +658,10 @@ class Simulation:
     def clumps(self) -> dict[str, np.ndarray]:
         """The clumps of the whole model, on every rank, in the order of ids: id (that of the first member), x y, vx vy,
         spin, angle, area, mass, inertia, members (how many)."""
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         self._ready()
-        return observe.clumps(self.engine)
+        return diagnostics.clumps(self.engine)
 
     @property
     def bonds_left(self) -> int:
@@ -741,11 +741,11 @@ class Simulation:
             raise CommandError(f"{what} would replace particles that touch blocks: part them first, Coupling.end()")
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         def table() -> dict[str, np.ndarray]:
             self._ready()
-            slab = observe.frame(self.engine).tables[name].columns
+            slab = diagnostics.frame(self.engine).tables[name].columns
             parts = self.engine.comm.allgather({key: np.asarray(values) for key, values in slab.items()})
             whole = {key: np.concatenate([part[key] for part in parts]) for key in slab}
             if name == "wall_contacts":

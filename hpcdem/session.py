@@ -89,7 +89,7 @@ class Session:
         return project
 
     def prepare(self, kind: str) -> None:
-        """Collective: wait for the kernels of a kind, see `rehearse`, once."""
+        """Collective: wait for the kernels of a kind, see `warm_up`, once."""
         if kind not in self.ready:
             with self._counted():
                 prepare(self.comm, self.log, kind, self.threads)
@@ -159,9 +159,9 @@ class Session:
         """A model of blocks at the end of the program. Collective, unless it is the end by a failure."""
         stopped = isinstance(failure, StoppedWithCheckpoint)  # on all ranks at the same step
         if failure is None or stopped:
-            from hpcdem.commands.fdem import closing
+            from hpcdem.commands.fdem import summary
 
-            closing.close(project, self.figure and not stopped)
+            summary.close(project, self.figure and not stopped)
         if project.folder_made:
             state = "done" if failure is None else "stopped" if stopped else "failed"
             run_folder.leave(project.outdir, self.comm, state, project.step)
@@ -174,41 +174,41 @@ class Session:
 
 
 def prepare(comm: SerialComm, log: Log, kind: str, *threads: int) -> Path:
-    """Collective: load the kernels of a kind (see `rehearse`), and before them those that all share, or compile them,
+    """Collective: load the kernels of a kind (see `warm_up`), and before them those that all share, or compile them,
     for each number of threads; particles and blocks come before "coupled". Returns their cache folder."""
-    from hpcdem.runtime.warmup import prepare_kernels
+    from hpcdem.runtime.kernels import prepare_kernels
 
     kinds = dict.fromkeys(("shared", kind))
-    return prepare_kernels(comm, log, {name: partial(rehearse, name, *threads) for name in kinds})
+    return prepare_kernels(comm, log, {name: partial(warm_up, name, *threads) for name in kinds})
 
 
-def rehearse(kind: str, *threads: int) -> None:
+def warm_up(kind: str, *threads: int) -> None:
     """Call every kernel of a kind once for each number of threads: "" of particles, "blocks", "coupled" what both need
     besides, "shared" by all, or the name of a physics. Imports them: the cache must be settled before."""
     call: Callable[[int], None]
     if kind == "shared":
-        from hpcdem.runtime.rehearsal import rehearse as call
+        from hpcdem.runtime.warm_up import warm_up as call
     elif kind == "blocks":
-        from hpcdem.commands.fdem.rehearsal import rehearse as call
+        from hpcdem.commands.fdem.warm_up import warm_up as call
     elif kind == "coupled":
-        from hpcdem.physics.coupling.rehearsal import rehearse as call
+        from hpcdem.physics.coupling.warm_up import warm_up as call
     elif kind in PHYSICS:
         call = PHYSICS[kind]().warm_up
     else:
-        from hpcdem.commands.dem.rehearsal import rehearse as call
+        from hpcdem.commands.dem.warm_up import warm_up as call
     for n in threads:
         call(n)
 
 
 def watch_states(sim: Simulation, reproduction: Reproduction) -> None:
     """Let the log tell of the states of this simulation. It only looks."""
-    from hpcdem.physics.dem import observe
+    from hpcdem.physics.dem import diagnostics
     from hpcdem.physics.dem.simulation import Watcher
 
     model = reproduction.new_model()
 
     def look() -> None:
-        reproduction.see(model, sim.clock.step, observe.fingerprint(sim))
+        reproduction.see(model, sim.clock.step, diagnostics.fingerprint(sim))
 
     sim.watchers.append(Watcher(reproduction.every, look))
 
@@ -235,11 +235,11 @@ def draw_last_state(sim: Simulation, log: Log) -> None:
     path, frame = sim.outdir / frame_name(sim.clock.step, ".jpg"), None
     if sim.last_frame is None or sim.last_frame[0] != sim.clock.step:
         from hpcdem.engine import output
-        from hpcdem.physics.dem import observe
+        from hpcdem.physics.dem import diagnostics
 
         sim.close()
         output.folder(sim)
-        frame = observe.frame(sim)
+        frame = diagnostics.frame(sim)
         frame.tables = {"particles": frame.tables["particles"]}
         frame = whole(frame, sim.comm)
     elif sim.comm.rank == 0:

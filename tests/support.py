@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hpcdem.commands.dem import properties, running, settings
+from hpcdem.commands.dem import cycles, properties, settings
 from hpcdem.core.selection import Ids
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 
 
@@ -69,21 +69,21 @@ class Contact(NamedTuple):
 
 def pair(sim: Simulation, a: int = 0, b: int = 1) -> Contact | None:
     """The contact or bond of two particles, or None."""
-    out, ids = observe.contact_rows(sim)
+    out, ids = diagnostics.contact_rows(sim)
     rows = np.flatnonzero((ids[:, 0] == a) & (ids[:, 1] == b))
     return Contact(*map(float, out[rows[0]])) if len(rows) else None
 
 
 def at_wall(sim: Simulation, gid: int = 0, wall: int = 0) -> Contact | None:
     """The contact of a particle with a wall (by its id), or None."""
-    out, ids = observe.wall_rows(sim)
+    out, ids = diagnostics.wall_rows(sim)
     rows = np.flatnonzero((ids[:, 0] == gid) & (ids[:, 1] == sim.walls.row(wall)))
     return Contact(*map(float, out[rows[0]])) if len(rows) else None
 
 
 def steps(sim: Simulation, n: int) -> Simulation:
     """n steps of the loop, without files."""
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(n):
         sim.step()
     return sim
@@ -91,7 +91,7 @@ def steps(sim: Simulation, n: int) -> Simulation:
 
 def watch(sim: Simulation, n: int, look: Callable[[Simulation], Any]) -> np.ndarray:
     """(n + 1, ...) what `look` sees before the first and after each of n steps."""
-    running.prepare(sim)
+    cycles.prepare(sim)
     seen = [look(sim)]
     for _ in range(n):
         sim.step()

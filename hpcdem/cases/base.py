@@ -147,7 +147,7 @@ class Case(BaseModel):
         return result
 
     def _build(self, outdir: str | Path | None) -> None:
-        from hpcdem.cases.running import Carrier
+        from hpcdem.cases.run import Carrier
 
         try:
             self._carrier = Carrier(f"{self.name}.sc", outdir)

@@ -34,7 +34,7 @@ STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 KERNELS = {"particles": ("",), "blocks": ("blocks",), "coupled": ("", "blocks", "coupled")} | {
     name: ("", name) for name in PHYSICS
 }
-"""Kinds of kernels (`session.rehearse`) in the order in which runs load them."""
+"""Kinds of kernels (`session.warm_up`) in the order in which runs load them."""
 
 
 @click.command(context_settings=HELP)
@@ -93,13 +93,13 @@ def run_warmup(words: list[str]) -> NoReturn:
     given = read_command_line(warmup, "hpcdem warmup", words)
     threads, kind = given["threads"], given["kind"]
     if launch.speaks_for_all():
-        if kind == "all":  # each kind in a process of its own, see runtime/warmup.py
+        if kind == "all":  # each kind in a process of its own, see runtime/kernels.py
             again = [sys.executable, "-m", "hpcdem", "warmup", "-j", str(threads), "--of"]
             sys.exit(max(subprocess.run([*again, one], check=False).returncode for one in KERNELS))
         launch.prepare_environment(threads)
         from hpcdem.halo.comm import SerialComm
+        from hpcdem.runtime.kernels import warmup as compile_all
         from hpcdem.runtime.progress import Log
-        from hpcdem.runtime.warmup import warmup as compile_all
 
         for one in KERNELS[kind]:
             compile_all(Log(), partial(prepare, SerialComm(), Log(), one, *{1, threads}))

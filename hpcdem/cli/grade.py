@@ -17,7 +17,7 @@ from hpcdem.cli.measure import Formats
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.pre.specimen import Grading, Request, Specimen
-    from hpcdem.pre.specimen.reading import Grains
+    from hpcdem.pre.specimen.classes import Grains
     from hpcdem.runtime.progress import Log
 
 SHAPES = ("circle", "ellipse", "triangle", "quadrilateral", "pentagon")
@@ -197,7 +197,7 @@ def look(options: dict[str, Any]) -> None:
     from hpcdem.core.errors import UsageError
     from hpcdem.io.ppdem import read_ppdem
     from hpcdem.pre.specimen import read_grading
-    from hpcdem.pre.specimen.reading import classified
+    from hpcdem.pre.specimen.classes import classified
 
     curve = None if options["file"] is None else read_grading(options["file"])
     file = read_ppdem(options["read"], options["layout"], _factor(options))

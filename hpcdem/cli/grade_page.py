@@ -62,7 +62,7 @@ def serve(options: dict[str, Any]) -> None:
             raise UsageError(f"--{name.removeprefix('as_')} does not go with --serve")
     launch.prepare_environment(1)
 
-    from hpcdem.page.serving import serve as serve_page
+    from hpcdem.page.lifetime import serve as serve_page
     from hpcdem.pre.specimen import read_grading
     from hpcdem.pre.specimen.grading import grading
 

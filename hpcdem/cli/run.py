@@ -131,7 +131,7 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
 def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     """Collective: read a script of PCDC commands and Python, and run it on every rank."""
     from hpcdem.lang.pcdc import check
-    from hpcdem.lang.pcdc.execute import Interpreter, Verbs
+    from hpcdem.lang.pcdc.execute import Commands, Interpreter
     from hpcdem.lang.pcdc.source import decode
 
     name, log = str(options.script), session.log
@@ -156,7 +156,7 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
         project = session.project()
         interpreter = session.interpreter = Interpreter(project)
         enter_session(session)
-        past = Verbs().saving.take_up(project) if options.resume else None
+        past = Commands().checkpoints.take_up(project) if options.resume else None
         log.script_started(name, 0)
         sys.argv = [name, *options.arguments]
         sys.path.insert(0, str(options.script.resolve().parent))
@@ -183,10 +183,10 @@ def own_traceback(error: BaseException, file: str) -> str:
 def go_on(sim: Simulation, script: Script, log: Log) -> bool:
     """Collective: finish a script from its newest checkpoint that is whole; False if there is none."""
     from hpcdem.lang.zdem import execute
-    from hpcdem.physics.dem import saving
+    from hpcdem.physics.dem import saved_state
 
     named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
-    found = saving.restore_newest(sim, [sim.outdir, *named.values()])
+    found = saved_state.restore_newest(sim, [sim.outdir, *named.values()])
     if found is None:
         return False
     sim.progress = found["progress"]

@@ -42,7 +42,7 @@ class ScriptError(HpcdemError):
 
 
 class CommandError(HpcdemError):
-    """A verb was given values that make no sense; the script language adds file and line."""
+    """A command was given values that make no sense; the script language adds file and line."""
 
     exit_code = EXIT_USAGE
 

@@ -1,6 +1,6 @@
 """Sizes and places that a model can have, and what is refused because it is surely a slip.
 
-The language asks here while it reads a script, the verbs ask again with the numbers of the moment; so both say the
+The language asks here while it reads a script, the commands ask again with the numbers of the moment; so both say the
 same. All lengths in metres.
 """
 

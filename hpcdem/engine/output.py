@@ -33,7 +33,7 @@ from hpcdem.io.frames import frame_name
 from hpcdem.io.ps import write_ps
 from hpcdem.io.vtk import write_vtk
 from hpcdem.io.vtkhdf import write_vtkhdf
-from hpcdem.physics.dem import budget, guards, observe, saving
+from hpcdem.physics.dem import budget, diagnostics, guards, saved_state
 from hpcdem.physics.dem.platens import OF_PARTS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.runtime import launch, run_folder
@@ -59,7 +59,7 @@ class Snapshot:
         """The frame, made when first asked for; what was under way is settled then."""
         if self._frame is None:
             settle(self.sim)
-            self._frame = observe.frame(self.sim)
+            self._frame = diagnostics.frame(self.sim)
         return self._frame
 
     def _path(self, suffix: str, stem: str = "all") -> str:
@@ -141,7 +141,7 @@ def write_checkpoint(sim: Simulation, _: Snapshot | None = None, automatic: bool
         settle(sim)
         path = folder(sim) / run_folder.checkpoint_name(sim.clock.step, automatic)
         secure_series(sim)
-    saving.save(sim, path)
+    saved_state.save(sim, path)
     run_folder.retire(path.parent, sim.comm, sim.clock.step, sim.keep)
     return path
 
@@ -159,15 +159,15 @@ def write_crash_frame(sim: Simulation) -> None:
 def unbalanced(sim: Simulation) -> float:
     """Largest unbalanced force of a free particle over the mean normal contact force; 0 without contacts.
     Collective."""
-    return observe.survey(sim).unbalanced
+    return diagnostics.survey(sim).unbalanced
 
 
 HISTORIES = {
-    "kinetic": ("J", observe.kinetic_energy),
+    "kinetic": ("J", diagnostics.kinetic_energy),
     "step": ("1", lambda sim: float(sim.clock.step)),
     "time": ("s", lambda sim: sim.clock.time),
     "unbalanced": ("1", unbalanced),
-    "contacts": ("1", lambda sim: float(observe.survey(sim).contacts)),
+    "contacts": ("1", lambda sim: float(diagnostics.survey(sim).contacts)),
     "bonds": ("1", lambda sim: float(sim.bonds_left())),
     "energy": ("J", budget.stored_energy),
 }
@@ -205,7 +205,7 @@ def report(sim: Simulation, _: Snapshot | None = None) -> None:
     """A row per wall in `walls.csv`, and the progress line where one is due."""
     with sim.timers("output"):
         _under_way.look(sim.comm)
-        force = observe.wall_forces(sim)
+        force = diagnostics.wall_forces(sim)
         w, clock = sim.walls, sim.clock
         rows = []
         for k in w.in_output_order():
@@ -230,7 +230,7 @@ def warn_of_overlaps(sim: Simulation) -> None:
     key = f"overlaps since step {sim.progress['first'] if sim.progress is not None else sim.clock.step}"
     if sim.comm.bcast(sim.log.has_warned(key)):
         return
-    worst, number = observe.overlaps_beyond(sim, DEEP, guards.NAMED)
+    worst, number = diagnostics.overlaps_beyond(sim, DEEP, guards.NAMED)
     lines = []
     for o in worst:
         who = f"particle {o.id1} and wall {o.id2}" if o.wall else f"particles {o.id1} and {o.id2}"
@@ -305,7 +305,7 @@ ENERGY_WORDS = {
 
 def status(sim: Simulation, walls: list[tuple[int, float, float]]) -> StepStatus:
     """What a progress line tells. Collective."""
-    clock, seen = sim.clock, observe.survey(sim)
+    clock, seen = sim.clock, diagnostics.survey(sim)
     tension, shear = sim.broken()
     if seen.deepest > DEEP and sim.log is not None:
         warn_of_overlaps(sim)

@@ -1,11 +1,11 @@
-"""The communicator: one set of verbs for one rank and for many.
+"""The communicator: one set of operations for one rank and for many.
 
 `SerialComm` does nothing where nothing needs doing, so that no other module asks how many ranks there are.
 
 MPI libraries wait by spinning, which is the fastest way while every rank has a core of its own. With more ranks than
 cores on a host, a spinning rank keeps the core from the one it waits for, and a step takes milliseconds instead of
 microseconds. There `MpiComm` asks and sleeps in turn; only calls that do not block make that possible, so all of its
-verbs are built on them.
+operations are built on them.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hpcdem.core.errors import HpcdemError
 
 
 class SerialComm:
-    """One rank: every collective verb is the identity."""
+    """One rank: every collective operation is the identity."""
 
     rank = 0
     size = 1
@@ -107,7 +107,7 @@ NAP = 2e-5
 
 
 class MpiComm(SerialComm):
-    """The same verbs over an mpi4py communicator."""
+    """The same operations over an mpi4py communicator."""
 
     def __init__(self, mpi: Any) -> None:
         from mpi4py import MPI

@@ -1,7 +1,7 @@
 """Ghosts: copies of the neighbours' border columns.
 
-Three verbs, after HOOMD-blue: *migrate* (ownership follows position; migrate.py), *connect* (choose and send ghosts)
-and *refresh* (every step: the same ghosts, new values). The first two happen only when the lists are rebuilt.
+Three operations, after HOOMD-blue: *migrate* (ownership follows position; migrate.py), *connect* (choose and send
+ghosts) and *refresh* (every step: the same ghosts, new values). The first two happen only when the lists are rebuilt.
 
 Particles are sorted by column, so the border column is a contiguous piece of the particle rows and lands in a
 contiguous piece on the other side: the requests work on the rows themselves, nothing is packed.

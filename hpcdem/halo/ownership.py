@@ -26,7 +26,7 @@ class Ownership:
         self.borders = np.zeros(0, np.int64)
         self.side = 1.0
         self.wanted = True
-        """Particles came or went: cut anew at the next chance, whatever was measured."""
+        """Particles came or went: cut again at the next chance, whatever was measured."""
         self._busy, self._step = 0.0, 0
 
     def owner_of(self, cx: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ def append_rows(path: str | os.PathLike, header: str, rows: list[str], since: fl
     """Collective. Add rows to the file.
 
     since: None to append; at the first call of a run the step it starts from: what the file has after that step is cut
-    off (0: it starts anew). Raises HpcdemError on all ranks if it cannot be written.
+    off (0: it starts again). Raises HpcdemError on all ranks if it cannot be written.
     """
     error = None
     if comm.rank == 0:

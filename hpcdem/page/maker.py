@@ -37,7 +37,7 @@ def main() -> None:
     """Answer until stdin ends."""
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not get between the answers
-    rehearse()
+    warm_up()
     _write(answers, READY, b"")
     while True:
         head = requests.read(FRAME.size)
@@ -57,7 +57,7 @@ def main() -> None:
             return
 
 
-def rehearse() -> None:
+def warm_up() -> None:
     """Have every kernel compiled, or loaded, and every module imported that a specimen of the page needs."""
     from hpcdem.pre.specimen import PLACEMENTS, SHAPES, Request, make_specimen
 

@@ -1,7 +1,7 @@
 """Kernels that `hpcdem warmup -j 2` has compiled, for runs with one thread and for tests too.
 
 A warm-up for several threads compiles what runs with one thread need as well, into folders of its own (see
-hpcdem/runtime/warmup.py). Before many tests that is half of the compiling: the folders of runs with one thread, if
+hpcdem/runtime/kernels.py). Before many tests that is half of the compiling: the folders of runs with one thread, if
 there are none yet, become copies. Tests that compute in their own process, and their helpers, look where numba looks if
 nobody says anything: beside the sources.
 """
@@ -19,9 +19,9 @@ from numba.core.caching import _CacheLocator
 import hpcdem
 
 FOLDER = """
-from hpcdem.runtime import launch, warmup
+from hpcdem.runtime import kernels, launch
 launch.prepare_environment({threads})
-print(warmup.cache_folder()[0])
+print(kernels.cache_folder()[0])
 """
 
 

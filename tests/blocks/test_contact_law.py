@@ -14,7 +14,7 @@ LOWER = np.array([[0.0, 0.0], [0.5, -math.sqrt(3.0) / 2.0], [1.0, 0.0]])
 
 
 def forces(
-    a, b, penalty=1.0, shear=0.0, friction=0.0, va=None, vb=None, dt=1.0, memory=None, half=0.0, damp=None, dashpot=0.0
+    a, b, penalty=1.0, shear=0.0, friction=0.0, va=None, vb=None, dt=1.0, history=None, half=0.0, damp=None, dashpot=0.0
 ):
     """Forces (n, 6, 2) on the corners of triangles a, then b, (n, 3, 2) each."""
     a, b = (np.asarray(t, float).reshape(-1, 3, 2) for t in (a, b))
@@ -26,13 +26,13 @@ def forces(
             v[rows] = np.broadcast_to(speed, (n, 3, 2)).reshape(n, 6)
     table = np.tile([penalty, shear, friction, 0.0], (n + 4, 1))
     table.view(np.int64)[:, contact.CODE] = int(half) + contact.ALL_EDGES
-    memory = np.zeros((n + 4, 6)) if memory is None else memory
+    history = np.zeros((n + 4, 6)) if history is None else history
     dampers, largest = np.zeros((0, 3)), np.zeros((0, 12))
     if damp is not None:
         dampers, largest = np.tile([*damp[:2], dashpot], (n + 4, 1)), damp[2]
     touching, out = np.zeros(n, np.uint8), np.zeros((n, 12))
     contact.forces(
-        1, np.arange(n), np.arange(n, 2 * n), 8 * np.arange(2 * n), 6 * np.arange(2 * n), x, v, table, memory, dampers,
+        1, np.arange(n), np.arange(n, 2 * n), 8 * np.arange(2 * n), 6 * np.arange(2 * n), x, v, table, history, dampers,
         largest, np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros((0, contact.CHOICE)), touching, out, dt,
     )  # fmt: skip
     return (out * touching[:, None]).reshape(n, 6, 2)
@@ -138,23 +138,23 @@ def test_halves_of_a_quad_act_like_one_body():
 def test_friction_grows_with_slip_and_stops_at_the_cone():
     """F_s = P_s l v dt per step up to tan(phi) F_n, against the motion."""
     a = UPPER - [0.0, 0.01]
-    memory = np.zeros((5, 6))
+    history = np.zeros((5, 6))
     rest = forces(a, LOWER)[0, :3].sum(axis=0)
     seen = []
     for _ in range(120):
-        f = forces(a, LOWER, shear=1.0, friction=0.5, va=[[2e-4, 0.0]] * 3, memory=memory)[0]
+        f = forces(a, LOWER, shear=1.0, friction=0.5, va=[[2e-4, 0.0]] * 3, history=history)[0]
         seen.append(f[:3].sum(axis=0))
     along = np.array(seen)[:, 0]
     assert along[0] < 0.0 and (np.diff(along) <= 1e-15).all()
     assert along[-1] == pytest.approx(-0.5 * rest[1], rel=0.03)  # small edges lie across
-    back = forces(a, LOWER, shear=1.0, friction=0.5, va=[[-2e-4, 0.0]] * 3, memory=memory)[0, :3].sum(axis=0)
+    back = forces(a, LOWER, shear=1.0, friction=0.5, va=[[-2e-4, 0.0]] * 3, history=history)[0, :3].sum(axis=0)
     assert back[0] > along[-1]
 
 
 def test_apart_or_only_touching_there_is_no_force():
     for shift in (0.0, 1e-9, 1.0):
-        memory = np.ones((5, 6))
-        assert (forces(UPPER + [0.0, shift], LOWER, friction=1.0, memory=memory) == 0.0).all()
+        history = np.ones((5, 6))
+        assert (forces(UPPER + [0.0, shift], LOWER, friction=1.0, history=history) == 0.0).all()
 
 
 def test_damped_contact_loses_energy_on_the_way_out():

@@ -171,7 +171,7 @@ def test_what_was_taken_out_and_left_forces_behind():
     sim.solve_elastic()
     sim.null(hole, relax=1000)
     sim.solve_elastic()
-    assert not sim.fading
+    assert not sim.relaxations
     gone.null(hole)
     gone.solve_elastic()
     assert farthest(sim, gone) < 1e-8
@@ -405,12 +405,12 @@ def test_a_stage_is_like_any_other(tmp_path):
 
 def refused(sim: Blocks, told: str, **how) -> None:
     """The solve says why not, and the model is as it was."""
-    before, fading, step = state(sim), list(sim.fading), sim.clock.step
+    before, relaxations, step = state(sim), list(sim.relaxations), sim.clock.step
     with pytest.raises(CommandError, match=told):
         sim.solve_elastic(**how)
     for a, b in zip(before, state(sim)):
         assert np.array_equal(a, b)
-    assert sim.fading == fading and sim.clock.step == step
+    assert sim.relaxations == relaxations and sim.clock.step == step
 
 
 def test_bodies_that_can_move():

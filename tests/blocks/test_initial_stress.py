@@ -112,10 +112,10 @@ def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
 
 def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
     """The table of initial stresses as versions before wrote it: the stress stays, and follows what comes."""
-    from hpcdem.physics.fdem import saving
+    from hpcdem.physics.fdem import saved_state
 
-    usual = saving._whole
-    monkeypatch.setattr(saving, "_whole", lambda columns, root: usual(
+    usual = saved_state._whole
+    monkeypatch.setattr(saved_state, "_whole", lambda columns, root: usual(
         {name: values for name, values in columns.items() if name != "row"}, root))  # fmt: skip
     sim = held("cross")
     sim.initial_stress(None, **STRESS)

@@ -19,9 +19,9 @@ VALUES = {
 
 
 def edge(*args) -> tuple[float, float, float, float, int]:
-    """`joints.yielded_edge` with rows instead of tables: corners, law, beyond, memory (12,), state."""
-    *corners, table, beyond, memory, state = args
-    return joints.yielded_edge(*corners, table[None], beyond[None], 0, memory[None], 0, state)
+    """`joints.yielded_edge` with rows instead of tables: corners, law, beyond, history (12,), state."""
+    *corners, table, beyond, history, state = args
+    return joints.yielded_edge(*corners, table[None], beyond[None], 0, history[None], 0, state)
 
 
 def law(**changes: float) -> tuple[np.ndarray, np.ndarray]:
@@ -35,16 +35,16 @@ def pull(path: np.ndarray, **changes: float) -> tuple[np.ndarray, np.ndarray, np
     """Drive a joint of length H from (0, 0) to (H, 0) along (opening, slip) (n, 2); the normal points down, so the
     other side moves down to open. Returns mean normal stress, shear stress, state."""
     table, beyond = law(**changes)
-    memory, state = np.zeros(joints.MEMORY), joints.INTACT
+    history, state = np.zeros(joints.HISTORY), joints.INTACT
     out = np.empty((len(path), 3))
     for i, (o, s) in enumerate(path.tolist()):
         # This side's edge runs from a = (0, 0) to b = (H, 0); p of the other side faces b, q faces a.
         corners = (0.0, 0.0, H, 0.0, H + s, -o, s, -o)
         if state == joints.INTACT and joints.past_peak(*corners, table) < 0.0:
             state = joints.YIELDED
-        fax, fay, fbx, fby, after = edge(*corners, table, beyond, memory, state)
+        fax, fay, fbx, fby, after = edge(*corners, table, beyond, history, state)
         if state == joints.INTACT:
-            memory[:] = 0.0
+            history[:] = 0.0
         else:
             state = after
         out[i] = -(fay + fby) / H, (fax + fbx) / H, state
@@ -114,12 +114,12 @@ def test_damage_of_proportional_loading_does_not_depend_on_the_way_there():
 def test_the_mode_is_that_of_the_parts_of_damage():
     for ends, mode in (((1e-4, 0.0), 1.0), ((0.0, 2e-4), 2.0)):
         table, beyond = law()
-        memory = np.zeros(joints.MEMORY)
+        history = np.zeros(joints.HISTORY)
         state = joints.YIELDED
         for t in np.linspace(0.0, 1.0, 1000):
             o, s = t * ends[0], t * ends[1]
-            *_, state = edge(0.0, 0.0, H, 0.0, H + s, -o, s, -o, table, beyond, memory, state)
-        assert state == joints.BROKEN and memory[joints.MODE] == mode
+            *_, state = edge(0.0, 0.0, H, 0.0, H + s, -o, s, -o, table, beyond, history, state)
+        assert state == joints.BROKEN and history[joints.MODE] == mode
 
 
 def test_both_sides_get_opposite_forces_bit_for_bit():

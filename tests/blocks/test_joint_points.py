@@ -67,12 +67,12 @@ def test_a_bent_joint_past_its_peak():
     sim = two_squares(0.8 * O_P, 0.0, turn * O_P / H)  # r = 1.5, 0.8, 0.1
     o_t = JOINT["gf1"] / (laws.SOFTENING_AREA * T)
     expected = [T * laws.softening(0.5 * O_P / o_t), 0.96 * T, 0.19 * T]
-    before = sim.local.slot_memory.copy() if sim.closed else None
+    before = sim.local.slot_history.copy() if sim.closed else None
     for _ in range(2):
         assert [sim.values(name)[0] for name in POINTS] == pytest.approx(expected, rel=2e-4)
     assert sim.values("normal_stress_largest")[0] == sim.values("normal_stress_first")[0]
     assert sim.values("damage")[0] == 0.0 and sim.values("state")[0] == 1
-    assert before is None or np.array_equal(before, sim.local.slot_memory)
+    assert before is None or np.array_equal(before, sim.local.slot_history)
 
 
 @pytest.mark.parametrize("part", [0.4, -0.7])

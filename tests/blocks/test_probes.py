@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.fdem import assigning, histories, meshing, modelling, running
+from hpcdem.commands.fdem import assignments, histories, meshes, settings
+from hpcdem.commands.fdem import steps as steps_
 from hpcdem.commands.fdem.project import Project
+from hpcdem.physics.fdem.diagnostics import Looking
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, OnLayer
 from hpcdem.physics.fdem.local import Local
-from hpcdem.physics.fdem.looking import Looking
 from hpcdem.physics.fdem.model import QUANTITIES, Blocks
 from tests.blocks.support import jointed, model, rectangle
 
@@ -61,16 +62,16 @@ def test_what_is_not_there_is_no_number(broken):
 def supported(folder: Path, dynamic: bool = True) -> Project:
     """A plate with joints, its left side held, its right side drawn away until it breaks."""
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
-    meshing.rectangle(project, (0.0, 0.0), (0.4, 0.2), (8, 4))
+    meshes.rectangle(project, (0.0, 0.0), (0.4, 0.2), (8, 4))
     rock = {"density": 2700.0, "young": 20e9, "poisson_ratio": 0.2}
-    assigning.element_model(project, "mech_iso_elastic", rock)
+    assignments.element_model(project, "mech_iso_elastic", rock)
     law = {"tensile_strength": 1e6, "cohesion": 2e6, "friction": 20.0, "gf1": 1.0, "gf2": 3.0, "penalty_normal": 1e11}
-    assigning.joint_model(project, "classic_intrinsic_cohesive_interface", law)
+    assignments.joint_model(project, "classic_intrinsic_cohesive_interface", law)
     if not dynamic:
-        modelling.option(project, dynamic=False)
+        settings.option(project, dynamic=False)
     speed = 0.4 if dynamic else 2e-8
-    assigning.velocity(project, 0.0, 0.0, where=(OnLayer("left"),))
-    assigning.velocity(project, speed, 0.0, where=(OnLayer("right"),))
+    assignments.velocity(project, 0.0, 0.0, where=(OnLayer("left"),))
+    assignments.velocity(project, speed, 0.0, where=(OnLayer("right"),))
     for name, value, side, how, every in (
         ("a", "reaction_x", "left", "sum", 1), ("b", "reaction_y", "right", "maximum", 3),
         ("c", "reaction_x", "right", "mean", 7), ("d", "displacement_x", "right", "mean", 1),
@@ -88,7 +89,7 @@ def test_forces_of_supports_come_with_the_next_step(dynamic, tmp_path, monkeypat
     steps = 140
     one, other = (supported(tmp_path / name, dynamic) for name in "ab")
     for _ in range(steps):
-        running.step(other, 1)
+        steps_.step(other, 1)
     looks = []
     evaluation = Local.evaluation
 
@@ -97,7 +98,7 @@ def test_forces_of_supports_come_with_the_next_step(dynamic, tmp_path, monkeypat
         return evaluation(self, *args, **kwargs)
 
     monkeypatch.setattr(Local, "evaluation", counted)
-    running.step(one, steps)
+    steps_.step(one, steps)
     assert one.blocks.joint_counts()[2 if dynamic else 1] >= (3 if dynamic else 0)
     for name, history in one.histories.items():
         assert history.rows == other.histories[name].rows, name
@@ -125,5 +126,5 @@ def test_a_history_of_one_node_looks_at_one_row(tmp_path, monkeypatch):
         return columns_of(self, on, names, at)
 
     monkeypatch.setattr(Looking, "columns_of", counted)
-    running.step(project, 10)
+    steps_.step(project, 10)
     assert asked == [1] * 30

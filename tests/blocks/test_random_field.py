@@ -176,7 +176,7 @@ def test_every_property_of_everything_takes_fields_tables_and_numbers(on, name, 
         assert np.array_equal(rows.column(one)[column[numbers]], values)
         if on == "joint":
             assert np.array_equal(column[sim.partner[numbers]], column[numbers])
-        if on == "element" and one == "young":  # what follows from it is made anew, per element
+        if on == "element" and one == "young":  # what follows from it is made again, per element
             nu = rows.column("poisson_ratio")[column[numbers]]
             assert rows.column("shear")[column[numbers]] == pytest.approx(values / (2 * (1 + nu)), rel=1e-14)
     sim.step()

@@ -84,7 +84,7 @@ def of_joints(sim: Blocks) -> tuple[np.ndarray, np.ndarray]:
             continue
         face = local.slot_face[slot]
         law, beyond = local.joint_table[local.slot_kind[slot]], local.joint_beyond[local.slot_kind[slot]]
-        memory = local.slot_memory[slot] if state != joints.INTACT else np.zeros(joints.MEMORY)
+        history = local.slot_history[slot] if state != joints.INTACT else np.zeros(joints.HISTORY)
 
         left = []
 
@@ -93,8 +93,8 @@ def of_joints(sim: Blocks) -> tuple[np.ndarray, np.ndarray]:
             left.append(rest)
             return sigma, tau
 
-        def behind(point, o, s, length, law=law, beyond=beyond, memory=memory):
-            known = memory[[joints.OPENED + point, joints.SLIPPED + point, joints.DAMAGE + point]]
+        def behind(point, o, s, length, law=law, beyond=beyond, history=history):
+            known = history[[joints.OPENED + point, joints.SLIPPED + point, joints.DAMAGE + point]]
             return laws.yielded_point(o, s, length, 1.0 / length, *law[:5], *beyond, *known)[:2]
 
         (r, k, k2), (other, m, m2) = (ends(sim, f) for f in (face, sim.partner[face]))

@@ -104,7 +104,7 @@ def test_tables_of_earlier_versions_lack_what_is_new():
     again = Rows.restored([none, [name, numbers[:-1]]])
     assert list(again.column("damping_ratio")) == [0.0, 0.0] and list(again.column("penalty_normal")) == [0.0, 1e10]
     sim = model(rectangle(1, 1, 1.0, 1.0))
-    state = sim.scene_state()
+    state = sim.definition_state()
     del state["options"]["overlap"]
-    sim.take_scene_state(state)
+    sim.take_definition_state(state)
     assert sim.options.overlap == "refuse"

@@ -222,10 +222,10 @@ def main() -> None:
     if sim.budget is not None:
         found.update({f"energy_{name}": np.array(value) for name, value in sim.energies().items()})
     came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - (first or set())))
-    found["about"] = np.array([sim.rebuilds, sim.lattice.late, len(sim.local.pairs), sum(came)])
+    found["about"] = np.array([sim.rebuilds, sim.rebuild_state.late, len(sim.local.pairs), sum(came)])
     if sim.comm.rank == 0:
         np.savez(out, **found)
-    print(sim.comm.rank, sim.n_own, sim.rebuilds, sim.lattice.late, sim.joint_counts(), came, flush=True)
+    print(sim.comm.rank, sim.n_own, sim.rebuilds, sim.rebuild_state.late, sim.joint_counts(), came, flush=True)
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hpcdem.commands.dem import particles, properties, running, settings
+from hpcdem.commands.dem import cycles, particles, properties, settings
 from hpcdem.physics.coupling.model import Coupled
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.model import Blocks
@@ -46,7 +46,7 @@ def body(mesh: Mesh, rock: dict[str, float] = ROCK, fixed: bool = False, gravity
 
 def together(sim: Simulation, blocks: Blocks, **options) -> Coupled:
     """Both, ready to step."""
-    running.prepare(sim, dt_known=sim.settings.dt == 0.0)
+    cycles.prepare(sim, dt_known=sim.settings.dt == 0.0)
     both = Coupled(sim, blocks, **options)
     both.settle_time_step()
     return both
@@ -67,7 +67,7 @@ def momentum(both: Coupled) -> np.ndarray:
     bodies = {"mass": both.particles.body[single, 0], "inertia": both.particles.body[single, 1],
               **{name: p[name][single] for name in ("x", "y", "vx", "vy", "spin")}}  # fmt: skip
     rows = []
-    for of in (bodies, observe.clumps(both.particles)):
+    for of in (bodies, diagnostics.clumps(both.particles)):
         m = of["mass"]
         about = m * (of["x"] * of["vy"] - of["y"] * of["vx"]) + of["inertia"] * of["spin"]
         rows.append(np.column_stack([m * of["vx"], m * of["vy"], about]))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import particles, walls
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
 
@@ -17,7 +17,7 @@ G, DT, RADIUS, WIDTH = 9.81, 5e-5, 0.03, 1.8
 
 def forces_of_walls(sim):
     """Force of all walls on the discs (2,) [N]."""
-    out, _ = observe.wall_rows(sim)
+    out, _ = diagnostics.wall_rows(sim)
     return out[:, 2:4].sum(axis=0)
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from hpcdem.commands.dem import clumps, properties
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
@@ -37,7 +37,7 @@ def pair(folder, blocks, theta=0.0, kn=1e7, dt=2e-6, above=1e-4, x=0.6, **motion
 
 def now(both) -> dict[str, float]:
     """The pair as it is."""
-    return {name: float(values[0]) for name, values in observe.clumps(both.particles).items()}
+    return {name: float(values[0]) for name, values in diagnostics.clumps(both.particles).items()}
 
 
 def held():

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from hpcdem.cli import info
-from hpcdem.commands.dem import properties, running, settings, walls
-from hpcdem.commands.fdem import assigning, closing, coupling, meshing, modelling, saving
-from hpcdem.commands.fdem import running as stepping
+from hpcdem.commands.dem import cycles, properties, settings, walls
+from hpcdem.commands.fdem import assignments, checkpoints, coupling, meshes
+from hpcdem.commands.fdem import settings as settings_
+from hpcdem.commands.fdem import steps as stepping
+from hpcdem.commands.fdem import summary as summary_
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.core.timers import Timers
@@ -28,8 +30,8 @@ from tests.coupled.support import ROCK, discs
 def scene(folder) -> tuple[Project, object]:
     """A block beside a disc that falls on it, not yet coupled."""
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
-    meshing.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
-    assigning.element_model(project, "mech_iso_elastic", ROCK)
+    meshes.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
+    assignments.element_model(project, "mech_iso_elastic", ROCK)
     sim = discs([(0.5, 0.6995, 0.1), (0.5, 0.8998, 0.1)], folder / "sand", dt=5e-6)
     properties.prop(sim, yv=-1.0, xv=0.3)
     settings.set_option(sim, "print", 100)
@@ -49,7 +51,7 @@ def test_both_are_stepped_saved_and_restored(tmp_path):
     coupling.couple(project, sim)
     stepping.step(project, 130)
     assert sim.clock.step == project.step == 130
-    saving.save(project, "middle.sav")
+    checkpoints.save(project, "middle.sav")
     stepping.step(project, 170)
     whole = state(project)
     names = sorted(path.name for path in (tmp_path / "sand").glob("*.vtkhdf"))
@@ -57,14 +59,14 @@ def test_both_are_stepped_saved_and_restored(tmp_path):
     rows = np.genfromtxt(tmp_path / "sand" / "energy.csv", delimiter=",", names=True)
     assert rows["step"][-1] == 300 and rows["work_blocks"][-1] != 0.0 and abs(rows["relative"][-1]) < 1e-2
 
-    saving.restore(project, str(tmp_path / "middle.sav"))
+    checkpoints.restore(project, str(tmp_path / "middle.sav"))
     assert sim.clock.step == project.step == 130
     stepping.step(project, 170)
     assert np.array_equal(state(project), whole)
 
     # As a run does that goes on: blocks first, particles when the script has coupled them again.
     again, other = scene(tmp_path)
-    saving._restored(again, tmp_path / "middle.sav", begins=True)
+    checkpoints._restored(again, tmp_path / "middle.sav", begins=True)
     coupling.couple(again, other)
     stepping.step(again, 170)
     assert other.clock.step == again.step == 300 and np.array_equal(state(again), whole)
@@ -83,21 +85,21 @@ def test_refusals(tmp_path):
     with pytest.raises(CommandError, match="coupled to particles already"):
         coupling.couple(project, sim)
     with pytest.raises(CommandError, match="CYC would leave the blocks behind"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
     project.clear()
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
 
 
 def test_scaled_masses_are_refused(tmp_path):
     """Before anything is stepped, whichever comes first."""
     project, sim = scene(tmp_path)
-    modelling.time_step(project, mass_scaling=1e-4)
+    settings_.time_step(project, mass_scaling=1e-4)
     with pytest.raises(CommandError, match="time-step mass-scaling must be 0"):
         coupling.couple(project, sim)
-    modelling.time_step(project, mass_scaling=0.0)
+    settings_.time_step(project, mass_scaling=0.0)
     coupling.couple(project, sim)
     stepping.step(project, 2)
-    modelling.time_step(project, mass_scaling=1e-4)
+    settings_.time_step(project, mass_scaling=1e-4)
     with pytest.raises(CommandError, match="time-step mass-scaling must be 0"):
         stepping.step(project, 2)
     assert project.step == sim.clock.step == 2
@@ -117,7 +119,7 @@ def test_a_time_step_that_is_said_later_counts(tmp_path):
     clocks = sim.clock, project.blocks.clock
     for say, dt in (
         (lambda: settings.set_option(sim, "dt", 4e-6), 4e-6),
-        (lambda: modelling.time_step(project, value=3e-6), 3e-6),
+        (lambda: settings_.time_step(project, value=3e-6), 3e-6),
         (lambda: None, 3e-6),
     ):
         before = sim.clock.time
@@ -125,12 +127,12 @@ def test_a_time_step_that_is_said_later_counts(tmp_path):
         stepping.step(project, 3)
         assert [clock.dt for clock in clocks] == [dt, dt] and sim.clock.time == pytest.approx(before + 3 * dt)
     settings.set_option(sim, "dt", 2e-6)
-    modelling.time_step(project, value=1e-6)
+    settings_.time_step(project, value=1e-6)
     with pytest.raises(CommandError, match="SET dt 2e-06 s of the particles, model time-step 1e-06 s"):
         stepping.step(project, 3)
-    modelling.time_step(project, value=2e-6)
+    settings_.time_step(project, value=2e-6)
     settings.set_option(sim, "frac", 0.003)
-    modelling.time_step(project, value=0.0)
+    settings_.time_step(project, value=0.0)
     stepping.step(project, 3)
     assert [clock.dt for clock in clocks] == pytest.approx([0.003 * np.sqrt(2.0 * 2500.0 * np.pi * 0.1**2 / 1e7)] * 2)
 
@@ -139,10 +141,10 @@ def test_frac_is_what_the_particles_ask_for(tmp_path):
     """sqrt(m / k) of the disc times it; a model time-step beyond is refused."""
     project, sim = scene(tmp_path)
     settings.set_option(sim, "frac", 0.003)
-    modelling.time_step(project, value=5e-5)
+    settings_.time_step(project, value=5e-5)
     with pytest.raises(CommandError, match=r"SET frac 0\.003 gives"):
         coupling.couple(project, sim)
-    modelling.time_step(project, value=0.0)
+    settings_.time_step(project, value=0.0)
     coupling.couple(project, sim)
     assert (
         sim.clock.dt == project.blocks.clock.dt == pytest.approx(0.003 * np.sqrt(2.0 * 2500.0 * np.pi * 0.1**2 / 1e7))
@@ -155,11 +157,11 @@ def test_what_is_said_of_one_only_is_named(tmp_path):
     said = io.StringIO()
     sim.log = project.blocks.log = Log(stream=said)
     settings.set_option(sim, "gravity", (0.0, -9.81))
-    modelling.option(project, collision=False)
+    settings_.option(project, collision=False)
     walls.box(sim, -1.0, 2.0, 0.3, 3.0)
     walls.wall(sim, 7, nodes=((1.1, -1.0), (1.1, 2.0)))
     walls.wall(sim, 8, nodes=((1.25, -1.0), (1.25, 2.0)))
-    assigning.initial_velocity(project, (50.0, 0.0))
+    assignments.initial_velocity(project, (50.0, 0.0))
     both = coupling.couple(project, sim)
     stepping.step(project, 3)
     told = said.getvalue()
@@ -172,8 +174,8 @@ def test_what_is_said_of_one_only_is_named(tmp_path):
     assert told.count("wall 7") == told.count("bottom side") == told.count("is in or beyond wall 8") == 1
     assert len(both.contacts()["id"]) > 0 or project.blocks.values("velocity_x").mean() < 50.0
 
-    modelling.gravity(project, (0.0, -9.81))
-    modelling.option(project, collision=True)
+    settings_.gravity(project, (0.0, -9.81))
+    settings_.option(project, collision=True)
     stepping.step(project, 3)
     assert said.getvalue().count("gravity differs") == 1
 
@@ -202,10 +204,10 @@ def test_info_of_a_checkpoint_of_both(tmp_path, capsys):
     """Both stand in it, each with its own step; damage is found wherever it is."""
     project, sim = scene(tmp_path)
     walls.wall(sim, 1, nodes=((-1.0, -0.5), (2.0, -0.5)))
-    running.cycle(sim, 7)
+    cycles.cycle(sim, 7)
     both = coupling.couple(project, sim)
     stepping.step(project, 130)
-    saving.save(project, "middle.sav")
+    checkpoints.save(project, "middle.sav")
     path = tmp_path / "middle.sav"
     facts = inventory.of_file(path)
     assert facts["whole"] and (facts["kind"], facts["version"]) == ("checkpoint", checkpoint.VERSION)
@@ -257,10 +259,10 @@ def test_the_tables_of_energy_close_together(tmp_path):
     both = coupling.couple(project, sim)
     falling = 2 * 0.5 * 2500.0 * np.pi * 0.1**2 * (1.0**2 + 0.3**2)
     stepping.step(project, 250)
-    saving.save(project, "middle.sav")
+    checkpoints.save(project, "middle.sav")
     stepping.step(project, 3000)
     whole = project.blocks.energies()
-    saving.restore(project, str(tmp_path / "middle.sav"))
+    checkpoints.restore(project, str(tmp_path / "middle.sav"))
     stepping.step(project, 3000)
     assert project.blocks.energies() == whole  # a restart forgets nothing of it
     found = both.energies()
@@ -271,7 +273,7 @@ def test_the_tables_of_energy_close_together(tmp_path):
     told = said.getvalue()
     discs = rows_of(told, "energy budget")
     said.truncate(0)
-    closing.close(project, figure=False)
+    summary_.close(project, figure=False)
     told = said.getvalue()
     blocks, between = rows_of(told, "energy budget"), rows_of(told, output.ACROSS)
     assert discs[output.ACROSS] == between["work on particles"] and blocks[output.ACROSS] == between["work on blocks"]
@@ -292,7 +294,7 @@ def test_the_table_of_stages_names_both(tmp_path):
     project.blocks.log = Log(stream=said)
     coupling.couple(project, sim)
     stepping.step(project, 300)
-    closing.close(project, figure=False)
+    summary_.close(project, figure=False)
     cells = [line.split("  ") for line in said.getvalue().splitlines()]
     names = {row[0] for row in cells}
     assert {"particles: force", "blocks: force", "between: contact", "between: search", "between: exchange",

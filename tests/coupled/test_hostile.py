@@ -96,13 +96,13 @@ def test_numbers_and_owners(tmp_path):
 
 def test_files_of_another_kind(tmp_path):
     """The three kinds of checkpoints are told apart, and a failed restore leaves both models as they were."""
-    from hpcdem.physics.coupling import saving
-    from hpcdem.physics.dem import saving as of_particles
+    from hpcdem.physics.coupling import saved_state
+    from hpcdem.physics.dem import saved_state as of_particles
 
     both = both_of(tmp_path)
     both.advance(5)
     paths = {name: tmp_path / f"{name}.sav" for name in ("both", "discs", "blocks")}
-    saving.save(both, paths["both"], {"a": 1})
+    saved_state.save(both, paths["both"], {"a": 1})
     of_particles.save(both.particles, paths["discs"])
     both.blocks.save(paths["blocks"])
     with pytest.raises(CommandError, match="not one of a model of blocks"):
@@ -111,9 +111,12 @@ def test_files_of_another_kind(tmp_path):
         of_particles.restore(both.particles, paths["both"])
     for name in ("discs", "blocks"):
         with pytest.raises(CommandError, match="not one of particles and blocks together"):
-            saving.restore(both, paths[name])
+            saved_state.restore(both, paths[name])
     both.advance(5)
-    assert saving.restore(both, paths["both"]) == {"a": 1} and both.blocks.clock.step == both.particles.clock.step == 5
+    assert (
+        saved_state.restore(both, paths["both"]) == {"a": 1}
+        and both.blocks.clock.step == both.particles.clock.step == 5
+    )
 
 
 def test_blocks_that_are_replaced(tmp_path):

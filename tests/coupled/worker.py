@@ -12,11 +12,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hpcdem.commands.dem import clumps, particles, properties, running, settings, walls
+from hpcdem.commands.dem import clumps, cycles, particles, properties, settings, walls
 from hpcdem.lang.zdem.parser import parse_text
-from hpcdem.physics.coupling import saving
+from hpcdem.physics.coupling import saved_state
 from hpcdem.physics.coupling.model import Coupled
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem.model import Blocks
@@ -48,7 +48,7 @@ def make(kind: str, threads: int) -> Coupled:
         clumps.clump(sim, f"bodies{comm.size}.txt", 0.7, 1.15, group="bodies")
         fallen = parse_text("RES model\nDEL RANGE group bodies", "bodies").statements[1].selection
         properties.prop(sim, fallen, density=2000.0, kn=2e6, ks=1e6, fric=0.4, yv=-12.0)
-    running.prepare(sim)
+    cycles.prepare(sim)
     blocks = Blocks(comm, threads, balance_on=kind != "flight")
     blocks.take_mesh(joined(shaken(rectangle(8, 4, 0.8, 0.4, x0=0.7, y0=0.73, kind="mixed"), 0.15),
                             rectangle(2, 2, 0.2, 0.2, x0=1.9, y0=0.72)))  # fmt: skip
@@ -80,7 +80,7 @@ def state(both: Coupled) -> dict[str, np.ndarray]:
     rows = np.column_stack([p[name] for name in names] + [sim.lists.owned_forces()])
     rows = np.concatenate(sim.comm.allgather(rows))
     found["discs"] = rows[np.argsort(rows[:, 0])]
-    found.update({f"clump_{name}": values for name, values in observe.clumps(sim).items()})
+    found.update({f"clump_{name}": values for name, values in diagnostics.clumps(sim).items()})
     found.update({f"contact_{name}": values for name, values in both.contacts().items()})
     found.update({f"energy_{name}": np.array(value) for name, value in both.energies().items()})
     found["force"] = np.array(both.force_on_blocks())
@@ -91,7 +91,7 @@ def main() -> None:
     kind, threads, steps, out, *more = sys.argv[1:]
     if more[:1] == ["resume"]:
         both = empty(kind, int(threads))
-        assert saving.restore(both, more[1]) == {"kind": kind}
+        assert saved_state.restore(both, more[1]) == {"kind": kind}
         both.prepare()
     else:
         both = make(kind, int(threads))
@@ -102,7 +102,7 @@ def main() -> None:
     most, searches, where = 0, set(), set()
     while both.blocks.clock.step < int(steps):
         if len(more) == 2 and more[0] != "resume" and both.blocks.clock.step == int(more[0]):
-            saving.save(both, more[1], {"kind": kind})
+            saved_state.save(both, more[1], {"kind": kind})
         both.advance(1)
         most = max(most, int(both.link.slot_on.sum()))
         searches.add(id(both.link))
@@ -110,7 +110,7 @@ def main() -> None:
     found = state(both)
     most = int(both.comm.max_into(np.array([most]))[0])
     others = both.comm.allgather(sorted(where))
-    found["about"] = np.array([most, both.late, both.particles.lattice.late, both.blocks.lattice.late,
+    found["about"] = np.array([most, both.late, both.particles.rebuild_state.late, both.blocks.rebuild_state.late,
                                sum(map(len, others))])  # fmt: skip
     if both.comm.rank == 0:
         np.savez(out, **found)

@@ -325,7 +325,7 @@ def test_two_runs_in_one_folder(launch, script, undisturbed, wait_until):
 
 
 def test_an_old_run_in_the_folder_is_not_gone_on_with(launch, script, undisturbed, stopped):
-    """A changed script is begun anew in the folder of an earlier run, which had come farther, and is killed."""
+    """A changed script is begun again in the folder of an earlier run, which had come farther, and is killed."""
     early = PILE.replace("save 1000", "save 500")
     script.write_text(early)
     job = launch.start(1, script, "--no-figure", cwd=script.parent)

@@ -1,4 +1,4 @@
-"""Statements reach the right verbs with the right values, in order; errors leave with file and line; resuming."""
+"""Statements reach the right commands with the right values, in order; errors leave with file and line; resuming."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from hpcdem.core.errors import CommandError, PhysicsError, ScriptError, UsageError
 from hpcdem.core.selection import Group, Interval
 from hpcdem.lang.zdem import table as t
-from hpcdem.lang.zdem.execute import Interpreter, Verbs, refuse_unexecuted
+from hpcdem.lang.zdem.execute import Commands, Interpreter, refuse_unexecuted
 from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.lang.zdem.plan import expected_steps
 
@@ -32,7 +32,7 @@ class Sim:
 class Recorder:
     """Stands for hpcdem.commands: notes every call, and fails where it is told to.
 
-    Every call must fit the signature of the real verb.
+    Every call must fit the signature of the real command.
     """
 
     def __init__(self, fail=None):
@@ -48,10 +48,10 @@ class _Module:
     def __init__(self, recorder, module):
         self.recorder, self.module = recorder, module
 
-    def __getattr__(self, verb):
+    def __getattr__(self, command):
         def call(sim, *args, **kwargs):
-            name = f"{self.module}.{verb}"
-            real = getattr(importlib.import_module(f"hpcdem.commands.dem.{self.module}"), verb)
+            name = f"{self.module}.{command}"
+            real = getattr(importlib.import_module(f"hpcdem.commands.dem.{self.module}"), command)
             inspect.signature(real).bind(sim, *args, **kwargs)
             self.recorder.calls.append((name, args, kwargs))
             self.recorder.positions.append((sim.position, sim.line))
@@ -135,7 +135,7 @@ A = Group("a")
         ("DRAW -bline bfill", [("history.draw", (None, ["bfill"], ["bline"]), {})]),
     ],
 )  # fmt: skip
-def test_every_verb(line, calls):
+def test_every_command(line, calls):
     assert calls_of(line) == calls
 
 
@@ -155,7 +155,7 @@ def test_starting_in_the_middle():
     assert [name for name, *_ in recorder.calls] == ["running.cycle", "running.cycle", "running.stop"]
 
 
-def test_errors_of_verbs_leave_with_file_and_line():
+def test_errors_of_commands_leave_with_file_and_line():
     with pytest.raises(ScriptError) as caught:
         run("START\nSET DT 1\n\nCYC 5", fail={"running.cycle": CommandError("3 particles have no density")})
     assert str(caught.value) == "/models/a.py:4: CYC: 3 particles have no density"
@@ -177,13 +177,13 @@ def test_errors_of_expressions_leave_with_file_and_line():
 
 
 @pytest.mark.parametrize("folder", ["", "data"])
-@pytest.mark.parametrize(("line", "verb"), [("RES 1.sav", "saving.restore"), ("LOAD 1.sav", "particles.load")])
-def test_files_are_looked_for_beside_the_script_then_in_data(tmp_path, folder, line, verb):
+@pytest.mark.parametrize(("line", "command"), [("RES 1.sav", "saving.restore"), ("LOAD 1.sav", "particles.load")])
+def test_files_are_looked_for_beside_the_script_then_in_data(tmp_path, folder, line, command):
     place = tmp_path / folder
     place.mkdir(exist_ok=True)
     (place / "1.sav").touch()
     recorder, _ = run(line, file=str(tmp_path / "a.py"))
-    assert recorder.calls[0] == (verb, (str(place / "1.sav"),), {})
+    assert recorder.calls[0] == (command, (str(place / "1.sav"),), {})
 
 
 def test_load_takes_a_scale_and_a_window(tmp_path):
@@ -280,8 +280,8 @@ def test_everything_in_the_table_is_carried_out_today():
     ["push", "syn_erosion", "syn_sedimentaion", "pre_struct", "detachment", "palaeohigh", "extens_rigid",
      "ex8_dem_am_gen", "ex8_dem_am_push", "extens_ductile_patent", "push_add_del"],
 )  # fmt: skip
-def test_manual_scripts_reach_their_verbs(manual_scripts, tmp_path, name):
-    """Every statement of the scripts makes calls that the real verbs accept."""
+def test_manual_scripts_reach_their_commands(manual_scripts, tmp_path, name):
+    """Every statement of the scripts makes calls that the real commands accept."""
     for file in ("init_xyr.dat", "ini_xyr.dat", "0000046000.sav"):
         (tmp_path / file).touch()
     text = (manual_scripts / f"{name}.py").read_bytes()
@@ -292,8 +292,8 @@ def test_manual_scripts_reach_their_verbs(manual_scripts, tmp_path, name):
     assert {position for position, _ in recorder.positions} == set(range(len(script.statements)))
 
 
-def test_the_real_verbs_are_found_by_name():
-    assert Verbs().particles is importlib.import_module("hpcdem.commands.dem.particles")
+def test_the_real_commands_are_found_by_name():
+    assert Commands().particles is importlib.import_module("hpcdem.commands.dem.particles")
 
 
 def test_reading_and_running_agree_on_the_steps(tmp_path):

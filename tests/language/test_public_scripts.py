@@ -483,11 +483,11 @@ def test_the_log_of_a_run_that_goes_on_counts_from_the_beginning_of_the_command(
     first = Simulation(SerialComm(), 1, tmp_path / "data", Log(0, io.StringIO()))
     Interpreter(script).run(first)
 
-    from hpcdem.physics.dem import saving
+    from hpcdem.physics.dem import saved_state
 
     out = io.StringIO()
     again = Simulation(SerialComm(), 1, tmp_path / "data", Log(0, out))
-    found = saving.restore(again, tmp_path / "data/0000000050.sav")
+    found = saved_state.restore(again, tmp_path / "data/0000000050.sav")
     again.progress = found["progress"]
     again.log.script_started("script.py", 100, 50)
     again.log.set_interval(explicit=True)

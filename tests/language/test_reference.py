@@ -11,7 +11,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "zdem_reference.md"
 
 
 def test_the_page_is_current():
-    advice = "make it anew: python -m hpcdem.lang.zdem.reference > docs/zdem_reference.md"
+    advice = "make it again: python -m hpcdem.lang.zdem.reference > docs/zdem_reference.md"
     assert PAGE.read_text(encoding="utf-8") == page(), advice
 
 

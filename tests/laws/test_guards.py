@@ -7,9 +7,9 @@ import io
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.errors import PhysicsError
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.runtime.progress import Log
 from hpcdem.session import report_end
 from tests.support import model, only
@@ -31,7 +31,7 @@ def crowd(folder, depths, dt: float = 1e-6):
 def test_deep_overlaps_are_named_once_per_command(tmp_path):
     sim, said = crowd(tmp_path, [0.4, 0.6, 0.9])
     walls.wall(sim, 7, ((-0.3, -9.0), (-0.3, 19.0)), kn=2.0)
-    running.cycle(sim, 20)
+    cycles.cycle(sim, 20)
     text = said.getvalue()
     assert text.count("overlap by more than half") == 1 and "step 5: 4 contacts" in text
     lines = [line for line in text.splitlines() if line.startswith("  particle")]
@@ -42,21 +42,21 @@ def test_deep_overlaps_are_named_once_per_command(tmp_path):
         "  particles 2 and 3 at (10, 5.7)",
     ]
     assert lines[0].endswith("overlap 0.9 m, 0.90 of the radius; density 1000, damp 0.1, kn 2")
-    running.cycle(sim, 20)
+    cycles.cycle(sim, 20)
     assert said.getvalue().count("overlap by more than half") == 2
-    assert observe.survey(sim).deepest == pytest.approx(0.9, abs=1e-6)
+    assert diagnostics.survey(sim).deepest == pytest.approx(0.9, abs=1e-6)
 
 
 def test_ten_are_named_and_all_counted(tmp_path):
     sim, said = crowd(tmp_path, [0.6 + 0.01 * k for k in range(13)])
-    running.cycle(sim, 5)
+    cycles.cycle(sim, 5)
     lines = [line for line in said.getvalue().splitlines() if line.startswith("  particles")]
     assert "13 contacts" in said.getvalue() and len(lines) == 10 and "particles 24 and 25" in lines[0]
 
 
 def test_nothing_is_said_of_usual_overlaps(tmp_path):
     sim, said = crowd(tmp_path, [0.01, 0.49])
-    running.cycle(sim, 20)
+    cycles.cycle(sim, 20)
     assert "overlap" not in said.getvalue()
 
 
@@ -69,7 +69,7 @@ def test_who_left_the_box(tmp_path):
     properties.prop(sim, density=1000.0)
     for gid in range(13):
         properties.prop(sim, only(gid), xv=100.0, yv=1.0)
-    running.cycle(sim, 100)
+    cycles.cycle(sim, 100)
     text = said.getvalue()
     assert "13 particles left the BOX and were deleted: 0 at (1" in text and "velocity (100, 1)" in text
     assert "; 9 at (" in text and "; 10 at (" not in text and "and 3 more" in text
@@ -85,17 +85,20 @@ def test_who_runs_away_through_the_box_between_two_looks_stops_the_run(tmp_path,
     particles.ball(sim, 0, 9.0, 0.0, 1.0)
     particles.ball(sim, 1, 0.0, 0.0, 1.0)
     properties.prop(sim, density=1000.0)
-    running.cycle(sim, 1)
-    sim.particles["vx"][sim.particles["gid"] == 0], sim.lattice.countdown = speed, 64  # nobody has told it to look
+    cycles.cycle(sim, 1)
+    sim.particles["vx"][sim.particles["gid"] == 0], sim.rebuild_state.countdown = (
+        speed,
+        64,
+    )  # nobody has told it to look
     for _ in range(5):
         sim.step()
     sim.open()
     if speed < 500.0:
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
         assert "1 particles left the BOX" in said.getvalue() and len(sim.particles) == 1
     else:
         with pytest.raises(PhysicsError, match=r"over half its radius per step .*\n  particle 0 at \(12, 0\)"):
-            running.cycle(sim, 1)
+            cycles.cycle(sim, 1)
 
 
 def test_who_is_nowhere_is_not_thought_to_have_left(tmp_path):
@@ -105,4 +108,4 @@ def test_who_is_nowhere_is_not_thought_to_have_left(tmp_path):
     properties.prop(sim, density=1000.0)
     sim.particles["x"][0] = np.nan
     with pytest.raises(PhysicsError, match="a number is not finite"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings
+from hpcdem.commands.dem import cycles, particles, properties, settings
 from hpcdem.physics.dem.kernels import mass
 from tests.support import body, model
 
@@ -48,7 +48,7 @@ def test_set_disk_acts_on_particles_that_are_there(tmp_path):
     seen = {}
     for disk in ("on", "off", "hex", "0"):
         settings.set_option(sim, "disk", disk)
-        running.prepare(sim)
+        cycles.prepare(sim)
         seen[disk] = body(sim)
     assert seen["on"] == pytest.approx((4000.0 * math.pi, 8000.0 * math.pi))
     assert seen["off"] == pytest.approx((32000.0 / 3.0 * math.pi, 51200.0 / 3.0 * math.pi)) == seen["0"]

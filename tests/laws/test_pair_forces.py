@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from hpcdem.commands.dem import bonds, particles, properties, running
+from hpcdem.commands.dem import bonds, cycles, particles, properties
 from hpcdem.core.fields import MATERIAL
 from hpcdem.core.selection import Interval
 from hpcdem.numerics import lanes
@@ -43,7 +43,7 @@ def heap(folder: Path, law: str, bonded: str, threads: int = 1) -> Simulation:
     p, rng = sim.particles, np.random.default_rng(7)
     for name, size in (("x", 0.035), ("y", 0.035), ("vx", 1.0), ("vy", 1.0), ("spin", 2.0)):
         p[name][:] += size * rng.uniform(-1.7, 1.7, len(p))[p["gid"]]
-    running.prepare(sim)
+    cycles.prepare(sim)
     shear = 3e4 * rng.standard_normal((len(p), len(p)))
     gid, lists = p["gid"], sim.lists
     for t in range(lists.n_blocks):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, walls
+from hpcdem.commands.dem import cycles, particles, properties, walls
 from hpcdem.core.fields import ANGLE, FIX, MATERIAL, SPIN, VX, VY, X, Y
 from hpcdem.core.selection import Ids, Interval
 from hpcdem.physics.dem import reference
@@ -36,7 +36,7 @@ def cloud(folder: Path, hertz: bool, seed: int, **options: float | str) -> Simul
     p, rng = sim.particles, np.random.default_rng(seed)
     for name, size in (("x", 0.5), ("y", 0.5), ("vx", 1.0), ("vy", 1.0), ("spin", 2.0)):
         p[name][:] += size * rng.uniform(-1.0, 1.0, len(p))[p["gid"]]
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
@@ -70,7 +70,7 @@ def test_motion(tmp_path: Path, eta: float) -> None:
     sim = cloud(tmp_path, False, 3, gravity=(0.4, -9.8), lsm=eta)
     for first, dofs in ((10, ("x",)), (30, ("y", "spin")), (50, ("x", "y", "spin"))):
         properties.fix(sim, dofs, Ids(first, first + 15))
-    running.prepare(sim)
+    cycles.prepare(sim)
     p, rows, s = sim.particles, sim.lists.force_rows(), sim.settings
     sim.lists.force[rows, :3] = np.random.default_rng(5).normal(0.0, 1e4, (len(p), 3))
     hot, cold = p.hot[p.owned].copy(), p.cold.copy()

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, particles, properties, running, settings
+from hpcdem.commands.dem import bonds, cycles, particles, properties, settings
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.dem.simulation import Simulation
 from tests.support import force, model, only, steps, value
@@ -31,13 +31,13 @@ def test_a_touching_pair_of_two_laws(tmp_path):
     sim = two(tmp_path)
     properties.prop(sim, only(12), **HERTZ)
     with pytest.raises(CommandError, match="particles 11 and 12 touch, but one has the Hertz law"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
 
 
 def test_two_laws_apart_are_fine(tmp_path):
     sim = two(tmp_path, gap=0.5)
     properties.prop(sim, only(12), **HERTZ)
-    running.cycle(sim, 10)
+    cycles.cycle(sim, 10)
     assert not force(sim, 11).any()
 
 
@@ -46,7 +46,7 @@ def test_linear_keys_without_hertz_choose_the_linear_law(tmp_path):
     sim = two(tmp_path)
     properties.prop(sim, **HERTZ)
     properties.prop(sim, kn=4e6)
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     assert force(sim, 12)[0] == pytest.approx(2e6 * 0.1, rel=1e-9)
 
 
@@ -54,12 +54,12 @@ def test_no_density(tmp_path):
     sim = two(tmp_path)
     properties.prop(sim, only(11), density=0.0)
     with pytest.raises(CommandError, match="1 particles that are free to move have no density"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
     properties.fix(sim, ("x", "y"), only(11))
     with pytest.raises(CommandError, match="density"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
     properties.fix(sim, ("spin",), only(11))
-    running.cycle(sim, 3)
+    cycles.cycle(sim, 3)
     assert value(sim, "x", 11) == 0.0 and value(sim, "x", 12) > 1.9
 
 
@@ -68,10 +68,10 @@ def test_no_time_step(tmp_path):
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
     properties.prop(sim, density=1.0)
     with pytest.raises(CommandError, match="no time step"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
     settings.set_option(sim, "frac", 0.2)
     with pytest.raises(CommandError, match="no stiffness"):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_a_runaway_is_named(tmp_path):
     sim = two(tmp_path, gap=5.0)
     properties.prop(sim, only(12), xv=600.0)
     with pytest.raises(PhysicsError) as stop:
-        running.cycle(sim, 10)
+        cycles.cycle(sim, 10)
     message = str(stop.value)
     assert "over half its radius" in message and "(1 particles)" in message
     assert "particle 12 at (7.6, 0), velocity (600, 0)" in message and "particle 11" not in message
@@ -133,7 +133,7 @@ def test_too_large_a_time_step_stops(tmp_path):
     sim = two(tmp_path)
     properties.prop(sim, kn=1e12)
     with pytest.raises(PhysicsError, match=r"the time step 0\.001 s is probably too large") as stop:
-        running.cycle(sim, 200)
+        cycles.cycle(sim, 200)
     assert "particle 11 at" in str(stop.value) and "particle 12 at" in str(stop.value)
 
 
@@ -143,7 +143,7 @@ def test_at_most_ten_are_listed(tmp_path):
         particles.ball(sim, gid, 5.0 * gid, 0.0, 1.0)
     properties.prop(sim, density=1000.0, yv=-1e4)
     with pytest.raises(PhysicsError) as stop:
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
     lines = str(stop.value).splitlines()
     assert "(30 particles)" in lines[0] and len(lines) == 11
     assert [int(line.split()[1]) for line in lines[1:]] == list(range(10))
@@ -156,6 +156,6 @@ def test_centres_in_one_place_do_not_stop_the_run(tmp_path):
     particles.gline(sim, (0.0, 0.0), (0.0, 10.0), 1.0)
     properties.prop(sim, density=1.0, kn=2e6, ks=2e6, fric=0.3)
     properties.fix(sim, ("x", "y", "spin"))
-    running.cycle(sim, 5)
+    cycles.cycle(sim, 5)
     assert np.isfinite(sim.lists.owned_forces()).all()
     assert force(sim, 0)[0] == pytest.approx(-2e6, rel=1e-6), "kn (Ra + Rb), and no neighbour is nearer than touching"

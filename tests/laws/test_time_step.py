@@ -12,7 +12,7 @@ import math
 
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.physics.dem.simulation import Simulation
 from tests.support import model, only, steps
 
@@ -29,7 +29,7 @@ def test_the_sandbox_of_li_2021(tmp_path):
         particles.ball(sim, gid, 1e-3 * gid, 0.0, r)
     properties.prop(sim, density=1300.0, kn=1.5e4, ks=1.5e4)
     walls.wall(sim, 1, ((-1.0, -1.0), (-1.0, 1.0)), kn=1.5e4, ks=1.5e4, xv=0.04)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(3.0995e-5, rel=2e-5)
     assert round(0.16 / (0.04 * sim.clock.dt)) == pytest.approx(129052, abs=3)
 
@@ -38,13 +38,13 @@ def test_the_last_of_dt_and_frac_counts(tmp_path):
     sim = with_frac(tmp_path, 0.2)
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
     properties.prop(sim, density=1000.0, kn=2e6)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(1000.0 * math.pi / 1e6))
     settings.set_option(sim, "dt", 0.05)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == 0.05
     settings.set_option(sim, "frac", 0.1)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.1 * math.sqrt(1000.0 * math.pi / 1e6))
 
 
@@ -54,13 +54,13 @@ def test_fixed_particles_do_not_count_but_walls_do(tmp_path):
     particles.ball(sim, 1, 5.0, 0.0, 0.1)
     properties.prop(sim, density=1000.0, kn=2e6)
     properties.fix(sim, ("x", "y", "spin"), only(1))
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(1000.0 * math.pi / 1e6))
     properties.free(sim, ("spin",), only(1))
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(10.0 * math.pi / 1e6))
     walls.wall(sim, 0, ((-9.0, -9.0), (9.0, -9.0)), kn=6e6)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(10.0 * math.pi / 1.5e6))
 
 
@@ -70,14 +70,14 @@ def test_hertz_particles(tmp_path):
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
     particles.ball(sim, 1, 2.5, 0.0, 1.0)
     properties.prop(sim, density=1000.0, shear=1e8, poiss=0.25, hertz=True)
-    running.prepare(sim)
+    cycles.prepare(sim)
     mass, k = 4000.0 / 3.0 * math.pi, 2e8 * math.sqrt(2.0) / (3.0 * 0.75)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(mass / (1.5 * k * math.sqrt(0.01))), rel=1e-9)
     properties.fix(sim, ("x", "y", "spin"))
     properties.free(sim, ("spin",))
     properties.prop(sim, only(1), xv=-0.6 / (100 * sim.clock.dt))
     steps(sim, 100)
-    running.prepare(sim)
+    cycles.prepare(sim)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(mass / (1.5 * k * math.sqrt(0.1))), rel=1e-6)
 
 
@@ -87,6 +87,6 @@ def test_hertz_particles_that_hardly_press(tmp_path):
     particles.ball(sim, 0, 0.0, 0.0, 1.0)
     particles.ball(sim, 1, 2.0 - 1e-12, 0.0, 1.0)
     properties.prop(sim, density=1000.0, shear=1e8, poiss=0.25, hertz=True)
-    running.prepare(sim)
+    cycles.prepare(sim)
     mass, k = 4000.0 / 3.0 * math.pi, 2e8 * math.sqrt(2.0) / (3.0 * 0.75)
     assert sim.clock.dt == pytest.approx(0.2 * math.sqrt(mass / (1.5 * k * math.sqrt(0.01))), rel=1e-9)

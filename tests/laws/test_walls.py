@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hpcdem.commands.dem import particles, properties, walls
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.kernels import walls as kernels
 from hpcdem.runtime.progress import Log
 from tests.support import at_wall, carry, force, model, only, position, steps, value, velocity
@@ -75,7 +75,7 @@ def test_a_face_pushes_to_the_side_of_the_centre(tmp_path, angle, side):
     n = np.array([-t[1], t[0]])
     sim = held(tmp_path, *(side * 0.9 * n), (tuple(-4.0 * t), tuple(5.0 * t)))
     assert force(sim)[:2] == pytest.approx(side * 0.1 * K * n, abs=1e-6)
-    assert observe.wall_forces(sim)[0] == pytest.approx(-side * 0.1 * K * n, abs=1e-6), "and the wall back"
+    assert diagnostics.wall_forces(sim)[0] == pytest.approx(-side * 0.1 * K * n, abs=1e-6), "and the wall back"
     contact = at_wall(sim)
     assert (contact.x, contact.y) == pytest.approx(tuple(-side * 0.05 * n), abs=1e-12), "R - U/2 from the centre"
 
@@ -156,7 +156,7 @@ def test_an_inward_corner_pushes_twice(tmp_path):
     """In the corner of floor and side wall both faces act, their common end does not."""
     sim = held(tmp_path, 0.9, 0.8, ((0.0, 5.0), (0.0, 0.0)), ((0.0, 0.0), (5.0, 0.0)))
     assert force(sim)[:2] == pytest.approx([0.1 * K, 0.2 * K], abs=1e-6)
-    assert len(observe.wall_rows(sim)[0]) == 2
+    assert len(diagnostics.wall_rows(sim)[0]) == 2
 
 
 def test_a_gap_between_two_pieces_has_ends(tmp_path):
@@ -277,7 +277,7 @@ def test_wall_forces_are_sums(tmp_path):
     properties.prop(sim, kn=2.0 * K, ks=2.0 * K)
     properties.fix(sim, ("x", "y", "spin"))
     steps(sim, 1)
-    assert observe.wall_forces(sim) == pytest.approx(np.array([[0.0, -0.8 * K], [0.0, 0.0]]), rel=1e-9)
+    assert diagnostics.wall_forces(sim) == pytest.approx(np.array([[0.0, -0.8 * K], [0.0, 0.0]]), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -344,14 +344,14 @@ def test_a_box_that_holds(tmp_path):
         properties.prop(sim, only(gid), xv=random.uniform(-5, 5), yv=random.uniform(-5, 5))
     properties.prop(sim, density=1000.0, kn=2.0 * K)
     steps(sim, 1)
-    before = observe.kinetic_energy(sim)
+    before = diagnostics.kinetic_energy(sim)
     steps(sim, 5000)
     assert len(sim.particles) == 12 and "BOX" not in said.getvalue()
     p = sim.particles
     potential = 0.0
-    for rows in (observe.contact_rows(sim)[0], observe.wall_rows(sim)[0]):
-        potential += (0.5 * rows[:, observe.FN] * rows[:, observe.OVERLAP]).sum()
-    assert observe.kinetic_energy(sim) + potential == pytest.approx(before, rel=0.02)
+    for rows in (diagnostics.contact_rows(sim)[0], diagnostics.wall_rows(sim)[0]):
+        potential += (0.5 * rows[:, diagnostics.FN] * rows[:, diagnostics.OVERLAP]).sum()
+    assert diagnostics.kinetic_energy(sim) + potential == pytest.approx(before, rel=0.02)
     assert (np.abs(p["x"]) < 10.0).all() and (np.abs(p["y"]) < 5.0).all()
     assert not p["spin"].any() and velocity(sim, 0).any()
 

@@ -14,7 +14,7 @@ from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.sizes import Refinement
-from hpcdem.pre.mesh.smoothing import smoothed
+from hpcdem.pre.mesh.smooth import smoothed
 from hpcdem.pre.mesh.triangulate import Meshed, Region, Wishes, triangulate
 
 STAR = [(r * math.cos(a), r * math.sin(a)) for a, r in ((0.2 * math.pi * k, (1.0, 0.3)[k % 2]) for k in range(10))]

@@ -1,4 +1,4 @@
-"""The pictures of the page in docs/specimens_page.md: `python -m tests.page.pictures` draws them anew.
+"""The pictures of the page in docs/specimens_page.md: `python -m tests.page.pictures` draws them again.
 
 test_pictures.py takes them again and compares."""
 

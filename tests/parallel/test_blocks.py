@@ -81,7 +81,7 @@ def test_a_checkpoint_of_three_ranks_goes_on_with_one(alone, launch):
 
 @pytest.mark.mpi
 def test_borders_follow_broken_zones(launch, tmp_path):
-    """A long bed of which the left third is shattered: cut anew, both ranks have the same cost, not the same number."""
+    """A long bed of which the left third is shattered: cut again, both ranks have equal cost, not number."""
     run = launch.python(2, WORKER, "borders", 1, 0, "none.npz", cwd=tmp_path)
     assert run.returncode == 0, run.stderr[-2000:]
     rows = sorted(line.split() for line in run.stdout.splitlines() if line.startswith("borders"))

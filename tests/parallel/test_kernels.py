@@ -1,6 +1,6 @@
 """A cache folder of kernels is complete when it gets its name: no program compiles any more, on whatever ranks.
 
-It must be, as nothing is ever added to it: each process would compile for itself what the rehearsal has forgotten.
+It must be, as nothing is ever added to it: each process would compile for itself what the warm-up has forgotten.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from tests.pcdc.test_whole import SCRIPTS
 
 WATCHED = """\
 from hpcdem.cli import main
-from hpcdem.runtime import warmup
+from hpcdem.runtime import kernels
 
 try:
     main()
 finally:
-    print(f"compiled late: {warmup.late}\\n", end="", flush=True)
+    print(f"compiled late: {kernels.late}\\n", end="", flush=True)
 """
 
 PARTICLES = """\
@@ -99,7 +99,7 @@ sand.bond('x 0 4', n_bond=1e4, s_bond=1e4)
 
 @pytest.fixture
 def late(launch: Launcher, tmp_path: Path):
-    """`late(2, "a.sc", ...)`: run hpcdem; the line of each rank that tells what was compiled besides the rehearsals."""
+    """`late(2, "a.sc", ...)`: run hpcdem; the line of each rank that tells what was compiled besides the warm-ups."""
     (tmp_path / "watched.py").write_text(WATCHED)
 
     def run(ranks: int, *words: object) -> list[str]:
@@ -175,7 +175,7 @@ def test_what_was_forgotten_is_told_and_not_stored(launch: Launcher, tmp_path: P
     """A kernel of the particles with arguments that no run has."""
     (tmp_path / "model.py").write_text(
         "import hpcdem\nsim = hpcdem.Simulation()\nfrom hpcdem.numerics import rng\nrng.uniform(True, 1, 2)\n"
-        "from hpcdem.runtime import warmup\nprint(*warmup.late)\n"
+        "from hpcdem.runtime import kernels\nprint(*kernels.late)\n"
         "from pathlib import Path\nprint(len(list(Path(rng.uniform._cache.cache_path).glob('rng.uniform*.nbc'))))\n"
     )
     done = launch.python(1, "model.py", cwd=tmp_path)

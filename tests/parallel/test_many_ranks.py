@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, clumps, particles, properties, running, settings, walls
+from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import FX
 from hpcdem.core.selection import Interval
@@ -18,9 +18,9 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.migrate import Migration, Trail
 from hpcdem.io import checkpoint, parts
 from hpcdem.io.dat import write_dat
-from hpcdem.physics.coupling import saving as of_both
+from hpcdem.physics.coupling import saved_state as of_both
 from hpcdem.physics.coupling.model import Coupled
-from hpcdem.physics.dem import observe, saving
+from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem.model import Blocks
@@ -42,7 +42,7 @@ def flow(comm: Any, size: int) -> Simulation:
     properties.prop(sim, xv=10.0)
     p = sim.particles
     p["vy"][:] = 0.5 * np.sin(p["x"])
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
@@ -139,11 +139,11 @@ def bonded_flow(folder: Path, size: int) -> Path:
     properties.prop(sim, density=1000.0, kn=1e6, ks=1e6, fric=0.3)
     walls.wall(sim, 1, ((-10.0, 0.0), (PER_RANK * size + 50.0, 0.0)), kn=1e6, ks=1e6)
     bonds.bond(sim, n_bond=1e9, s_bond=1e9, tolerate=0.1)
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(40):
         sim.step()
     path = folder / f"{size}.sav"
-    saving.save(sim, path)
+    saved_state.save(sim, path)
     return path
 
 
@@ -151,8 +151,8 @@ def restored(comm: Any, path: Path) -> tuple[dict, Any, int, Simulation]:
     sim = Simulation(comm, outdir=".", balance_on=False)
     if isinstance(comm, Pretended):
         comm.watch()
-    saving.restore(sim, path)
-    running.prepare(sim, dt_known=True)
+    saved_state.restore(sim, path)
+    cycles.prepare(sim, dt_known=True)
     counts, most = (dict(comm.counts), comm.most) if isinstance(comm, Pretended) else ({}, 0)
     return state(sim), counts, most, sim
 
@@ -228,7 +228,7 @@ def refusals(path: Path, size: int) -> set[str]:
         sim = Simulation(comm, outdir=".", balance_on=False)
         particles.gen_grid(sim, [0.5], (0.0, 20.0), (0.0, 2.0))
         with pytest.raises(HpcdemError) as error:
-            saving.restore(sim, path)
+            saved_state.restore(sim, path)
         assert sim.count(len(sim.particles)) == 40
         return str(error.value)
 
@@ -326,7 +326,7 @@ def of_frame(comm: Any, path: Path, **options: Any) -> tuple[dict, Any, dict]:
     kept = {row[0]: (*row, sim.hist.rows[a:b].tobytes()) for row, a, b in zip(rows, ends, ends[1:])}
     known = (n, sim.groups, sim.bonds, sim._longest2, sim.next_gid, sim.materials.as_floats().tolist(),
              sim.bond_types.as_floats().tolist(), sim.walls.table().tolist())  # fmt: skip
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(AHEAD):
         sim.step()
     return kept, known, state(sim)
@@ -343,11 +343,11 @@ def test_each_rank_loads_its_part_of_a_frame(
         where = Interval("x", 60.0 * k, 60.0 * k + 50.0)
         properties.prop(sim, where, density=900.0 + k, group=name)
     bonds.bond(sim, n_bond=1e3, s_bond=1e9, tolerate=0.1)
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(40):
         sim.step()
     path = tmp_path / "all_0000000040.dat"
-    write_dat(path, observe.frame(sim), SerialComm())
+    write_dat(path, diagnostics.frame(sim), SerialComm())
     path.write_bytes(path.read_bytes().replace(b"\n", end))
     kept, known, moved = of_frame(SerialComm(), path, **options)
     assert known[2] > 200 and len(known[1]) > 2 and any(len(row[-1]) > 32 for row in kept.values())
@@ -369,7 +369,7 @@ def test_a_frame_that_is_damaged_is_refused_by_all_ranks(
     tmp_path: Path, spoilt: Callable[[str], str], message: str
 ) -> None:
     path = tmp_path / "all_1.dat"
-    write_dat(path, observe.frame(flow(SerialComm(), 16)), SerialComm())
+    write_dat(path, diagnostics.frame(flow(SerialComm(), 16)), SerialComm())
     text = path.read_text()
     assert spoilt(text) != text
     path.write_text(spoilt(text))
@@ -432,7 +432,7 @@ def raft(comm: Any, size: int, save: Path | None = None, restore: Path | None = 
             settings.set_option(sim, name, value)
         particles.gen_grid(sim, [0.5], (0.5, 8.0 * size - 0.5), (0.999, 2.0))
         properties.prop(sim, density=1000.0, kn=1e6, ks=1e6, fric=0.5, xv=30.0)
-        running.prepare(sim)
+        cycles.prepare(sim)
         blocks.take_mesh(rectangle(8 * size, 1, 8.0 * size + 20.0, 1.0))
         blocks.element_model(None, "mech_iso_elastic", {"density": 2500.0, "young": 1e8, "poisson_ratio": 0.25})
         blocks.velocity_condition(None, vx=0.0, vy=0.0)

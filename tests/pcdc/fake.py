@@ -40,7 +40,7 @@ class Noted:
 
 
 class FakeBlocks:
-    """The interface of `hpcdem.physics.fdem.model.Blocks`, as far as the verbs use it. calls: (method, arguments) in
+    """The interface of `hpcdem.physics.fdem.model.Blocks`, as far as the commands use it. calls: (method, arguments) in
     order; the time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2 time), reactions are 1 and 2 per
     node."""
 

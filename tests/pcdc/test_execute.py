@@ -1,4 +1,4 @@
-"""Scripts are run: expressions, errors, verbs."""
+"""Scripts are run: expressions, errors, commands."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import HpcdemError, ScriptError
-from hpcdem.lang.pcdc.bindings import VERBS
+from hpcdem.lang.pcdc.bindings import BINDINGS
 from hpcdem.lang.pcdc.table import PCDC
 
 BOX = "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right group 'rock' set 'domain'\n"
@@ -19,7 +19,7 @@ def failure(bench, text: str) -> str:
 
 
 def test_every_command_has_a_binding():
-    assert set(VERBS) == {c.name for c in PCDC.commands if not c.later}
+    assert set(BINDINGS) == {c.name for c in PCDC.commands if not c.later}
 
 
 def test_the_loop_of_the_manual(bench):
@@ -130,7 +130,7 @@ def test_print_speaks_once(bench, capsys):
     assert capsys.readouterr().out == "a-1\n"
 
 
-def test_verbs_are_told_what_the_line_says(bench):
+def test_commands_are_told_what_the_line_says(bench):
     bench(
         "pcdc model gravity (0,-9.81)\n"
         "pcdc model option dynamic off collision on large-strain off overlap relax\n"

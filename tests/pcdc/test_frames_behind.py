@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from hpcdem.commands.fdem import assigning, frames, meshing, running, saving
+from hpcdem.commands.fdem import assignments, checkpoints, frames, meshes, steps
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import under_way
@@ -19,8 +19,8 @@ EVERY, STEPS = 7, 63
 def plate(folder) -> Project:
     """In motion, so that every frame is another one."""
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
-    meshing.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
-    assigning.element_model(project, "mech_iso_elastic", ROCK)
+    meshes.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
+    assignments.element_model(project, "mech_iso_elastic", ROCK)
     project.blocks.set_velocity(None, vx=1.0, vy=-2.0)
     return project
 
@@ -32,13 +32,13 @@ def test_the_bytes_are_those_of_frames_written_at_once(tmp_path):
     threading.Timer(0.5, gate.set).start()
     frames.vtk(behind, "a", EVERY)
     frames.vtk(behind, "b", 3 * EVERY)
-    running.step(behind, STEPS)
+    steps.step(behind, STEPS)
     for k in range(0, STEPS + 1, EVERY):
         frames.vtk(waiting, "a")
         if k % (3 * EVERY) == 0:
             frames.vtk(waiting, "b")
         if k < STEPS:
-            running.step(waiting, EVERY)
+            steps.step(waiting, EVERY)
     files = sorted((tmp_path / "waiting" / "data").glob("*.vtkhdf"))
     assert len(files) == 10 + 4  # steps 0, 7, ... 63, and 0, 21, 42, 63
     assert [path.name for path in files] == sorted(p.name for p in (tmp_path / "behind" / "data").glob("*.vtkhdf"))
@@ -51,11 +51,11 @@ def test_a_frame_that_cannot_be_written_stops_the_run(tmp_path):
     frames.vtk(project, "a", EVERY)
     (tmp_path / "data" / "a_0000000014.vtkhdf").mkdir(parents=True)
     with pytest.raises(HpcdemError, match=r"cannot write .*a_0000000014\.vtkhdf"):
-        running.step(project, STEPS)
+        steps.step(project, STEPS)
     assert project.step == 21  # the next step with frames
     assert not list((tmp_path / "data").glob("*.tmp"))
     frames.stop(project, "a")
-    running.step(project, 5)  # once told, it is over
+    steps.step(project, 5)  # once told, it is over
 
 
 def test_a_checkpoint_waits_for_frames(tmp_path):
@@ -63,8 +63,8 @@ def test_a_checkpoint_waits_for_frames(tmp_path):
     frames.vtk(project, "a", EVERY)
     (tmp_path / "data" / "a_0000000063.vtkhdf").mkdir(parents=True)
     with pytest.raises(HpcdemError, match="cannot write"):
-        running.step(project, STEPS)
+        steps.step(project, STEPS)
     under_way.entrust(lambda: (_ for _ in ()).throw(HpcdemError("cannot write it")))
     with pytest.raises(HpcdemError, match="cannot write it"):
-        saving.save(project, "middle.sav")
+        checkpoints.save(project, "middle.sav")
     assert not (tmp_path / "middle.sav").exists()

@@ -67,7 +67,7 @@ def test_what_is_said(desk):
 def test_only_those_between_two_groups(desk):
     desk(TWO + "pcdc mesh structured (0,1) (2,2) cells 4 2 diagonal right group 'c' set 'bodies'\n"
          "pcdc mesh glue between 'a' 'c' set 'bodies'\n")  # fmt: skip
-    from hpcdem.commands.fdem.choosing import chosen
+    from hpcdem.commands.fdem.choices import chosen
 
     assert len(chosen(desk.project, g.JOINT, (g.Between("a", "c", "bodies"),))) == 4
     with pytest.raises(HpcdemError, match="chooses no face-joint"):

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.fdem.choosing import chosen
+from hpcdem.commands.fdem.choices import chosen
 from hpcdem.core.errors import HpcdemError
 from hpcdem.physics.fdem import groups as g
 from tests.conftest import absent

@@ -23,7 +23,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "pcdc_reference.md"
 
 
 def test_the_page_is_current():
-    advice = "make it anew: python -m hpcdem.lang.pcdc.reference > docs/pcdc_reference.md"
+    advice = "make it again: python -m hpcdem.lang.pcdc.reference > docs/pcdc_reference.md"
     assert PAGE.read_text(encoding="utf-8") == page(), advice
 
 
@@ -107,7 +107,7 @@ def test_a_new_property_is_a_word_of_the_language(monkeypatch):
     assert row.endswith("| MPa m0.5 | 2 | toughness of the tip |")
 
 
-def test_histories_record_what_the_verbs_can():
+def test_histories_record_what_the_commands_can():
     kinds = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, "model": "model"}
     for kind, values in t.RECORDED.items():
         assert {python(name): unit for name, unit in values.items()} == UNITS[kinds[kind]]

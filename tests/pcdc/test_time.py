@@ -8,7 +8,7 @@ import random
 import numpy as np
 import pytest
 
-from hpcdem.commands.fdem import saving
+from hpcdem.commands.fdem import checkpoints
 from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
 from hpcdem.physics.fdem.model import Blocks
 from hpcdem.runtime.stop_requests import STOP
@@ -59,7 +59,7 @@ def resumed(folder, script: str, step: int, monkeypatch) -> Rock:
     monkeypatch.setattr(stopped.blocks, "advance", lambda steps: usual(1) or STOP * (stopped.project.step == step))
     with pytest.raises(StoppedWithCheckpoint):
         stopped(script)
-    past = saving.take_up(again.project)
+    past = checkpoints.take_up(again.project)
     again.interpreter.run(again.interpreter.read(script, "script.sc"), past)
     return again
 

@@ -62,7 +62,7 @@ def test_check_refuses_the_line(line, told):
 
 
 def test_expressions_are_left_to_the_run(bench):
-    """The same values behind brackets: --check cannot know them, the verbs refuse them."""
+    """The same values behind brackets: --check cannot know them, the commands refuse them."""
     text = (
         "pcdc mesh structured (0,0) (4,2) cells 4 2 diagonal right\n"
         "pcdc element c-model mech-iso-e property den 2500 y 1e9 p-r 0.2\nn = 7\n"

@@ -15,12 +15,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from hpcdem.commands.dem import bonds, particles, properties, running, walls
+from hpcdem.commands.dem import bonds, cycles, particles, properties, walls
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from hpcdem.physics.dem import saving
+from hpcdem.physics.dem import saved_state
 from hpcdem.physics.dem.simulation import Simulation
 from tests.property.workers import Worker
 from tests.short_push import contents
@@ -72,7 +72,7 @@ def busy(folder: Path, number: int, steps: int) -> Simulation:
     particles.gen(sim, 40, [0.7, 1.0], (1.0, 29.0), (0.0, 12.0), group="bed")
     properties.prop(sim, density=2500.0, kn=1e7, ks=1e7, fric=0.3, damp=rng.choice([0.0, 0.3]))
     bonds.bond(sim, n_bond=rng.choice([1e3, 1e9]), s_bond=1e9, tolerate=0.3)
-    running.cycle(sim, steps)
+    cycles.cycle(sim, steps)
     if rng.random() < 0.5:  # an open model
         sim.open()
     return sim
@@ -83,11 +83,11 @@ def busy(folder: Path, number: int, steps: int) -> Simulation:
 def test_a_model_saved_restored_and_saved_again(number: int, steps: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         one, other = Path(folder) / "1.sav", Path(folder) / "2.sav"
-        saving.save(busy(Path(folder), number, steps), one)
+        saved_state.save(busy(Path(folder), number, steps), one)
         again = Simulation(outdir=folder)
-        found = saving.restore(again, one)
+        found = saved_state.restore(again, one)
         again.script, again.position, again.progress = found["script"], found["position"], found["progress"]
-        saving.save(again, other)
+        saved_state.save(again, other)
         a, b = contents(one), contents(other)
         assert a.keys() == b.keys()
         assert not [name for name in a if a[name].tobytes() != b[name].tobytes()]
@@ -103,7 +103,7 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     folder = tmp_path_factory.mktemp("damaged")
     sim = busy(folder, 1, 150)
     file = folder / "busy.sav"
-    saving.save(sim, file)
+    saved_state.save(sim, file)
     worker = Worker(1)
 
     def read(damages: list[Any], seconds: float = 60.0) -> list[str]:
@@ -179,8 +179,8 @@ def described(whole: bytes) -> list[int]:
 def test_a_damaged_checkpoint_leaves_the_model_as_it_was(tmp_path: Path) -> None:
     sim = busy(tmp_path, 2, 50)
     file, before, after = (tmp_path / name for name in ("x.sav", "before.sav", "after.sav"))
-    saving.save(sim, file)
-    saving.save(sim, before)
+    saved_state.save(sim, file)
+    saved_state.save(sim, before)
     whole = file.read_bytes()
     for number in range(20):
         data = bytearray(whole)
@@ -191,6 +191,6 @@ def test_a_damaged_checkpoint_leaves_the_model_as_it_was(tmp_path: Path) -> None
             checkpoint.read(file)
         except HpcdemError:
             with pytest.raises(HpcdemError):
-                saving.restore(sim, file)
-            saving.save(sim, after)
+                saved_state.restore(sim, file)
+            saved_state.save(sim, after)
             assert after.read_bytes() == before.read_bytes()

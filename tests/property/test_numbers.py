@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hpcdem.commands.dem import particles, running, walls
+from hpcdem.commands.dem import cycles, particles, walls
 from hpcdem.engine import output
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat, write_dat
@@ -72,7 +72,7 @@ def test_walls_csv_and_histories_hold_doubles(x: float, y: float, xv: float, dt:
         particles.ball(sim, 0, x, y + 5.0, 1e-3 + 1e-6 * abs(x) + 1e-6 * abs(y))
         sim.particles["fix"][:] = 7
         sim.history_wishes[1] = (1, "time")
-        running.cycle(sim, 2)
+        cycles.cycle(sim, 2)
         head, *rows = (Path(name) / "walls.csv").read_text().splitlines()
         assert head == output.WALL_COLUMNS
         step, time, wall, *ends = rows[-1].split(",")

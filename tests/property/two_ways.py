@@ -229,22 +229,22 @@ class Writer:
             every = self.rng("functions").randint(2, 9)
             self.add(f"sand.every({every}, lambda s: (s.count, s.contacts(), s.extents()) and None)")
 
-    def _said(self, verb: str, **values: Any) -> str:
+    def _said(self, command: str, **values: Any) -> str:
         """A method, or the line of the ZDEM language that is the same."""
-        if self.has("language") and verb in ("set", "prop"):
-            text = self._zdem(verb, values)
+        if self.has("language") and command in ("set", "prop"):
+            text = self._zdem(command, values)
             if text is not None:
                 return f"sand.command({text!r})"
         inside = ", ".join(f"{name}={value!r}" for name, value in values.items())
-        return f"sand.{verb}({inside})"
+        return f"sand.{command}({inside})"
 
     @staticmethod
-    def _zdem(verb: str, values: dict[str, Any]) -> str | None:
+    def _zdem(command: str, values: dict[str, Any]) -> str | None:
         values = dict(values)
         where = values.pop("where", None)
         if values.pop("hertz", False):
             values["hertz"] = ""
-        if verb == "set" and "lsm" in values:
+        if command == "set" and "lsm" in values:
             return f"SET damp lsm {values['lsm']!r}"
 
         def shown(value: Any) -> str:
@@ -253,7 +253,7 @@ class Writer:
             return value if isinstance(value, str) else repr(value)
 
         words = [f"{name} {shown(value)}" for name, value in values.items()]
-        return f"{verb.upper()} {' '.join(words)}" + (f" RANGE {where}" if where else "")
+        return f"{command.upper()} {' '.join(words)}" + (f" RANGE {where}" if where else "")
 
     # ---- blocks --------------------------------------------------------------------------------------------------
 
@@ -476,7 +476,7 @@ class Writer:
 
     def _again(self, rng: random.Random) -> list[str]:
         """What says nothing new. A command makes the blocks look at once for joints that broke, and estimate their time
-        step anew: nothing is said again where that can be seen."""
+        step again: nothing is said again where that can be seen."""
         if self.kind != PARTICLES and (self.jointed or not (self.fixed_dt or self.kind == COUPLED)):
             return []
         of_particles = [

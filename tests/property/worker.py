@@ -117,14 +117,14 @@ def watched(job: dict[str, Any]) -> Any:
 
 def save_again(comm: Any, name: str) -> None:
     """A checkpoint brought in and written once more, as again.sav: it must say the same."""
-    from hpcdem.physics.dem import saving
+    from hpcdem.physics.dem import saved_state
     from hpcdem.physics.dem.simulation import Simulation
 
     sim = Simulation(comm)
     try:
-        found = saving.restore(sim, name)
+        found = saved_state.restore(sim, name)
         sim.script, sim.position, sim.progress = found["script"], found["position"], found["progress"]
-        saving.save(sim, "again.sav")
+        saved_state.save(sim, "again.sav")
     finally:
         sim.release()
 

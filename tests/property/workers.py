@@ -45,7 +45,7 @@ class Worker:
         self._owing = False
 
     def ask(self, **job: Any) -> None:
-        """Hand out a job. Ranks that still owe an answer, as the other worker was lost meanwhile, are started anew."""
+        """Hand out a job. Ranks that still owe an answer, as the other worker was lost meanwhile, are started again."""
         if self._owing:
             self.stop()
         if self._process is None:

@@ -15,7 +15,7 @@ import pytest
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frames import read_frame
-from hpcdem.physics.dem import observe, saving
+from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.diffusion.model import Diffusion
 from tests.conftest import Launcher
@@ -92,7 +92,7 @@ def test_wrong_parameters(name, values):
 )
 def test_wrong_calls(name, parameters, message):
     with pytest.raises(CommandError, match=message):
-        saving.add_physics(Simulation(), name, parameters)
+        saved_state.add_physics(Simulation(), name, parameters)
 
 
 def test_physics_is_added_once(tmp_path):
@@ -102,7 +102,7 @@ def test_physics_is_added_once(tmp_path):
 
 def test_the_limit_of_the_time_step(tmp_path):
     """c m / (2 H) for discs with two neighbours."""
-    from hpcdem.commands.dem import running
+    from hpcdem.commands.dem import cycles
 
     sim = row_of_discs(tmp_path)
     sim.close()
@@ -110,7 +110,7 @@ def test_the_limit_of_the_time_step(tmp_path):
     assert limit == pytest.approx(2.0 * MASS / 6.0, rel=1e-12)
     sim.settings.dt = 1.01 * limit
     with pytest.raises(CommandError, match="is beyond the stability limit of diffusion"):
-        running.prepare(sim)
+        cycles.prepare(sim)
 
 
 def test_a_limit_that_falls_in_mid_run_stops_it(tmp_path):
@@ -126,24 +126,24 @@ def test_a_limit_that_falls_in_mid_run_stops_it(tmp_path):
 
 
 def test_particles_without_mass_are_refused(tmp_path):
-    from hpcdem.commands.dem import properties, running
+    from hpcdem.commands.dem import cycles, properties
     from hpcdem.core.selection import Ids
 
     sim = row_of_discs(tmp_path)
     properties.prop(sim, Ids(2, 4), density=0.0)
     properties.fix(sim, ("x", "y", "spin"), where=Ids(2, 4))
     with pytest.raises(CommandError, match="diffusion: 3 particles have no mass"):
-        running.prepare(sim)
+        cycles.prepare(sim)
 
 
 def test_clumps_are_refused(tmp_path):
-    from hpcdem.commands.dem import clumps, running
+    from hpcdem.commands.dem import clumps, cycles
     from hpcdem.core.selection import Ids
 
     sim = row_of_discs(tmp_path)
     clumps.join(sim, Ids(0, 3))
     with pytest.raises(CommandError, match="no heat would flow inside clumps"):
-        running.prepare(sim)
+        cycles.prepare(sim)
 
 
 def test_new_particles_have_initial_values_and_the_removed_take_theirs_along(tmp_path):
@@ -160,14 +160,14 @@ def test_state_and_its_fingerprint(tmp_path):
     sim.particles["temperature"][:] = np.arange(N)
     sim.close()
     sim.step()
-    before = observe.fingerprint(sim)
-    saving.save(sim, tmp_path / "a.sav")
+    before = diagnostics.fingerprint(sim)
+    saved_state.save(sim, tmp_path / "a.sav")
     other = Simulation()
-    saving.restore(other, tmp_path / "a.sav")
+    saved_state.restore(other, tmp_path / "a.sav")
     assert other.physics[0].parameters() == {"conductance": 3.0, "capacity": 2.0}
-    assert observe.fingerprint(other) == before
+    assert diagnostics.fingerprint(other) == before
     other.particles["temperature"][0] += 1e-13
-    assert observe.fingerprint(other) != before
+    assert diagnostics.fingerprint(other) != before
 
 
 PROGRAM = """\

@@ -12,8 +12,8 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.clumps import read_clumps, write_clumps
 from hpcdem.io.ppdem import PpdemGrains, circles, read_ppdem, write_ppdem
 from hpcdem.pre.specimen import Request, make_specimen
+from hpcdem.pre.specimen.classes import classified
 from hpcdem.pre.specimen.files import to_clumps, to_ppdem, xyr
-from hpcdem.pre.specimen.reading import classified
 from tests.specimen.shapes import KINDS, WINDOW
 
 ROWS = Path(__file__).parent / "ppdem_rows.txt"

@@ -10,7 +10,7 @@ import numpy as np
 from hpcdem.commands.dem import bonds, particles, properties, walls
 from hpcdem.core.selection import Interval
 from hpcdem.io.frame import Frame
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
@@ -32,7 +32,7 @@ def settled(fric: float = 0.0) -> Simulation:
 @cache
 def resting() -> Frame:
     """The bed long at rest."""
-    return observe.frame(support.steps(settled(), 2000))
+    return diagnostics.frame(support.steps(settled(), 2000))
 
 
 @cache
@@ -42,14 +42,14 @@ def pushed() -> tuple[Frame, ...]:
     sim = settled(fric=0.3)
     bonds.bond(sim, ebmod=2e8, gbmod=2e8, tstrength=2e7, sstrength=4e7)
     walls.wall(sim, 1, xv=2.0)
-    frames = [observe.frame(sim)]
+    frames = [diagnostics.frame(sim)]
     support.steps(sim, 2000)
-    frames.append(observe.frame(sim))
+    frames.append(diagnostics.frame(sim))
     particles.delete(sim, Interval("y", float(np.max(sim.particles["y"])) - 150.0, 99000.0))
     support.steps(sim, 1000)
-    frames.append(observe.frame(sim))
+    frames.append(diagnostics.frame(sim))
     particles.gen(sim, 20, [60.0, 80.0], (2500.0, 5000.0), (4000.0, 6000.0))
     properties.prop(sim, Interval("y", 4000.0, 99000.0), density=2.5e3, shear=2.9e9, poiss=0.2, damp=0.4, hertz=True)
     support.steps(sim, 500)
-    frames.append(observe.frame(sim))
+    frames.append(diagnostics.frame(sim))
     return tuple(frames)

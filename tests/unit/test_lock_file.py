@@ -135,7 +135,7 @@ def test_where_the_lock_does_not_fit_the_ranges_are_taken(tmp_path, said):
 
 
 def test_another_lock_is_another_environment():
-    """scripts/run fills its environment anew when the lock has changed."""
+    """scripts/run fills its environment again when the lock has changed."""
     text = (ROOT / "scripts" / "lib" / "setup.sh").read_text()
     assert re.search(r'once "\$1" "wheels-\$2" "\$\(fingerprint [^\n]*<requirements\.lock', text)
 

@@ -143,7 +143,7 @@ def test_checkpoints_of_an_earlier_run_do_not_count(tmp_path):
     enter(tmp_path)
     record = run_folder.read(tmp_path)
     assert run_folder.is_older(tmp_path / "0000005000.sav", record)
-    (tmp_path / "0000005000.sav").write_bytes(b"written anew")
+    (tmp_path / "0000005000.sav").write_bytes(b"written again")
     assert not run_folder.is_older(tmp_path / "0000005000.sav", record)
     assert not run_folder.is_older(tmp_path / "0000001000.sav", record)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.runtime import warmup
+from hpcdem.runtime import kernels as kernels_
 from hpcdem.runtime.progress import Log
 
 KERNELS = """
@@ -39,7 +39,7 @@ def base(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def kernels(tmp_path, monkeypatch):
-    """A module with one kernel: `kernels()` imports it anew and calls it, as a fresh process would."""
+    """A module with one kernel: `kernels()` imports it again and calls it, as a fresh process would."""
     source = tmp_path / "kernels_of_a_test.py"
     source.write_text(KERNELS)
     calls = []
@@ -63,7 +63,7 @@ def kernels(tmp_path, monkeypatch):
 
 def prepare(kernels) -> tuple[Path, str]:
     out = io.StringIO()
-    return warmup.prepare_kernels(SerialComm(), Log(stream=out), {"": kernels()}), out.getvalue()
+    return kernels_.prepare_kernels(SerialComm(), Log(stream=out), {"": kernels()}), out.getvalue()
 
 
 def files(folder: Path) -> list[str]:
@@ -80,8 +80,8 @@ def test_the_folder_is_filled_once_and_then_read(base, kernels):
 
 
 def test_who_waits_is_told_how_long(base, kernels, monkeypatch):
-    monkeypatch.setattr(warmup, "QUIET_SECONDS", 0.0)
-    monkeypatch.setitem(warmup.KERNELS, "", 4)
+    monkeypatch.setattr(kernels_, "QUIET_SECONDS", 0.0)
+    monkeypatch.setitem(kernels_.KERNELS, "", 4)
     _, said = prepare(kernels)
     first, second = said.splitlines()
     assert first == "compiling about 4 kernels (first run of this version on this machine)"
@@ -89,40 +89,40 @@ def test_who_waits_is_told_how_long(base, kernels, monkeypatch):
     assert prepare(kernels)[1] == ""
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.slow) for kind in warmup.KERNELS])
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.slow) for kind in kernels_.KERNELS])
 def test_the_number_of_kernels_is_about_right(tmp_path, kind):
     program = (
-        "from numba.core import event\nfrom hpcdem.session import rehearse\n"
-        f"if {kind!r} != 'shared': rehearse('shared', 1)\n"
-        f"if {kind!r} == 'coupled': rehearse('', 1), rehearse('blocks', 1)\n"
+        "from numba.core import event\nfrom hpcdem.session import warm_up\n"
+        f"if {kind!r} != 'shared': warm_up('shared', 1)\n"
+        f"if {kind!r} == 'coupled': warm_up('', 1), warm_up('blocks', 1)\n"
         "with event.install_recorder('numba:compile') as seen:\n"
-        f"    rehearse({kind!r}, 1)\n"
+        f"    warm_up({kind!r}, 1)\n"
         "print(sum(one.is_end for _, one in seen.buffer))"
     )
     env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_NUM_THREADS="1")
     done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, check=True)
-    assert int(done.stdout) == pytest.approx(warmup.KERNELS[kind], rel=0.15, abs=5)
+    assert int(done.stdout) == pytest.approx(kernels_.KERNELS[kind], rel=0.15, abs=5)
 
 
 def test_nobody_sees_a_folder_that_is_not_complete(base, kernels):
     def fails() -> None:
         kernels()()
-        assert not (base / warmup.cache_key()).exists()
+        assert not (base / kernels_.cache_key()).exists()
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": fails})
-    assert not (base / warmup.cache_key()).exists()
+        kernels_.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": fails})
+    assert not (base / kernels_.cache_key()).exists()
 
 
 def test_the_faster_of_two_jobs_wins(base, kernels):
     def warm() -> None:
         kernels()()
-        other = base / warmup.cache_key()
+        other = base / kernels_.cache_key()
         other.mkdir()
         (other / "theirs.nbi").write_text("complete")
 
-    warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": warm})
+    kernels_.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": warm})
     (left,) = base.iterdir()
     assert [p.name for p in left.iterdir()] == ["theirs.nbi"]
 
@@ -145,12 +145,12 @@ def test_an_error_of_the_kernels_themselves_comes_through(base):
         raise TypeError("a kernel that cannot be compiled")
 
     with pytest.raises(TypeError):
-        warmup.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": wrong})
+        kernels_.prepare_kernels(SerialComm(), Log(stream=io.StringIO()), {"": wrong})
 
 
 def test_a_cache_that_cannot_be_written_moves_to_a_temporary_folder(tmp_path, monkeypatch, kernels, base):
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/proc/nobody/may/write/here")
-    monkeypatch.setattr(warmup.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(kernels_.tempfile, "tempdir", str(tmp_path))
     folder, said = prepare(kernels)
     assert folder.parent == tmp_path / f"hpcdem-{os.getuid()}"
     assert folder.parent.stat().st_mode & 0o777 == 0o700
@@ -159,31 +159,31 @@ def test_a_cache_that_cannot_be_written_moves_to_a_temporary_folder(tmp_path, mo
 
 
 def test_a_temporary_folder_of_somebody_else_is_not_trusted(tmp_path, monkeypatch):
-    monkeypatch.setattr(warmup.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(kernels_.tempfile, "tempdir", str(tmp_path))
     mine = tmp_path / f"hpcdem-{os.getuid()}"
     mine.mkdir(mode=0o777)
     mine.chmod(0o777)
-    assert warmup.temporary_base() != mine
+    assert kernels_.temporary_base() != mine
     mine.rmdir()
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     mine.symlink_to(tmp_path / "elsewhere")
-    assert warmup.temporary_base() != mine
+    assert kernels_.temporary_base() != mine
 
 
 def test_the_key_knows_the_settings_of_the_compiler(monkeypatch):
-    key = warmup.cache_key()
-    assert key == warmup.cache_key() and "numba" in key and "/" not in key
+    key = kernels_.cache_key()
+    assert key == kernels_.cache_key() and "numba" in key and "/" not in key
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
-    assert warmup.cache_key() != key
+    assert kernels_.cache_key() != key
 
 
 def test_runs_with_threads_have_a_folder_of_their_own(monkeypatch):
     monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
-    key = warmup.cache_key()
+    key = kernels_.cache_key()
     keys = []
     for n in ("2", "8"):
         monkeypatch.setenv("NUMBA_NUM_THREADS", n)
-        keys.append(warmup.cache_key())
+        keys.append(kernels_.cache_key())
     assert keys[0] == keys[1] != key
 
 
@@ -196,7 +196,7 @@ def test_folders_that_nobody_uses_are_removed(base):
     mine = base / "0-numba1-mine"
     mine.mkdir()
     os.utime(mine, (now, now - 86400 * 90))
-    warmup.tidy(mine)
+    kernels_.tidy(mine)
     assert sorted(p.name for p in base.iterdir()) == ["0-numba1-mine", "0-numba1-used", "other"]
 
 
@@ -206,14 +206,14 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(
         "import sys\n"
-        "from hpcdem.runtime import launch, shutdown, warmup\n"
+        "from hpcdem.runtime import kernels, launch, shutdown\n"
         "from hpcdem.runtime.progress import Log\n"
         "comm = launch.start_mpi()\n"
         "def warm():\n"
         "    import kernels_of_a_test as k\n"
         "    k.twice(21)\n"
         "def work():\n"
-        "    warmup.prepare_kernels(comm, Log(comm.rank), {'': warm})\n"
+        "    kernels.prepare_kernels(comm, Log(comm.rank), {'': warm})\n"
         "    import kernels_of_a_test as k\n"
         "    hits = sum(k.twice.stats.cache_hits.values())\n"
         "    sys.stdout.write(f'rank {comm.rank} hits {hits}\\n')\n"
@@ -230,14 +230,14 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
 
 def test_the_key_knows_every_module_with_kernels_and_its_callers():
     """Whatever holds the word njit is in it, and so are constants that kernels use and modules that call kernels."""
-    package = Path(warmup.__file__).parent.parent
-    found = {str(path.relative_to(package)) for path in warmup.kernel_sources(package)}
+    package = Path(kernels_.__file__).parent.parent
+    found = {str(path.relative_to(package)) for path in kernels_.kernel_sources(package)}
     with_kernels = {str(p.relative_to(package)) for p in package.rglob("*.py") if "@njit" in p.read_text()}
     assert with_kernels and with_kernels <= found
     assert {
         "core/fields.py",
         "physics/dem/simulation.py",
-        "physics/dem/observe.py",
+        "physics/dem/diagnostics.py",
         "commands/dem/bonds.py",
         "commands/dem/particles.py",
         "io/textnum.py",

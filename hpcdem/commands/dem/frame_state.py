@@ -21,7 +21,7 @@ from hpcdem.io.dat import read_dat
 from hpcdem.io.frame import Frame
 from hpcdem.io.slabs import ask, holders
 from hpcdem.physics.dem.kernels import laws, mass
-from hpcdem.physics.dem.saving import histories
+from hpcdem.physics.dem.saved_state import histories
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import OLD_SIDES
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.dem import saving
+from hpcdem.physics.dem import saved_state
 from hpcdem.physics.dem.simulation import Simulation
 
 
 def add(sim: Simulation, name: str, **parameters: float) -> None:
     """Physics by its name in physics/particle_physics.py, from the next step on. CommandError for names and parameters
     that there are not. Collective."""
-    saving.add_physics(sim, name, parameters)
+    saved_state.add_physics(sim, name, parameters)
 
 
 def check_time_step(sim: Simulation) -> None:

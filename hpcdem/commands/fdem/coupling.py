@@ -1,7 +1,7 @@
 """Particles beside the blocks of a script: hpcdem.couple, and what `model step` and `model solve` then do.
 
 Whatever is about particles is imported where they are there: a script of blocks alone does without their kernels, and
-numba keeps a kernel in the folder of those with which it was imported (see runtime/warmup.py).
+numba keeps a kernel in the folder of those with which it was imported (see runtime/kernels.py).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
-from hpcdem.physics.fdem import saving as of_blocks
+from hpcdem.physics.fdem import saved_state as of_blocks
 
 if TYPE_CHECKING:
     from hpcdem.physics.coupling.model import Coupled
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def couple(project: Project, particles: Simulation, friction: float | None = None, dt: float = 0.0) -> Coupled:
     """From now on both are stepped together. friction: largest one between discs and faces; dt [s]: time step of both,
     0: as said for one of them, else the smaller of the stable ones. Collective."""
-    from hpcdem.commands.dem import running
+    from hpcdem.commands.dem import cycles
     from hpcdem.physics.coupling.model import Coupled
 
     if project.coupled is not None:
@@ -42,7 +42,7 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
     if project.continues is not None and particles.number == project.asleep:
         project.coupled = Coupled(particles, blocks, friction)  # both come out of the checkpoint, see take_up
         return project.coupled
-    running.prepare(particles, dt_known=particles.settings.dt == 0.0)
+    cycles.prepare(particles, dt_known=particles.settings.dt == 0.0)
     both = Coupled(particles, blocks, friction)
     try:
         both.settle_time_step(dt or _by_frac(both))
@@ -57,12 +57,12 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
 
 def _by_frac(both: Coupled) -> float:
     """The time step [s] that SET frac of the particles asks for, if that is stable for all; 0 without SET frac."""
-    from hpcdem.commands.dem import running
+    from hpcdem.commands.dem import cycles
 
     particles, said = both.particles, both.blocks.options.dt
     if particles.settings.frac <= 0.0:
         return 0.0
-    wanted = running.time_step(particles)
+    wanted = cycles.time_step(particles)
     if said > wanted:
         raise CommandError(
             f"the time steps differ: SET frac {particles.settings.frac:g} gives {wanted:g} s for the particles, model "
@@ -115,21 +115,21 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
     if both is None:
         yield
         return
-    from hpcdem.commands.dem import running
+    from hpcdem.commands.dem import cycles
     from hpcdem.engine import output
 
     sim = both.particles
     both.heed_time_step(partial(_by_frac, both))
     both.prepare()
     if sim.progress is None:  # else the command goes on from a checkpoint
-        intervals = {kind: int(getattr(sim.settings, kind)) for kind in running.KINDS}
-        running.start(sim, f"model {name}", steps, 0, intervals, initial_frame=sim.edited)
+        intervals = {kind: int(getattr(sim.settings, kind)) for kind in cycles.KINDS}
+        cycles.start(sim, f"model {name}", steps, 0, intervals, initial_frame=sim.edited)
         sim.edited = False
     elif sim.energy is not None and not sim.energy.running:
         sim.energy.begin(sim)
     progress = sim.progress
     assert progress is not None
-    project.due = running.Due(sim, None, partial(_warn_of_walls, both))
+    project.due = cycles.Due(sim, None, partial(_warn_of_walls, both))
     late = both.late
     _warn(both)
     _warn_of_walls(both)
@@ -150,7 +150,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
             sim.log.command_finished()
     if sim.energy is not None:
         sim.energy.pause(sim)
-    running.warn_about_late_lists(sim, progress)
+    cycles.warn_about_late_lists(sim, progress)
     if both.late > late and sim.log is not None:
         sim.log.warn(
             f"{both.late - late} times particles and faces outran the search for contacts between them; a contact may "
@@ -208,9 +208,9 @@ def take_up(project: Project) -> None:
     """A run that goes on from a checkpoint: both as they were when it was written, in the middle of a command."""
     both = project.coupled
     if both is not None and project.continues is not None:
-        from hpcdem.physics.coupling import saving
+        from hpcdem.physics.coupling import saved_state
 
-        saving.restore(both, project.continues)
+        saved_state.restore(both, project.continues)
         both.particles.edited, both.particles.resumed = False, True
         project.continues = None
 
@@ -227,11 +227,11 @@ def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
     """Write all that is stepped together. Collective."""
     if project.coupled is not None:
         from hpcdem.engine import output
-        from hpcdem.physics.coupling import saving
+        from hpcdem.physics.coupling import saved_state
 
         take_up(project)
         output.secure_series(project.coupled.particles)
-        saving.save(project.coupled, path, extra)
+        saved_state.save(project.coupled, path, extra)
     else:
         project.blocks.save(path, extra)
 
@@ -240,9 +240,9 @@ def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
     """Take the state of a file; begins: the script has still to run, particles are taken when it steps first after
     hpcdem.couple. Collective."""
     if project.coupled is not None:
-        from hpcdem.physics.coupling import saving
+        from hpcdem.physics.coupling import saved_state
 
-        of_both = saving.restore(project.coupled, path)
+        of_both = saved_state.restore(project.coupled, path)
         sim = project.coupled.particles
         sim.progress = None  # the command in which it was written is not taken up
         if sim.energy is not None and sim.energy.running:

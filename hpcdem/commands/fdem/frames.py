@@ -19,8 +19,8 @@ from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.physics.fdem.connectivity import face_points
+from hpcdem.physics.fdem.diagnostics import PROPERTIES
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT
-from hpcdem.physics.fdem.looking import PROPERTIES
 from hpcdem.physics.fdem.model import QUANTITIES, Blocks
 
 

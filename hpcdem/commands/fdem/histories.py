@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hpcdem.commands.fdem.choosing import chosen, everything
+from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, MODEL, UNITS, History
 from hpcdem.core.errors import CommandError

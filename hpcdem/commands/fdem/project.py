@@ -18,7 +18,7 @@ from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import launch, run_folder
 
 if TYPE_CHECKING:
-    from hpcdem.commands.dem.running import Due
+    from hpcdem.commands.dem.cycles import Due
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.fdem.model import Blocks
 

@@ -1,4 +1,4 @@
-"""Which verb a command is: one function per row of the table."""
+"""Which function carries out a command: one binding per row of the table."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Terms = tuple[tuple[str, Any], ...]
 
 
 class Call:
-    """A command on its way to its verb: arguments with all expressions evaluated, by name; where: its range;
+    """A command on its way to its function: arguments with all expressions evaluated, by name; where: its range;
     restore_names: puts the names and functions of a checkpoint (of this file) into the script."""
 
     def __init__(
-        self, project: Any, verbs: Any, arguments: Mapping[str, Any], terms: Terms | None,
+        self, project: Any, commands: Any, arguments: Mapping[str, Any], terms: Terms | None,
         restore_names: Callable[[Mapping[str, Any], str], None],
     ) -> None:  # fmt: skip
-        self.project, self.verbs, self.arguments = project, verbs, arguments
+        self.project, self.commands, self.arguments = project, commands, arguments
         self.restore_names = restore_names
         self.where: g.Range | None = where(terms)
 
@@ -53,7 +53,7 @@ def _plain(value: Any) -> Any:
 
 
 def where(terms: Terms | None) -> g.Range | None:
-    """RANGE as the verbs take it."""
+    """RANGE as the commands take it."""
     return None if terms is None else tuple(_TERMS[name](value) for name, value in terms)
 
 
@@ -75,7 +75,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
 
 
 def _restore(call: Call) -> None:
-    found = call.verbs.saving.restore(call.project, call["file"])
+    found = call.commands.checkpoints.restore(call.project, call["file"])
     call.restore_names(found, call["file"])
 
 
@@ -84,13 +84,13 @@ def _restore(call: Call) -> None:
 
 def _shape(kind: str, *names: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        call.verbs.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
+        call.commands.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
 
     return carry_out
 
 
 def _fractures(call: Call) -> None:
-    call.verbs.meshing.fracture_network(
+    call.commands.meshes.fracture_network(
         call.project, call["as-layer"], call["inside"], **trial.fracture_words(call.arguments), seed=call["seed"],
         holes=call.get("hole", []), least=call.get("shortest", 0.0),
     )  # fmt: skip
@@ -98,7 +98,7 @@ def _fractures(call: Call) -> None:
 
 def _mesh_create(call: Call) -> None:
     group = call.group()
-    call.verbs.meshing.create(
+    call.commands.meshes.create(
         call.project, call["from-layer"], call["size"], call.get("type", "tri"), **group,
         refine=[(r["value"], r["size"], r.get("distance")) for r in call.get("refine-layer", [])],
         holes=call.get("hole", []),
@@ -110,7 +110,7 @@ def _mesh_create(call: Call) -> None:
 
 def _mesh_structured(call: Call) -> None:
     options = {"ratio": call["ratio"]} if "ratio" in call.arguments else {}
-    call.verbs.meshing.rectangle(
+    call.commands.meshes.rectangle(
         call.project, call["first"], call["second"], call["cells"], call.get("type", "tri"),
         call.get("diagonal", "alternate"), **call.group(), **options,
     )  # fmt: skip
@@ -118,7 +118,7 @@ def _mesh_structured(call: Call) -> None:
 
 def _mesh_glue(call: Call) -> None:
     groups = call.get("between", {})
-    call.verbs.meshing.glue(
+    call.commands.meshes.glue(
         call.project, call.get("tolerance"), groups.get("value"), groups.get("set", g.DEFAULT)
     )  # fmt: skip
 
@@ -128,26 +128,26 @@ def _mesh_glue(call: Call) -> None:
 
 def _group(kind: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        call.verbs.assigning.group(call.project, kind, call["group"], call.get("set", g.DEFAULT), call.where)
+        call.commands.assignments.group(call.project, kind, call["group"], call.get("set", g.DEFAULT), call.where)
 
     return carry_out
 
 
 def _element_model(call: Call) -> None:
     if call["model"] == "null":
-        call.verbs.assigning.null(call.project, **call.properties(), where=call.where)
+        call.commands.assignments.null(call.project, **call.properties(), where=call.where)
     else:
         name = trial.MODELS[call["model"]].name
-        call.verbs.assigning.element_model(call.project, name, call.properties(), call.where)
+        call.commands.assignments.element_model(call.project, name, call.properties(), call.where)
 
 
 def _face_model(call: Call) -> None:
-    call.verbs.assigning.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
+    call.commands.assignments.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
 
 
 def _joint_model(call: Call) -> None:
     properties = {name: value for name, value in call.properties().items() if name != "np"}
-    call.verbs.assigning.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
+    call.commands.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
 
 
 def _initial_stress(call: Call) -> None:
@@ -155,18 +155,18 @@ def _initial_stress(call: Call) -> None:
     gradient = {
         name.removeprefix("stress-"): given["gradient"] for name, given in call.arguments.items() if "gradient" in given
     }
-    call.verbs.assigning.initial_stress(call.project, stress, gradient, call.where)
+    call.commands.assignments.initial_stress(call.project, stress, gradient, call.where)
 
 
 def _node_condition(call: Call) -> None:
-    given, verbs = call.properties(), call.verbs.assigning
+    given, commands = call.properties(), call.commands.assignments
     match call["model"]:
         case "mechanical-velocity-boundary-condition":
-            verbs.velocity(call.project, **_short(given), where=call.where)
+            commands.velocity(call.project, **_short(given), where=call.where)
         case "mechanical-force-boundary-condition":
-            verbs.force(call.project, **_short(given), where=call.where)
+            commands.force(call.project, **_short(given), where=call.where)
         case "mechanical-move-boundary-constraint":
-            verbs.move(call.project, *given["type"], where=call.where)
+            commands.move(call.project, *given["type"], where=call.where)
 
 
 def _short(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -176,7 +176,7 @@ def _short(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _face_condition(call: Call) -> None:
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
-    call.verbs.assigning.stress(call.project, **given, where=call.where)
+    call.commands.assignments.stress(call.project, **given, where=call.where)
 
 
 # ---- records -------------------------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ def _field(call: Call) -> None:
         about["correlation"] = call["correlation"]["value"]
         about["covariance"] = call["correlation"].get("covariance", "exponential")
     first, second = call[distribution]
-    call.verbs.assigning.random_field(
+    call.commands.assignments.random_field(
         call.project, call["name"], distribution=distribution, first=first, second=second, seed=call["seed"], **about
     )
 
@@ -197,7 +197,7 @@ def _field(call: Call) -> None:
 def _history(call: Call) -> None:
     how = next((word for word in ("sum", "mean", "minimum", "maximum") if word in call.arguments), "")
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
-    call.verbs.histories.create(
+    call.commands.histories.create(
         call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
         call.get("every", 1), call.where,
     )  # fmt: skip
@@ -205,26 +205,26 @@ def _history(call: Call) -> None:
 
 def _solve(call: Call) -> None:
     if "elastic" in call.arguments:
-        call.verbs.running.solve_elastic(call.project, **call.given("elastic"))
+        call.commands.steps.solve_elastic(call.project, **call.given("elastic"))
     else:
-        call.verbs.running.solve(call.project, **call.given())
+        call.commands.steps.solve(call.project, **call.given())
 
 
 def _output(call: Call) -> None:
     if "off" in call.arguments:
-        call.verbs.frames.stop(call.project, call["file"])
+        call.commands.frames.stop(call.project, call["file"])
     else:
-        call.verbs.frames.vtk(call.project, call["file"], call.get("every"))
+        call.commands.frames.vtk(call.project, call["file"], call.get("every"))
 
 
-VERBS: dict[str, Callable[[Call], None]] = {
-    "model new": lambda c: c.verbs.modelling.new(c.project),
-    "model save": lambda c: c.verbs.saving.save(c.project, c["file"]),
+BINDINGS: dict[str, Callable[[Call], None]] = {
+    "model new": lambda c: c.commands.settings.new(c.project),
+    "model save": lambda c: c.commands.checkpoints.save(c.project, c["file"]),
     "model restore": _restore,
-    "model gravity": lambda c: c.verbs.modelling.gravity(c.project, c["gravity"]),
-    "model option": lambda c: c.verbs.modelling.option(c.project, **c.given()),
-    "model time-step": lambda c: c.verbs.modelling.time_step(c.project, **c.given()),
-    "model step": lambda c: c.verbs.running.step(c.project, c["steps"]),
+    "model gravity": lambda c: c.commands.settings.gravity(c.project, c["gravity"]),
+    "model option": lambda c: c.commands.settings.option(c.project, **c.given()),
+    "model time-step": lambda c: c.commands.settings.time_step(c.project, **c.given()),
+    "model step": lambda c: c.commands.steps.step(c.project, c["steps"]),
     "model solve": _solve,
     "geometry create polyline": _shape("polyline", "points"),
     "geometry create polygon": _shape("polygon", "points"),
@@ -233,50 +233,52 @@ VERBS: dict[str, Callable[[Call], None]] = {
     "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
     "geometry create point": _shape("point", "points"),
     "geometry create fractures": _fractures,
-    "geometry import": lambda c: c.verbs.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
-    "geometry transform": lambda c: c.verbs.geometry.transform(c.project, **c.given()),
-    "geometry delete": lambda c: c.verbs.geometry.delete(c.project, c["layer"]),
+    "geometry import": lambda c: c.commands.geometry.import_file(
+        c.project, c["as-layer"], c["file"], c.get("dxf-layer")
+    ),
+    "geometry transform": lambda c: c.commands.geometry.transform(c.project, **c.given()),
+    "geometry delete": lambda c: c.commands.geometry.delete(c.project, c["layer"]),
     "mesh create": _mesh_create,
     "mesh structured": _mesh_structured,
-    "mesh equilateral": lambda c: c.verbs.meshing.equilateral(
+    "mesh equilateral": lambda c: c.commands.meshes.equilateral(
         c.project, c["first"], c["second"], c["size"], **c.group()
     ),
-    "mesh import": lambda c: c.verbs.meshing.import_file(
+    "mesh import": lambda c: c.commands.meshes.import_file(
         c.project, c["file"], **c.group(), **{n: c[n] for n in ("merge", "scale") if n in c.arguments}
     ),
-    "mesh intersect": lambda c: c.verbs.meshing.intersect(c.project, c["layer"], c.get("follow", False)),
+    "mesh intersect": lambda c: c.commands.meshes.intersect(c.project, c["layer"], c.get("follow", False)),
     "mesh glue": _mesh_glue,
-    "mesh quality": lambda c: c.verbs.meshing.tell_quality(c.project),
+    "mesh quality": lambda c: c.commands.meshes.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
-    "element property": lambda c: c.verbs.assigning.element_property(c.project, c.given(), c.where),
+    "element property": lambda c: c.commands.assignments.element_property(c.project, c.given(), c.where),
     "element initial": _initial_stress,
-    "element reset state": lambda c: c.verbs.modelling.reset_elements(c.project, c.where),
+    "element reset state": lambda c: c.commands.settings.reset_elements(c.project, c.where),
     "element-face group": _group(g.FACE),
     "element-face c-model": _face_model,
-    "element-face property": lambda c: c.verbs.assigning.face_property(c.project, c.given(), c.where),
+    "element-face property": lambda c: c.commands.assignments.face_property(c.project, c.given(), c.where),
     "element-face boundary": _face_condition,
-    "element-face boundary remove": lambda c: c.verbs.assigning.remove_face_conditions(c.project, c.where),
+    "element-face boundary remove": lambda c: c.commands.assignments.remove_face_conditions(c.project, c.where),
     "face-joint group": _group(g.JOINT),
     "face-joint c-model": _joint_model,
-    "face-joint property": lambda c: c.verbs.assigning.joint_property(c.project, c.given(), c.where),
-    "face-joint reset state": lambda c: c.verbs.modelling.reset_joints(c.project, c.where),
+    "face-joint property": lambda c: c.commands.assignments.joint_property(c.project, c.given(), c.where),
+    "face-joint reset state": lambda c: c.commands.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
-    "node boundary remove": lambda c: c.verbs.assigning.remove_node_conditions(c.project, c.where),
-    "node initial": lambda c: c.verbs.assigning.initial_velocity(c.project, c["velocity"], c.where),
-    "node reset velocity": lambda c: c.verbs.modelling.reset_velocity(c.project),
-    "node reset displacement": lambda c: c.verbs.modelling.reset_displacement(c.project),
-    "table create": lambda c: c.verbs.assigning.table(c.project, c["name"], c["values"]),
+    "node boundary remove": lambda c: c.commands.assignments.remove_node_conditions(c.project, c.where),
+    "node initial": lambda c: c.commands.assignments.initial_velocity(c.project, c["velocity"], c.where),
+    "node reset velocity": lambda c: c.commands.settings.reset_velocity(c.project),
+    "node reset displacement": lambda c: c.commands.settings.reset_displacement(c.project),
+    "table create": lambda c: c.commands.assignments.table(c.project, c["name"], c["values"]),
     "field create": _field,
-    "field delete": lambda c: c.verbs.assigning.remove_field(c.project, c["name"]),
-    "table delete": lambda c: c.verbs.assigning.remove_table(c.project, c["name"]),
+    "field delete": lambda c: c.commands.assignments.remove_field(c.project, c["name"]),
+    "table delete": lambda c: c.commands.assignments.remove_table(c.project, c["name"]),
     "history create": _history,
-    "history delete": lambda c: c.verbs.histories.delete(c.project, c["name"]),
-    "history export": lambda c: c.verbs.histories.export(c.project, c["file"], c.get("names", ())),
-    "chart create": lambda c: c.verbs.charts.create(c.project, **c.given()),
-    "chart add": lambda c: c.verbs.charts.add(c.project, **c.given()),
-    "chart export": lambda c: c.verbs.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
+    "history delete": lambda c: c.commands.histories.delete(c.project, c["name"]),
+    "history export": lambda c: c.commands.histories.export(c.project, c["file"], c.get("names", ())),
+    "chart create": lambda c: c.commands.charts.create(c.project, **c.given()),
+    "chart add": lambda c: c.commands.charts.add(c.project, **c.given()),
+    "chart export": lambda c: c.commands.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
     "output vtk": _output,
 }
 

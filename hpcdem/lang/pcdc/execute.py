@@ -1,4 +1,4 @@
-"""Carries out a script: runs its Python, and binds every command to the verb of `hpcdem.commands.fdem` that does it.
+"""Carries out a script: runs its Python, and hands every command to a function of `hpcdem.commands.fdem`.
 
 The Python of a script runs on every rank; its commands are collective. Before one is carried out the ranks compare
 what they were told, so that a rank that took another way is found at once.
@@ -23,7 +23,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import names, source
-from hpcdem.lang.pcdc.bindings import PASSED_OVER, VERBS, Call
+from hpcdem.lang.pcdc.bindings import BINDINGS, PASSED_OVER, Call
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
 from hpcdem.lang.pcdc.source import CALL, Source
 from hpcdem.lang.pcdc.statement import Statement, shown
@@ -34,7 +34,7 @@ SEED = 0
 """Of the random numbers of Python and numpy, so that all ranks draw the same."""
 
 
-class Verbs:
+class Commands:
     """The modules of `hpcdem.commands.fdem` by name, each imported when it is first needed."""
 
     def __getattr__(self, name: str) -> Any:
@@ -44,19 +44,19 @@ class Verbs:
 class Interpreter:
     """Runs scripts and single lines in one namespace, on a project (hpcdem.commands.fdem).
 
-    namespace: the global names of the script. `verbs` replaces the modules of hpcdem.commands.fdem in tests. journal:
-    of a script that runs, None in a conversation.
+    namespace: the global names of the script. `commands` replaces hpcdem.commands.fdem in tests. journal: of a script
+    that runs, None in a conversation.
     """
 
-    def __init__(self, project: Any, verbs: Any = None) -> None:
+    def __init__(self, project: Any, commands: Any = None) -> None:
         self.project: Any = project
-        self.verbs = verbs if verbs is not None else Verbs()
+        self.commands = commands if commands is not None else Commands()
         self.sources: dict[str, Source] = {}
         self.statements: list[Statement] = []
         self.journal: Journal | None = None
         self._own_names: dict[str, Any] = {
             "__name__": "__main__", "__builtins__": __builtins__, "math": math, "Vector": Vector, "print": self._print,
-            "pcdc": Model(project, self.verbs, self.look), CALL: self._carry_out,
+            "pcdc": Model(project, self.commands, self.look), CALL: self._carry_out,
         }  # fmt: skip
         self.namespace = dict(self._own_names)
         self._included_at: int | None = None
@@ -180,9 +180,9 @@ class Interpreter:
         if self._passed_over(statement, arguments, told):
             return
         if asked and self.journal is not None:
-            self.verbs.running.stop_here(self.project, asked)
+            self.commands.steps.stop_here(self.project, asked)
         try:
-            VERBS[statement.command.name](Call(self.project, self.verbs, arguments, terms, self.restore_names))
+            BINDINGS[statement.command.name](Call(self.project, self.commands, arguments, terms, self.restore_names))
         except HpcdemError as error:
             known = self._told_with_line(error, statement)
             if self.journal is not None:
@@ -192,7 +192,7 @@ class Interpreter:
             raise known from error
 
     def _told_with_line(self, error: HpcdemError, statement: Statement) -> HpcdemError:
-        """An error of a verb, with the line."""
+        """An error of a command, with the line."""
         if isinstance(error, (CommandError, ScriptError)):
             return self._on_the_way(error if isinstance(error, ScriptError) else statement.error(str(error)))
         if isinstance(error, EquilibriumError):
@@ -241,7 +241,7 @@ class Interpreter:
 
     @property
     def keeps(self) -> bool:
-        """A journal is kept: --resume will run this script anew."""
+        """A journal is kept: --resume will run this script again."""
         return self.journal is not None and not self.journal.lost
 
     def look(self, make: Callable[[], Any]) -> Any:

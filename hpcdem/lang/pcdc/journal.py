@@ -1,6 +1,6 @@
 """What a running script was told, so that it can be brought back to where it was.
 
-A script is Python, and where Python is cannot be saved. So a run that goes on from a checkpoint runs its script anew,
+A script is Python, and where Python is cannot be saved. So a run that goes on from a checkpoint runs its script again,
 up to the command in which the checkpoint was written: commands are passed over, and what the script looks at is
 answered with what it saw the first time, so that its loops and decisions are the same. The journal is the list of
 these commands and answers; it is part of every numbered checkpoint.
@@ -208,7 +208,7 @@ class Journal:
     def _other_way(self, why: str) -> UsageError:
         self.failure = UsageError(
             f"{why}: the script was changed, or takes another way each time it runs (the clock, files that others "
-            "write). Begin anew, or go on with a script of your own that begins with pcdc model restore"
+            "write). Begin again, or go on with a script of your own that begins with pcdc model restore"
         )
         return self.failure
 

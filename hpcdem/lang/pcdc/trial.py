@@ -21,7 +21,7 @@ _OF_COMMAND = {
 
 
 def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    """ValueError if values of a line make no sense in any model; expressions are left to the verbs, which refuse the
+    """ValueError if values of a line make no sense in any model; expressions are left to the commands, which refuse the
     same."""
     try:
         for name, value in terms or ():
@@ -102,25 +102,25 @@ def _shape(arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in arguments.items() if name != "as-layer"}
 
 
-def _make_shape(verb: str) -> Callable[[Mapping[str, Any]], None]:
+def _make_shape(command: str) -> Callable[[Mapping[str, Any]], None]:
     def make(arguments: Mapping[str, Any]) -> None:
         from hpcdem.commands.fdem import geometry
 
-        geometry.shape(verb, *_shape(arguments).values())
+        geometry.shape(command, *_shape(arguments).values())
 
     return make
 
 
 def _rectangle(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshing
+    from hpcdem.commands.fdem import meshes
 
-    meshing.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
+    meshes.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
 
 
 def _equilateral(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshing
+    from hpcdem.commands.fdem import meshes
 
-    meshing.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
+    meshes.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
 
 
 def _table(arguments: Mapping[str, Any]) -> None:
@@ -146,9 +146,9 @@ def _frames(arguments: Mapping[str, Any]) -> None:
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshing
+    from hpcdem.commands.fdem import meshes
 
-    meshing.fracture_set(**fracture_words(arguments)).check("fractures")
+    meshes.fracture_set(**fracture_words(arguments)).check("fractures")
 
 
 def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -21,8 +21,8 @@ _VECTORS = {"position": "position", "displacement": "displacement", "velocity": 
 class Model:
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
-    def __init__(self, project: Any, verbs: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
-        self._project, self._verbs, self._look = project, verbs, look
+    def __init__(self, project: Any, commands: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
+        self._project, self._commands, self._look = project, commands, look
 
     @property
     def time(self) -> float:
@@ -53,7 +53,7 @@ class Model:
     @property
     def ratio(self) -> float:
         """Unbalanced over all forces of the nodes."""
-        return self._look(lambda: float(self._verbs.looking.ratio(self._project)))
+        return self._look(lambda: float(self._commands.queries.ratio(self._project)))
 
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
@@ -71,21 +71,21 @@ class Model:
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
         """Numbers of the elements, nodes, joints or faces that are there: of a group (group=, set=), of a layer
         (geometry=), or x=(from, to), y= in the mesh; with present=True by where they are now."""
-        return self._look(lambda: self._verbs.looking.numbers(self._project, _kind(kind), _range(where)))
+        return self._look(lambda: self._commands.queries.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
         """A quantity by name, in the order of numbers."""
-        return self._look(lambda: self._verbs.looking.values(self._project, _kind(kind), _name(name), _range(where)))
+        return self._look(lambda: self._commands.queries.values(self._project, _kind(kind), _name(name), _range(where)))
 
     def total(self, kind: str, name: str, **where: Any) -> float:
         """Exact sum of a quantity."""
-        return self._look(lambda: self._verbs.looking.total(self._project, _kind(kind), _name(name), _range(where)))
+        return self._look(lambda: self._commands.queries.total(self._project, _kind(kind), _name(name), _range(where)))
 
     def history(self, name: str) -> np.ndarray:
         """(n, 3) step, time and value of what a history has recorded."""
 
         def rows() -> np.ndarray:
-            return np.array(self._verbs.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
+            return np.array(self._commands.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
 
         return self._look(rows)
 

@@ -1,6 +1,6 @@
-"""Carries out a script: binds every statement to the verb of `hpcdem.commands` that does it.
+"""Carries out a script: hands every statement to a function of `hpcdem.commands`.
 
-The verbs know nothing of lines and files; an error of theirs leaves here with the file and line of the statement.
+The commands know nothing of lines and files; an error of theirs leaves here with the file and line of the statement.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, record
 from hpcdem.lang.zdem.statement import Statement, find
 
 
-class Verbs:
+class Commands:
     """The modules of `hpcdem.commands` by name, each imported when it is first needed."""
 
     def __getattr__(self, name: str) -> Any:
@@ -104,15 +104,15 @@ def refuse_escapes(script: Script, folder: Path) -> None:
 class Interpreter:
     """Runs a script on a simulation.
 
-    `sim` is handed to the verbs. What a checkpoint and the log must know is set here: ``sim.script`` (the text),
+    `sim` is handed to the commands. What a checkpoint and the log must know is set here: ``sim.script`` (the text),
     ``sim.position`` (index of the statement being carried out) and ``sim.line`` (its line). Asked are only
     ``sim.extents()`` and, where there are ranks, ``sim.comm``.
-    `verbs` replaces the modules of hpcdem.commands in tests.
+    `commands` replaces the modules of hpcdem.commands in tests.
     """
 
-    def __init__(self, script: Script, verbs: Any = None) -> None:
+    def __init__(self, script: Script, commands: Any = None) -> None:
         self.script = script
-        self.verbs = verbs if verbs is not None else Verbs()
+        self.commands = commands if commands is not None else Commands()
 
     def run(self, sim: Any, start_at: int = 0, resume: int | None = None, saved_script: str = "") -> None:
         """Carry out the statements from index `start_at` to the end, or go on after a checkpoint.
@@ -133,7 +133,7 @@ class Interpreter:
         for index in range(start_at, len(self.script.statements)):
             self.carry_out(sim, index)
         if self.script.statements[-1].command != "STOP":
-            self.verbs.running.stop(sim)
+            self.commands.cycles.stop(sim)
 
     def _refuse_lost_files(self, sim: Any) -> None:
         """Rank 0 looks, so that all ranks agree."""
@@ -156,7 +156,7 @@ class Interpreter:
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
         if statement.command in ("CYC", "IMPLE"):
-            self._guarded(statement, lambda: self.verbs.running.resume(sim))
+            self._guarded(statement, lambda: self.commands.cycles.resume(sim))
 
     def carry_out(self, sim: Any, index: int) -> None:
         statement = self.script.statements[index]
@@ -191,10 +191,10 @@ def check_same_beginning(script: Script, saved_text: str, position: int) -> None
 
 
 class _Call:
-    """One statement on its way to a verb: its arguments with expressions resolved and file names made complete."""
+    """One statement on its way to a command: its arguments with expressions resolved and file names made complete."""
 
     def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
-        self.sim, self.verbs, self.statement = sim, interpreter.verbs, statement
+        self.sim, self.commands, self.statement = sim, interpreter.commands, statement
         self.directory = interpreter.script.directory
         self.arguments = dict(statement.arguments)
         self.where: Selection | None = statement.selection
@@ -231,61 +231,61 @@ class _Call:
 
 
 def _start(call: _Call) -> None:
-    call.verbs.particles.start(call.sim)
+    call.commands.particles.start(call.sim)
 
 
 def _restore(call: _Call) -> None:
-    call.verbs.saving.restore(call.sim, call.existing())
+    call.commands.checkpoints.restore(call.sim, call.existing())
 
 
 def _load(call: _Call) -> None:
-    call.verbs.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
+    call.commands.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
 
 
 def _stop(call: _Call) -> None:
-    call.verbs.running.stop(call.sim)
+    call.commands.cycles.stop(call.sim)
 
 
 def _box(call: _Call) -> None:
-    call.verbs.walls.box(call.sim, **call.given())
+    call.commands.walls.box(call.sim, **call.given())
 
 
 def _wall(call: _Call) -> None:
-    call.verbs.walls.wall(call.sim, **call.given())
+    call.commands.walls.wall(call.sim, **call.given())
 
 
 def _ball(call: _Call) -> None:
     arguments = call.given()
-    call.verbs.particles.ball(call.sim, arguments.pop("id"), **arguments)
+    call.commands.particles.ball(call.sim, arguments.pop("id"), **arguments)
 
 
 def _gen(call: _Call) -> None:
     arguments = call.given()
     radii = arguments.pop("rad")
     if arguments.pop("grid", False):
-        call.verbs.particles.gen_grid(call.sim, radii, **arguments)
+        call.commands.particles.gen_grid(call.sim, radii, **arguments)
     else:
-        call.verbs.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
+        call.commands.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
 
 
 def _gline(call: _Call) -> None:
-    call.verbs.particles.gline(call.sim, **call.given())
+    call.commands.particles.gline(call.sim, **call.given())
 
 
 def _clump(call: _Call) -> None:
     arguments = call.given()
     if arguments.pop("file", None) is not None:
-        call.verbs.clumps.clump(call.sim, call.existing(), **arguments)
+        call.commands.clumps.clump(call.sim, call.existing(), **arguments)
     else:
-        call.verbs.clumps.join(call.sim, call.where, **arguments)
+        call.commands.clumps.join(call.sim, call.where, **arguments)
 
 
 def _del(call: _Call) -> None:
-    call.verbs.particles.delete(call.sim, call.where)
+    call.commands.particles.delete(call.sim, call.where)
 
 
 def _exp(call: _Call) -> None:
-    call.verbs.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
+    call.commands.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
 
 
 def _prop(call: _Call) -> None:
@@ -294,23 +294,23 @@ def _prop(call: _Call) -> None:
         # Bonds are made with the new properties, but before the particles leave the group that RANGE may name.
         group = {"group": properties.pop("group")} if "group" in properties else {}
         if properties:
-            call.verbs.properties.prop(call.sim, call.where, **properties)
-        call.verbs.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
+            call.commands.properties.prop(call.sim, call.where, **properties)
+        call.commands.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
         properties = group
     if properties:
-        call.verbs.properties.prop(call.sim, call.where, **properties)
+        call.commands.properties.prop(call.sim, call.where, **properties)
 
 
 def _bond(call: _Call) -> None:
-    call.verbs.bonds.break_bonds(call.sim, call.where)
+    call.commands.bonds.break_bonds(call.sim, call.where)
 
 
 def _fix(call: _Call) -> None:
-    call.verbs.properties.fix(call.sim, tuple(call.arguments), where=call.where)
+    call.commands.properties.fix(call.sim, tuple(call.arguments), where=call.where)
 
 
 def _free(call: _Call) -> None:
-    call.verbs.properties.free(call.sim, tuple(call.arguments), where=call.where)
+    call.commands.properties.free(call.sim, tuple(call.arguments), where=call.where)
 
 
 def _set(call: _Call) -> None:
@@ -319,35 +319,35 @@ def _set(call: _Call) -> None:
             name = "lsm"
         elif name == "outdir":
             value = str(call.directory / value)
-        call.verbs.settings.set_option(call.sim, name, value)
+        call.commands.settings.set_option(call.sim, name, value)
 
 
 def _cyc(call: _Call) -> None:
-    call.verbs.running.cycle(call.sim, call.arguments["steps"])
+    call.commands.cycles.cycle(call.sim, call.arguments["steps"])
 
 
 def _imple(call: _Call) -> None:
     arguments = call.given()
-    call.verbs.running.imple(call.sim, arguments.pop("id"), **arguments)
+    call.commands.cycles.imple(call.sim, arguments.pop("id"), **arguments)
 
 
 def _sav(call: _Call) -> None:
-    call.verbs.saving.save(call.sim, call.path())
+    call.commands.checkpoints.save(call.sim, call.path())
 
 
 def _hist(call: _Call) -> None:
     what = recorded(call.statement)
-    call.verbs.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
+    call.commands.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
 
 
 def _plot(call: _Call) -> None:
-    call.verbs.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
+    call.commands.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
 
 
 def _draw(call: _Call) -> None:
     words = {name: on for name, on in call.arguments.items() if name != "interval"}
     what, off = ([name for name, on in words.items() if on is wanted] for wanted in (True, False))
-    call.verbs.history.draw(call.sim, call.arguments.get("interval"), what, off)
+    call.commands.history.draw(call.sim, call.arguments.get("interval"), what, off)
 
 
 def _log(call: _Call) -> None:

@@ -23,7 +23,7 @@ from hpcdem.halo.migrate import Trail
 from hpcdem.numerics.exact_sum import BINS_SHAPE, as_integer, exact_sum, from_integer
 from hpcdem.physics.coupling.kernels import disc_faces
 from hpcdem.physics.coupling.links import Link, Touching, face_frictions
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import EMPTIED
 from hpcdem.physics.dem.kernels import laws, motion
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
@@ -108,7 +108,7 @@ class Coupled:
         due = self._check_interval.passed()
         if not self._link_holds():
             self._connect()
-        elif due and self._look():
+        elif due and self._check_rebuild():
             self._connect()
         self._interact()
         if books:
@@ -159,7 +159,7 @@ class Coupled:
         if one != other:
             raise CommandError(
                 f"the time steps differ: {one!r} s of the particles, {other!r} s of the blocks; one must be said "
-                "for both (SET dt and model time-step), or `settle_time_step` called anew"
+                "for both (SET dt and model time-step), or `settle_time_step` called again"
             )
         if self.accounted and self.particles.clumps:
             raise CommandError("there is no account of energy for clumps that touch blocks: leave it off")
@@ -186,9 +186,9 @@ class Coupled:
             self.link = Link(particles, blocks, ROOM * largest if largest > 0.0 else 1.0, self._known)
             self._known = Touching.nothing()
             self._renew_laws()
-        self._look()
+        self._check_rebuild()
 
-    def _look(self) -> bool:
+    def _check_rebuild(self) -> bool:
         """How far has anyone gone since the search? Sets the step of the next look. Returns whether it is time for a
         search. PhysicsError if a disc went through a face."""
         particles, blocks, link = self.particles, self.blocks, self._link()
@@ -361,7 +361,7 @@ class Coupled:
         blocks.close_model()
         self._renew_laws()
         p, local = particles.particles, blocks.local
-        of_discs, of_blocks = observe.critical_dt(particles), local.critical_time_step()
+        of_discs, of_blocks = diagnostics.critical_dt(particles), local.critical_time_step()
         stiffness = np.zeros(1)
         used = np.flatnonzero(particles.used(p["material"], particles.materials))
         table = self._laws.reshape(-1, len(particles.materials), 4)[1 : len(blocks.element_rows), used].reshape(-1, 4)
@@ -374,7 +374,7 @@ class Coupled:
         # 1 / dt^2 of springs adds up: both limits are safety * 2 / omega.
         safety = blocks.options.safety
         of_corner = (1.0 / of_blocks) ** 2 + 4.0 * stiffness[0] / lightest / (2.0 * safety) ** 2
-        of_disc = (1.0 / of_discs) ** 2 + 2.0 * stiffness[0] / observe.lightest(particles) / (2.0 * SAFETY) ** 2
+        of_disc = (1.0 / of_discs) ** 2 + 2.0 * stiffness[0] / diagnostics.lightest(particles) / (2.0 * SAFETY) ** 2
         fastest = max(of_corner, of_disc)
         return 1.0 / math.sqrt(fastest) if fastest > 0.0 else math.inf
 

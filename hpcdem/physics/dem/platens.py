@@ -17,7 +17,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.core.selection import Group
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 
 AXES = "xy"
@@ -136,7 +136,7 @@ def wall_stress(sim: Simulation, what: str, _: int) -> float:
     """Force of the particles on a wall in x or y, over its width across and SET thickness [Pa]; positive where it
     points away from the particles. Collective."""
     row, axis = _row(sim, _parts(what)[0]), AXES.index(what[0])
-    force = float(observe.wall_forces(sim)[row, axis])
+    force = float(diagnostics.wall_forces(sim)[row, axis])
     away = _middle(sim, row)[axis] - _mean_place(sim, np.ones(len(sim.particles), bool))[axis]
     return force * (-1.0 if away < 0.0 else 1.0) / (_wall_width(sim, what) * sim.settings.thickness or math.nan)
 

@@ -3,7 +3,7 @@
 State is either *closed* (sorted, ghosts in place, lists built: ready to step) or *open* (owned particles and their
 contact histories only: free to be added to or thinned out). Commands that change who is there open it; the next cycle
 closes it again. Everything that decides the order of arithmetic comes from global values and is part of the state:
-see `Lattice`.
+see `ListState`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ EVERYWHERE = (-math.inf, math.inf, -math.inf, math.inf)
 
 
 @dataclass
-class Lattice(RebuildState):
+class ListState(RebuildState):
     """Skin over the largest radius; longest bond [m] as last seen; columns that partners may lie apart."""
 
     skin_factor: float = NARROW
@@ -171,7 +171,7 @@ class Simulation:
         self.series_open: set[str] = set()
         self.series_closed: set[str] = set()
         self.restart_step = 0
-        self.lattice = Lattice()
+        self.rebuild_state = ListState()
         self.fast = Fast.none()
         self._fast_rows, self._fast_at = self.fast.among(NO_ROWS)
         self._drift: np.ndarray | None = None
@@ -211,11 +211,11 @@ class Simulation:
                 self._move(self.lists.n_blocks, *halo.inside, *self._move_args)
             if self._walls_move:
                 self.walls.move(self.clock.dt)
-        self.lattice.age += 1
+        self.rebuild_state.age += 1
         stale = False
-        if self.lattice.passed():
+        if self.rebuild_state.passed():
             with timers("reduce"):
-                stale, request = self._look()
+                stale, request = self._check_rebuild()
         with timers("halo"):
             halo.finish()
         if stale:
@@ -253,12 +253,12 @@ class Simulation:
         if self.clumps:
             self.clumps.sum_forces(self.particles, self.halo, lists)
 
-    def _look(self) -> tuple[bool, int]:
+    def _check_rebuild(self) -> tuple[bool, int]:
         """How far has anyone gone since the lists were built? Sets the step of the next look.
 
         Returns (lists must be rebuilt now, request from outside). One reduction; only global maxima enter.
         """
-        lattice, dt = self.lattice, self.clock.dt
+        rebuild_state, dt = self.rebuild_state, self.clock.dt
         found = np.zeros(9)
         p = self.particles
         # Half of the room, in case things speed up; gravity counted twice; and never more than twice the last wait.
@@ -273,15 +273,15 @@ class Simulation:
             guards.stop_on_runaway(p, self.origin, dt, self.clock.step, broken, self._mixed_laws(), self.comm, alone)
         path = max(math.sqrt(found[motion.PATH2]), self.walls.longest_travel())
         stride = max(math.sqrt(found[motion.SPEED2]), self._wall_speed()) * dt
-        room = 0.5 * lattice.skin - path
+        room = 0.5 * rebuild_state.skin - path
         if room < 0.0 and self.largest_radius > 0.0:  # without particles nothing can be late
-            lattice.late += 1
-        lattice.late += int(found[5 + fast.DUE] == fast.LATE)
+            rebuild_state.late += 1
+        rebuild_state.late += int(found[5 + fast.DUE] == fast.LATE)
         stale = room < stride or found[5 + fast.DUE] > 0.0
         if stale:
-            room = 0.5 * lattice.skin
+            room = 0.5 * rebuild_state.skin
         hurry = 0.0 if stale else found[5 + fast.HURRY]
-        lattice.wait(fast.wait(room, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
+        rebuild_state.wait(fast.wait(room, stride, fall), 1.0 / hurry if hurry > 0.0 else math.inf)
         return stale, int(found[4])
 
     def _look_at_fast(self, fall: float, found: np.ndarray) -> None:
@@ -300,7 +300,7 @@ class Simulation:
 
     def check_soon(self) -> None:
         """Speeds or the time step were changed by a command: look at the motion at the next step."""
-        self.lattice.soon()
+        self.rebuild_state.soon()
 
     def add_physics(self, physics: ParticlePhysics) -> None:
         """Take physics that act on the particles beside their motion. CommandError if the model has physics of this
@@ -342,7 +342,7 @@ class Simulation:
     def rebuild(self) -> None:
         """New ownership, order, ghosts and lists at the present positions. Forces are not kept."""
         with self.timers("neighbour"):
-            p, age = self.particles, self.lattice.age
+            p, age = self.particles, self.rebuild_state.age
             if 0 < age < fast.FLEETING or (age and len(self.fast)):
                 self._drift = fast.drift(p.hot, p.n_left, p.n_own, self.origin, age)
             self._open_lists()
@@ -384,7 +384,9 @@ class Simulation:
         chain = None
         if self.rows:
             self.halo.fill(origin)
-            chain = slips.neighbours_in_rows(p.ihot[:, GID], p.hot[:, [X, Y]], origin, self.rows, self.lattice.side)
+            chain = slips.neighbours_in_rows(
+                p.ihot[:, GID], p.hot[:, [X, Y]], origin, self.rows, self.rebuild_state.side
+            )
             self.halo.fill(chain)
         ways = np.where(mine[:, None], walls.travel, np.nan)
         kinds = slips.found(self.lists, p.hot, origin, chain, np.hstack([walls.p1, walls.p2]), ways)
@@ -422,19 +424,19 @@ class Simulation:
         self.halo.refresh()
 
     def _close(self, frozen: bool = False, least_skin: float = 0.0) -> None:
-        """From open to closed. frozen: keep the lattice as it is (restart); least_skin [m]: bond search."""
+        """From open to closed. frozen: keep the rebuild_state as it is (restart); least_skin [m]: bond search."""
         with self.timers("neighbour"):
             box = self.walls.box()
-            outside = self._choose_lattice(frozen, least_skin, box)
+            outside = self._choose_reach(frozen, least_skin, box)
             if outside and box is not None:
                 self._drop_outside(box)
         cell = self._share_out()
-        p, lattice, borders = self.particles, self.lattice, self.ownership.borders
+        p, rebuild_state, borders = self.particles, self.rebuild_state, self.ownership.borders
         with self.timers("neighbour"):
             order = strips.global_order(cell, p["gid"])
             cell = cell[order]
         with self.timers("halo"):
-            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads, lattice.columns)
+            storage, self.halo = connect(self.comm, p.hot, order, cell, borders, self.threads, rebuild_state.columns)
             rigid = self.clumps.storage(p, order, self.halo, self.threads)
             clump = None if rigid is None else rigid.view(np.int64)[:, CLUMP].copy()
             more = self.halo.storage(p.more[order]) if p.extra else np.empty((len(storage), 0))
@@ -443,20 +445,21 @@ class Simulation:
             cold = take_rows(p.cold, order, aligned((len(order), WIDTH)), self.threads)
             p.place(storage, cold, halo.n_left, rigid, more)
             left, right = storage[: halo.n_left], storage[halo.n_left + p.n_own :]
-            cell = np.concatenate([keys(left, lattice.side), cell, keys(right, lattice.side)])
+            cell = np.concatenate([keys(left, rebuild_state.side), cell, keys(right, rebuild_state.side)])
             self.origin = p.positions()
             self.walls.travel[:] = 0.0
             self._wall_table = self.walls.table()
-            bond_reach = min(lattice.side, lattice.bond_reach + lattice.skin) if self.bonds else 0.0
+            bond_reach = min(rebuild_state.side, rebuild_state.bond_reach + rebuild_state.skin) if self.bonds else 0.0
             self._lists = neighbours.build(
-                storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, lattice.side, self.largest_radius,
-                lattice.skin, bond_reach, self.threads, clump, self.fast, lattice.columns,
+                storage, cell, p.n_left, p.n_own, hist, order, self._wall_table, rebuild_state.side,
+                self.largest_radius, rebuild_state.skin, bond_reach, self.threads, clump, self.fast,
+                rebuild_state.columns,
             )  # fmt: skip
             self._fast_rows, self._fast_at = self.fast.among(p["gid"])
-            self.clumps.close(p, halo, self._lists, self.clock.step, lattice.side)
+            self.clumps.close(p, halo, self._lists, self.clock.step, rebuild_state.side)
             self._count_bonds(hist)
             self._hist = None
-            lattice.age = 0
+            rebuild_state.age = 0
             self.rebuilds += 1
             self._tables_stale = True
             self.refresh_tables()
@@ -470,17 +473,17 @@ class Simulation:
         if found[0] != 2 * found[1]:
             raise PhysicsError(
                 f"step {self.clock.step}: {found[0] // 2 - found[1]} bonds were lost when the lists were rebuilt; "
-                f"longest bond {self.lattice.bond_reach:g} m, column {self.lattice.side:g} m. Particles move too far "
-                "in a step: the time step is probably too large"
+                f"longest bond {self.rebuild_state.bond_reach:g} m, column {self.rebuild_state.side:g} m. Particles "
+                "move too far in a step: the time step is probably too large"
             )
         self.bonds = int(found[1])
 
-    def _choose_lattice(self, frozen: bool, least_skin: float, box: tuple[float, float, float, float] | None) -> bool:
+    def _choose_reach(self, frozen: bool, least_skin: float, box: tuple[float, float, float, float] | None) -> bool:
         """Skin and cell side for the next lists, from global values only.
 
         Returns whether a particle is outside the box (left, right, bottom, top) [m]: it rides on the same reduction.
         """
-        lattice, p = self.lattice, self.particles
+        rebuild_state, p = self.rebuild_state, self.particles
         seen = np.array([0.0, self._longest2, 0.0])
         seen[0], seen[2] = neighbours.gauge(p.hot, p.n_left, p.n_own, box if box is not None else EVERYWHERE)
         if self.clumps and box is not None:
@@ -489,18 +492,18 @@ class Simulation:
         self.largest_radius, outside = float(seen[0]), bool(seen[2])
         if frozen:
             return outside
-        lattice.bond_reach = math.sqrt(seen[1])
+        rebuild_state.bond_reach = math.sqrt(seen[1])
         limit = 0.5 * NARROW * self.largest_radius / fast.LIFE
         first_class = self._first_fast_class(limit)
         if first_class is not None:
-            lattice.skin_factor = NARROW if fast.LIFE / 2**first_class >= SHORT_LIVED else WIDE
+            rebuild_state.skin_factor = NARROW if fast.LIFE / 2**first_class >= SHORT_LIVED else WIDE
         else:
-            lattice.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
-        lattice.skin = max(lattice.skin_factor * self.largest_radius, least_skin)
-        side = 2.0 * self.largest_radius + lattice.skin
-        while 0.0 < side < max(lattice.bond_reach + lattice.skin, 1.000001 * self.clumps.reach):
-            side *= 1.05  # in steps, so that the lattice seldom changes
-        lattice.side = side if side > 0.0 else 1.0
+            rebuild_state.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
+        rebuild_state.skin = max(rebuild_state.skin_factor * self.largest_radius, least_skin)
+        side = 2.0 * self.largest_radius + rebuild_state.skin
+        while 0.0 < side < max(rebuild_state.bond_reach + rebuild_state.skin, 1.000001 * self.clumps.reach):
+            side *= 1.05  # in steps, so that the rebuild_state seldom changes
+        rebuild_state.side = side if side > 0.0 else 1.0
         self._choose_fast(first_class, limit)
         return outside
 
@@ -519,9 +522,9 @@ class Simulation:
 
     def _choose_fast(self, first_class: int | None, limit: float) -> None:
         """Reach of the fast particles, and how many columns it spans; arguments as in `_first_fast_class`."""
-        lattice, p, dt = self.lattice, self.particles, self.clock.dt
+        rebuild_state, p, dt = self.rebuild_state, self.particles, self.clock.dt
         before, drift = len(self.fast), self._drift
-        self.fast, lattice.columns, self._drift = Fast.none(), 1, None
+        self.fast, rebuild_state.columns, self._drift = Fast.none(), 1, None
         if drift is None or first_class is None:
             if before:
                 self.check_soon()
@@ -535,8 +538,8 @@ class Simulation:
         gid, clump, rows = (np.concatenate([part[k] for part in parts]) for k in range(3))
         order = np.argsort(gid)
         gid, clump, rows = gid[order], clump[order], rows[order]
-        half, gravity = 0.5 * lattice.skin, math.hypot(self.settings.gx, self.settings.gy)
-        most = fast.NEARLY * (0.5 * fast.MOST_COLUMNS * lattice.side - self.largest_radius)
+        half, gravity = 0.5 * rebuild_state.skin, math.hypot(self.settings.gx, self.settings.gy)
+        most = fast.NEARLY * (0.5 * fast.MOST_COLUMNS * rebuild_state.side - self.largest_radius)
         wanted = fast.wanted_reach(rows[:, 3], gravity, dt)
         asked = np.argsort(-rows[:, 3], kind="stable")[: fast.ASKED]
         # Nothing is known here of the faces of blocks: beside them nobody is alone.
@@ -550,13 +553,15 @@ class Simulation:
         reach = np.clip(wanted, half, max(half, most))
         alone = free >= reach
         widest = float(reach[~alone].max(initial=half))
-        lattice.columns = max(1, math.ceil(2.0 * (self.largest_radius + widest) / lattice.side))
+        rebuild_state.columns = max(1, math.ceil(2.0 * (self.largest_radius + widest) / rebuild_state.side))
         self.fast = Fast(gid, np.where(alone, free, reach), alone)
         room = np.append(self.fast.reach, half)
         pace = np.append(rows[:, 3], limit * 2.0**first_class)
         fall = 2.0 * gravity * dt * dt
         wait = min(fast.wait(float(r), float(s), fall) for r, s in zip(room, pace, strict=True))
-        lattice.pace = lattice.countdown = max(1, min(lattice.countdown, int(min(wait, LONGEST_WAIT))))
+        rebuild_state.pace = rebuild_state.countdown = max(
+            1, min(rebuild_state.countdown, int(min(wait, LONGEST_WAIT)))
+        )
 
     def _drop_outside(self, box: tuple[float, float, float, float]) -> None:
         """Particles whose centre, or that of their clump, has left the BOX are deleted, with a line in the log;
@@ -610,14 +615,14 @@ class Simulation:
 
         Returns the cells of the particles that are owned now (n_own,) i8.
         """
-        p, side = self.particles, self.lattice.side
+        p, side = self.particles, self.rebuild_state.side
         with self.timers("neighbour"):
             cell = keys(p.hot, side)
         with self.timers("balance"):
             box = self.walls.box()
             room = None if box is None else (box[0], box[1])
             self.ownership.renew(
-                columns(cell), side, self.clock.step, self.timers.seconds(), room, least=self.lattice.columns
+                columns(cell), side, self.clock.step, self.timers.seconds(), room, least=self.rebuild_state.columns
             )
         with self.timers("migrate"):
             leave = strips.strays(cell, self.ownership.borders, self.comm.rank)

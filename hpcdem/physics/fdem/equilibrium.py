@@ -16,12 +16,12 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.convergence import Solving
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
 from hpcdem.physics.fdem.linear import MANY, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.local import Evaluation
-from hpcdem.physics.fdem.solving import Solving
 
 AIM = 1e-12
 """Balance that is aimed at; rounding ends the iteration where coordinates are large."""
@@ -30,7 +30,7 @@ ENOUGH = 1e-8
 MOST = 60
 """Iterations after which there is no hope."""
 RENEW = 0.1
-"""The matrix is made anew when an iteration leaves more than this part of the unbalanced forces."""
+"""The matrix is made again when an iteration leaves more than this part of the unbalanced forces."""
 TOUCH = 1e-9
 """Contact forces over all forces above which surfaces count as touching."""
 WORST = 1e-3
@@ -65,7 +65,7 @@ class _Nodes:
 
 
 class Equilibrium(Solving):
-    """Verbs of `Blocks` that find equilibrium without steps. All collective."""
+    """Commands of `Blocks` that find equilibrium without steps. All collective."""
 
     def solve_elastic(self, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto") -> Balanced:
         """Put the model into static equilibrium with the loads of this moment, at once.
@@ -92,12 +92,12 @@ class Equilibrium(Solving):
         self._refuse_loose_bodies(nodes, unknowns)
         with self._at_rest(nodes):
             x, balanced = self._newton(nodes, unknowns, ratio, self._linear_solver(solver, unknowns, nodes))
-        fading, self.fading = self.fading, []
+        relaxations, self.relaxations = self.relaxations, []
         self._settle(nodes, x, unknowns.given / cycles)
         touching = self._touching()
         inverted = float(self._inverted())
         if touching or self.comm.max_into(np.array([inverted]))[0]:
-            self.fading = fading
+            self.relaxations = relaxations
             self._settle(nodes, nodes.x, nodes.v)
             if touching:
                 self._refuse_touching(touching, "touch in the equilibrium that was found")
@@ -267,17 +267,17 @@ class Equilibrium(Solving):
     def _at_rest(self, nodes: _Nodes) -> Iterator[None]:
         """Velocities are zero and nothing dies down; afterwards everything is as it was."""
         local = self.local
-        fading = local.fading_corner
+        relaxations = local.relaxing_corner
         v = self.v.copy()
         try:
             self.v[:] = 0.0
-            local.fading_corner = fading[:0]
+            local.relaxing_corner = relaxations[:0]
             self._refuse_touching(self._touching(), "touch")
             yield
         finally:
             self._place_corners(nodes.x)
             self.v[:] = v
-            local.fading_corner = fading
+            local.relaxing_corner = relaxations
 
     def _place_corners(self, x: np.ndarray) -> None:
         """Place all corners held here, ghosts too, by the positions of their nodes (nn, 2)."""
@@ -313,7 +313,7 @@ class Equilibrium(Solving):
                 self.log.warn_once(
                     "static solve",
                     f"{unknowns.count} unknowns are solved on one rank, as petsc4py is not there: this may need "
-                    "minutes and many GB of memory",
+                    "minutes and many GB of history",
                 )
         return (Petsc if there else Direct)(self.comm, unknowns, nodes.owner)
 

@@ -12,10 +12,10 @@ import numpy as np
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity
+from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels.joints import BROKEN, INTACT, MEMORY, NONE, YIELDED
-from hpcdem.physics.fdem.memories import FIRST, KEY, STATE, WORDS, Memories, place_joints
+from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.properties import Rows
 
@@ -103,7 +103,7 @@ class Local:
         self.passes = 0
         self._make_constants()
         self._make_joints()
-        self._put_memories()
+        self._put_histories()
         self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
         self._make_loads()
         self._make_nodes()
@@ -158,7 +158,7 @@ class Local:
             )  # fmt: skip
             lost = max(lost, int(found))
         self._agree_on_lost(lost, "the joint of face")
-        self.slot_memory = np.zeros((padded, MEMORY))
+        self.slot_history = np.zeros((padded, HISTORY))
         self.first_slot = np.empty(sim.n_own, np.int64)
         self.first_slot[self.triangle_rows[:count] - sim.n_left] = 3 * np.arange(count)
         self.first_slot[self.quad_rows - sim.n_left] = 3 * count + 4 * np.arange(len(self.quad_rows))
@@ -171,18 +171,18 @@ class Local:
         found = int(sim.comm.max_into(np.array([lost], np.int64))[0])
         if found >= 0:
             raise PhysicsError(
-                f"step {sim.clock.step}: {what} {found} spans more than a column of {sim.lattice.side:g} m; elements "
-                "move too far in a step: the time step is probably too large"
+                f"step {sim.clock.step}: {what} {found} spans more than a column of {sim.rebuild_state.side:g} m; "
+                "elements move too far in a step: the time step is probably too large"
             )
 
-    def _put_memories(self) -> None:
-        """Joints behind their peak take their places; memories are in storage order."""
-        memories = self.sim.memories
-        key = memories.keys()
+    def _put_histories(self) -> None:
+        """Joints behind their peak take their places; histories are in storage order."""
+        histories = self.sim.histories
+        key = histories.keys()
         at = np.flatnonzero(key < 0)
-        slot = self.first_slot[memories.owners()[at]] - 1 - key[at]
+        slot = self.first_slot[histories.owners()[at]] - 1 - key[at]
         place_joints(
-            slot, memories.rows[at], self.slots_of_triangles, self.slot_law, self.slot_state, self.slot_memory,
+            slot, histories.rows[at], self.slots_of_triangles, self.slot_law, self.slot_state, self.slot_history,
             self.head, self.follow,
         )  # fmt: skip
 
@@ -200,18 +200,18 @@ class Local:
         self.load_edge = row * sim.x.shape[1] + 2 * k
         self.load_a, self.load_b = 8 * row + 2 * k, 8 * row + 2 * k2
         self.load_of = sim.load_row[faces[i, k]].astype(np.int64)
-        parts = [one for one in sim.fading if not sim.has_faded(one)]
+        parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
         force = np.concatenate([one.force for one in parts] or [np.empty((0, 2))])
         each = [len(one.corner) for one in parts]
         at_row = sim.where[corner // 4]
         at = np.flatnonzero((at_row >= own.start) & (at_row < own.stop))
         self.special[at_row[at] - own.start, corner[at] % 4] = True
-        self.fading_corner = 8 * at_row[at] + 2 * (corner[at] % 4)
-        self.fading_x, self.fading_y = force[at, 0].copy(), force[at, 1].copy()
-        self.fading_begin = np.repeat(np.array([one.begin for one in parts]), each)[at]
-        self.fading_span = np.repeat(np.array([one.span for one in parts]), each)[at]
-        self.fading_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
+        self.relaxing_corner = 8 * at_row[at] + 2 * (corner[at] % 4)
+        self.relaxing_x, self.relaxing_y = force[at, 0].copy(), force[at, 1].copy()
+        self.relaxing_begin = np.repeat(np.array([one.begin for one in parts]), each)[at]
+        self.relaxing_span = np.repeat(np.array([one.span for one in parts]), each)[at]
+        self.relaxing_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
         sim.surface_loads.corners(sim, self.special)
         self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or len(at) > 0)
 
@@ -272,7 +272,7 @@ class Local:
 
         Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
         altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
-        ones limit the time step by themselves. (It must not follow from who is near: a restart makes those lists anew.)
+        ones limit the time step by themselves. (It must not follow from who is near: a restart makes new lists.)
         """
         sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
         number = sim.number[own]
@@ -335,14 +335,16 @@ class Local:
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
-            wanted = sim.lattice.dt == 0.0
+            wanted = sim.rebuild_state.dt == 0.0
             if wanted or o.mass_scaling > 0.0:
                 critical = self.critical_time_step(o.mass_scaling, self.mass)
                 if wanted:
-                    sim.lattice.dt = o.dt or o.mass_scaling or critical
-                    sim.lattice.estimated = sim.clock.step
-                    sim.tell_time_step(sim.lattice.dt, critical, self.added_mass() if o.mass_scaling > 0.0 else 0.0)
-            sim.clock.dt = sim.lattice.dt
+                    sim.rebuild_state.dt = o.dt or o.mass_scaling or critical
+                    sim.rebuild_state.estimated = sim.clock.step
+                    sim.tell_time_step(
+                        sim.rebuild_state.dt, critical, self.added_mass() if o.mass_scaling > 0.0 else 0.0
+                    )
+            sim.clock.dt = sim.rebuild_state.dt
         if sim.comm.size > 1:
             sim.halo.fill(self.mass)
         self._place_nodes(self.mass)
@@ -369,13 +371,13 @@ class Local:
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
             sim.stress0 is not None, small, self.slot_at, self.slot_law, self.slot_kind, self.slot_state,
-            self.slot_memory, self.head, self.follow, self.joint_table, self.joint_beyond, pairs.block_begin,
+            self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond, pairs.block_begin,
             pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
             sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_kind, self.slot_state,
-            self.slot_memory, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+            self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -410,10 +412,10 @@ class Local:
             self.applied[:] = 0.0
             loads = sim.loads_at(clock.time)
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
-            if len(self.fading_corner):
-                now = np.where(self.fading_steps, float(clock.step), clock.time)
-                left = np.clip(1.0 - (now - self.fading_begin) / self.fading_span, 0.0, 1.0)
-                moving.fading(self.fading_corner, self.fading_x, self.fading_y, left, self.applied)
+            if len(self.relaxing_corner):
+                now = np.where(self.relaxing_steps, float(clock.step), clock.time)
+                left = np.clip(1.0 - (now - self.relaxing_begin) / self.relaxing_span, 0.0, 1.0)
+                moving.relax(self.relaxing_corner, self.relaxing_x, self.relaxing_y, left, self.applied)
             sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
@@ -438,12 +440,12 @@ class Local:
         kept = [
             (table, table.copy())
             for table in (
-                sim.v, pairs.memory, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
+                sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
-        remembered = self.slot_memory[behind]
+        remembered = self.slot_history[behind]
         stored = self.force
         total = len(sim.number)
         self.force, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
@@ -460,8 +462,8 @@ class Local:
             self.felt.copy(), sim.v.copy(),
         )  # fmt: skip
         self.force = stored
-        self.slot_memory[self.slot_state > INTACT] = 0.0
-        self.slot_memory[behind] = remembered
+        self.slot_history[self.slot_state > INTACT] = 0.0
+        self.slot_history[behind] = remembered
         for table, values in kept:
             table[...] = values
         return found
@@ -542,7 +544,7 @@ class Local:
         sim = self.sim
         out = np.zeros(sim.n_own)
         energy.stored_in_joints(
-            self.slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_memory, sim.where,
+            self.slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_history, sim.where,
             sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, sim.n_left, out,
         )  # fmt: skip
         return out
@@ -568,34 +570,34 @@ class Local:
         sim = self.sim
         out = np.zeros((len(slots), 14))
         build.edges_now(
-            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_memory, sim.where,
+            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_history, sim.where,
             sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, out,
         )  # fmt: skip
         return out
 
     # ---- what is taken out of the tables ---------------------------------------------------------------------------
 
-    def memories(self, transfer: bool) -> Memories:
+    def histories(self, transfer: bool) -> Histories:
         """What joints and contacts of the owned elements remember.
 
         transfer: joints that are broken are left out; their friction is handed over to the contacts that follow them.
         """
-        parts = [self._joint_memories(transfer), self.pairs.memories(self.sim)]
+        parts = [self._joint_histories(transfer), self.pairs.histories(self.sim)]
         if transfer:
             parts.append(self.handed_over())
-        return Memories.of(
+        return Histories.of(
             self.sim.n_own, np.concatenate([owner for owner, _ in parts]), np.concatenate([rows for _, rows in parts])
         )
 
-    def _joint_memories(self, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Owned element (0 ..) and row (memories.py) of each joint behind its peak; with `transfer` without those that
+    def _joint_histories(self, transfer: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Owned element (0 ..) and row (histories.py) of each joint behind its peak; with `transfer` without those that
         are broken."""
         state = self.slot_state
         slots = np.flatnonzero((state == YIELDED) if transfer else ((state == YIELDED) | (state == BROKEN)))
         rows = np.zeros((len(slots), WORDS))
         rows.view(np.int64)[:, KEY] = -1 - self.slot_face[slots] % 4
         rows[:, STATE] = state[slots]
-        rows[:, FIRST : FIRST + MEMORY] = self.slot_memory[slots]
+        rows[:, FIRST : FIRST + HISTORY] = self.slot_history[slots]
         return self.slot_element(slots), rows
 
     def slot_element(self, slots: np.ndarray) -> np.ndarray:
@@ -603,9 +605,9 @@ class Local:
         return self.sim.where[self.slot_face[slots] // 4] - self.sim.n_left
 
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """Contact memories of joints that have just broken: the joint's shear force, half to each of the two edges.
+        """Contact histories of joints that have just broken: the joint's shear force, half to each of the two edges.
 
-        Owned element (0 ..) and row (memories.py) for each of their sides.
+        Owned element (0 ..) and row (histories.py) for each of their sides.
         """
         sim = self.sim
         slots = np.flatnonzero(self.slot_state == BROKEN)

@@ -69,7 +69,7 @@ class Mesh:
         )
 
     def edges(self) -> Edges:
-        """All edges, ascending by number. Computed anew at each call."""
+        """All edges, ascending by number. Computed again at each call."""
         return edges_of(self.cells, len(self.points))
 
     def areas(self) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Blocks that deform, crack and collide: the combined finite-discrete element method.
 
 `Blocks` is the simulation. The method can be read in `simulation.py`: state, step, rebuild. What a model is made of is
-in `scene.py`, the tables of the kernels are made in `local.py`.
+in `definition.py`, the tables of the kernels are made in `local.py`.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hpcdem.physics.fdem import saving
+from hpcdem.physics.fdem import saved_state
+from hpcdem.physics.fdem.convergence import Moving, Solved, Watch
+from hpcdem.physics.fdem.diagnostics import QUANTITIES, Quantity
 from hpcdem.physics.fdem.equilibrium import Balanced, Equilibrium
-from hpcdem.physics.fdem.looking import QUANTITIES, Quantity
-from hpcdem.physics.fdem.solving import Moving, Solved, Watch
 
 __all__ = ["Balanced", "Blocks", "Moving", "QUANTITIES", "Quantity", "Solved", "Watch"]
 
@@ -31,9 +31,9 @@ class Blocks(Equilibrium):
 
     def save(self, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
         """Write the whole state, and `extra` (JSON values) with it. Reads only."""
-        saving.save(self, path, extra or {})
+        saved_state.save(self, path, extra or {})
 
     def restore(self, path: Path | str) -> dict[str, Any]:
         """Take the state of a file, on any number of ranks and threads; returns `extra`. CommandError if the file is
         missing, foreign or damaged; the simulation is then as it was."""
-        return saving.restore(self, path)
+        return saved_state.restore(self, path)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.definition import REFUSE, RELAX
 from hpcdem.physics.fdem.kernels import contact, detect
 from hpcdem.physics.fdem.pairs import Bodies
-from hpcdem.physics.fdem.scene import REFUSE, RELAX
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local

@@ -13,8 +13,8 @@ from numba import njit
 
 from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem.histories import FIRST, KEY, WORDS
 from hpcdem.physics.fdem.kernels import contact, detect, elements
-from hpcdem.physics.fdem.memories import FIRST, KEY, WORDS
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import Rows
 
@@ -247,7 +247,7 @@ class ContactPairs(Bodies):
         own = sim.owned
         owned = (self.row >= own.start) & (self.row < own.stop)
         self._make_list(sim, tables, owned)
-        self._put_memories(low, high, values)
+        self._put_histories(low, high, values)
         self._make_entries(sim, tables, owned)
 
     def _make_list(self, sim: State, tables: ElementTables, owned: np.ndarray) -> None:
@@ -257,7 +257,7 @@ class ContactPairs(Bodies):
         box, around = np.empty((len(self.row), 4)), np.empty((len(self.row), 4))
         closed = np.empty(0, bool)
         if len(box):
-            detect.boxes(self.x_place, self.free, sim.x, sim.lattice.skin, box, around)
+            detect.boxes(self.x_place, self.free, sim.x, sim.rebuild_state.skin, box, around)
             closed = sim.closed_faces()
         first, second = detect.find(
             box, around, self.element, self.number, owned, mesh.cells, sim.partner, closed
@@ -276,7 +276,7 @@ class ContactPairs(Bodies):
         m = len(first)
         self.table = np.zeros((m + 4, contact.PAIR))
         self.table[:m, :3], self.table.view(np.int64)[:m, contact.CODE] = laws[:, :3], code
-        self.memory = np.zeros((m + 4, contact.EDGES))
+        self.history = np.zeros((m + 4, contact.EDGES))
         self.dampers, self.largest = np.zeros((0, contact.DAMPER)), np.zeros((0, 2 * contact.EDGES))
         if not sim.options.dynamic:
             laws[:, 3 + contact.DASHPOT] = self.choices[:, contact.PROPERTIES + 3 + contact.DASHPOT] = 0.0
@@ -362,22 +362,22 @@ class ContactPairs(Bodies):
     def __len__(self) -> int:
         return len(self.first)
 
-    def _put_memories(self, low: np.ndarray, high: np.ndarray, values: np.ndarray) -> None:
+    def _put_histories(self, low: np.ndarray, high: np.ndarray, values: np.ndarray) -> None:
         if len(low) and len(self):
-            put_memories(
-                self.number[self.first], self.number[self.second], self.table, low, high, values, self.memory,
+            put_histories(
+                self.number[self.first], self.number[self.second], self.table, low, high, values, self.history,
                 self.largest, self.touching,
             )  # fmt: skip
 
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Numbers of the bodies of pairs that remember something, and what."""
         m = len(self)
-        some = self.memory[:m].any(axis=1)
+        some = self.history[:m].any(axis=1)
         if len(self.largest):
             some |= self.largest[:m].any(axis=1)
         used = np.flatnonzero(some)
         values = np.zeros((len(used), 3 * contact.EDGES))
-        values[:, : contact.EDGES] = self.memory[used]
+        values[:, : contact.EDGES] = self.history[used]
         if len(self.largest):
             values[:, contact.EDGES :] = self.largest[used]
         used, values = self.by_pairs(used, values)
@@ -391,16 +391,16 @@ class ContactPairs(Bodies):
 
     @staticmethod
     def named(element: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from rows of memories.py of the elements `element` (k,)."""
+        """The same from rows of histories.py of the elements `element` (k,)."""
         key = rows.view(np.int64)[:, KEY]
         own, other = 2 * element + key % 2, key // 2
         return np.minimum(own, other), np.maximum(own, other), rows[:, FIRST:]
 
     @staticmethod
     def remembered(sim: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same from the memories of the owned elements."""
-        at = np.flatnonzero(sim.memories.keys() >= 0)
-        return ContactPairs.named(sim.number[sim.owned][sim.memories.owners()[at]], sim.memories.rows[at])
+        """The same from the histories of the owned elements."""
+        at = np.flatnonzero(sim.histories.keys() >= 0)
+        return ContactPairs.named(sim.number[sim.owned][sim.histories.owners()[at]], sim.histories.rows[at])
 
     def _make_entries(self, sim: State, tables: ElementTables, owned: np.ndarray) -> None:
         """Owned elements of the pairs, and which pairs act on each of them, in the order of partners."""
@@ -441,15 +441,15 @@ class ContactPairs(Bodies):
             else (contact.forces_threaded, contact.collect_threaded)
         )
         act(
-            self.threads, self.first, self.second, self.x_place, self.v_place, x, v, self.table, self.memory,
+            self.threads, self.first, self.second, self.x_place, self.v_place, x, v, self.table, self.history,
             self.dampers, self.largest, self.chosen, self.choice_begin, self.choices, self.touching, self.out, dt,
         )  # fmt: skip
         collect(
             self.threads, self.begin, self.entry, self.entry_start, self.corners, self.touching, self.out, self.pushed
         )
 
-    def memories(self, sim: State) -> tuple[np.ndarray, np.ndarray]:
-        """Owned element (0 ..) and row (memories.py) of each pair that remembers something, for both its elements."""
+    def histories(self, sim: State) -> tuple[np.ndarray, np.ndarray]:
+        """Owned element (0 ..) and row (histories.py) of each pair that remembers something, for both its elements."""
         low, high, values = self.known()
         owners, parts = [], []
         for mine, other in ((low, high), (high, low)):
@@ -563,7 +563,7 @@ def touched_faces(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def put_memories(first, second, table, low, high, values, memory, largest, touching):
+def put_histories(first, second, table, low, high, values, history, largest, touching):
     """Give the rows of the list, of which first and second ascend, what the pairs (low, high) remember: to each edge
     what is there for it."""
     for i in range(len(low)):
@@ -578,7 +578,7 @@ def put_memories(first, second, table, low, high, values, memory, largest, touch
             code = as_bits(table[a, contact.CODE]) >> 2
             for k in range(contact.EDGES):
                 if code >> k & 1:
-                    memory[a, k] = values[i, k]
+                    history[a, k] = values[i, k]
                     if len(largest) > 0:
                         largest[a, k] = values[i, contact.EDGES + k]
                         largest[a, contact.EDGES + k] = values[i, 2 * contact.EDGES + k]

@@ -5,7 +5,7 @@ Corners that move as one node (nothing lies between their elements) carry equal 
 rows of elements; they are shared out among the ranks in strips, as particles are, and travel with what they remember.
 
 State (state.py) is either *closed* (sorted, ghosts in place, tables of the kernels made: ready to step) or *open*
-(owned elements and their memories only). Assignments open it; the next step closes it again.
+(owned elements and their histories only). Assignments open it; the next step closes it again.
 
 Every sum over elements that share something is taken in the order of their numbers in the mesh. So the bits depend
 neither on ranks and threads nor on when the lists were rebuilt.
@@ -29,29 +29,29 @@ from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem import build, connectivity, overlaps
+from hpcdem.physics.fdem.definition import Numbers
+from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.local import Evaluation, Local
-from hpcdem.physics.fdem.memories import Memories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
-from hpcdem.physics.fdem.scene import Numbers
-from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, Lattice, State
+from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, ListState, State
 from hpcdem.physics.fdem.tables import Value
 
 ROOM = 0.6
-"""How far elements may go, both together, before storage and ghosts are made anew; over the mean edge."""
+"""How far elements may go, both together, before storage and ghosts are made again; over the mean edge."""
 SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
-"""Storage is made anew at this age even if nobody moved, so that borders can follow the load."""
+"""Storage is made again at this age even if nobody moved, so that borders can follow the load."""
 AUTO = 100
-"""Steps after which an automatic time step is estimated anew."""
+"""Steps after which an automatic time step is estimated again."""
 
 
 class Core(State):
-    """Step and rebuild; `Blocks` adds the verbs. Every method is collective unless it says otherwise."""
+    """Step and rebuild; `Blocks` adds the commands. Every method is collective unless it says otherwise."""
 
     local: Local
     _known: dict[str, Any] | None = None
@@ -78,7 +78,7 @@ class Core(State):
         self.release()
         self.surface_loads.mesh_replaced()
         self.closed = False
-        self.lattice = Lattice()
+        self.rebuild_state = ListState()
         self.ownership = Ownership(self.comm, self.balance_on)
         self.event_rows = []
         self._topology_stale = True
@@ -96,7 +96,7 @@ class Core(State):
         self.v = np.zeros((len(self.number), 12 if wide else 6))
         build.corners(mesh.points, mesh.cells, self.number, self.x)
         self.cold = {}
-        self.memories = Memories.empty(len(self.number))
+        self.histories = Histories.empty(len(self.number))
 
     def _before_change(self) -> None:
         if self.budget is not None and self.closed:
@@ -109,9 +109,9 @@ class Core(State):
         self._topology_stale |= topology
         if topology:
             self._closed = None
-        self.lattice.soon()
+        self.rebuild_state.soon()
         if stiffness:
-            self.lattice.dt = 0.0
+            self.rebuild_state.dt = 0.0
 
     def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         before = self.element_row.copy()
@@ -138,7 +138,7 @@ class Core(State):
         self.close_model()
         self.check_start()
         self.untouched = False
-        timers, halo, lattice, request = self.timers, self.halo, self.lattice, 0
+        timers, halo, rebuild_state, request = self.timers, self.halo, self.rebuild_state, 0
         budget = self.budget if self.options.dynamic else None
         if budget is not None:
             budget.before_forces(self)
@@ -153,20 +153,20 @@ class Core(State):
         self.clock.step += 1
         if self.options.dynamic:
             self.clock.time += self.clock.dt
-        lattice.age += 1
-        lattice.stored += 1
+        rebuild_state.age += 1
+        rebuild_state.stored += 1
         stale = outdated = False
-        if lattice.passed():
+        if rebuild_state.passed():
             with timers("reduce"):
                 try:
-                    stale, outdated, request = self._look()
+                    stale, outdated, request = self._check_rebuild()
                 except EquilibriumError:
                     halo.finish()  # the script may go on
                     raise
         with timers("halo"):
             halo.finish()
-        if self.options.auto and self.options.dynamic and self.clock.step - lattice.estimated >= AUTO:
-            lattice.dt, stale = 0.0, True
+        if self.options.auto and self.options.dynamic and self.clock.step - rebuild_state.estimated >= AUTO:
+            rebuild_state.dt, stale = 0.0, True
         if stale or outdated:
             if not outdated or (budget is not None and self.masses_change()):
                 self._renew_lists()
@@ -185,13 +185,13 @@ class Core(State):
         kernel = elements.drift if self.threads == 1 else elements.drift_threaded
         kernel(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
 
-    def _look(self) -> tuple[bool, bool, int]:
+    def _check_rebuild(self) -> tuple[bool, bool, int]:
         """How far has anyone gone since the lists were built? Sets the step of the next look.
 
-        Returns whether contact lists, and whether the storage has to be made anew now, and the outside's request. All
+        Returns whether contact lists, and whether the storage has to be made again now, and the outside's request. All
         ranks get the same answers.
         """
-        lattice, cells = self.lattice, self.the_mesh().cells
+        rebuild_state, cells = self.rebuild_state, self.the_mesh().cells
         found, more = np.zeros(8), np.zeros(4)
         build.survey(self.x, self.v, self.listed, self.n_left, self.n_own, cells, self.number, found)
         build.survey(self.x, self.v, self.origin, self.n_left, self.n_own, cells, self.number, more)
@@ -206,19 +206,19 @@ class Core(State):
         if broken or inverted or stride > 0.5 * self._mean_edge:
             self._stop_on_runaway(bool(broken), bool(inverted))
         self.local.tally[:, elements.NEW_YIELDED] = 0
-        stale, outdated = breaks > 0.0, lattice.stored >= OLDEST
+        stale, outdated = breaks > 0.0, rebuild_state.stored >= OLDEST
         wait = float(LONGEST_WAIT // 4 if yields > 0.0 else LONGEST_WAIT)  # a joint may be about to break
         if self.options.collision:
-            room = 0.5 * lattice.skin - math.sqrt(path2)
-            lattice.late += room < 0.0
+            room = 0.5 * rebuild_state.skin - math.sqrt(path2)
+            rebuild_state.late += room < 0.0
             # Lists end where the ghosts do, so some of their room is left for the next ones.
             outdated |= 0.5 * (ROOM - WIDE) * self._mean_edge < math.sqrt(way2) + stride
             stale |= room < stride
             if stale or outdated:
-                room = 0.5 * lattice.skin
+                room = 0.5 * rebuild_state.skin
             if stride > 0.0:
                 wait = min(wait, 0.5 * room / stride)
-        lattice.wait(wait)
+        rebuild_state.wait(wait)
         return bool(stale), bool(outdated), int(request)
 
     def _stop_on_runaway(self, broken: bool, inverted: bool) -> None:
@@ -278,7 +278,7 @@ class Core(State):
     # ---- open and closed -----------------------------------------------------------------------------------------
 
     def open_model(self) -> None:
-        """Make the model free to be changed: owned elements and their memories only. Joints that broke become free
+        """Make the model free to be changed: owned elements and their histories only. Joints that broke become free
         faces."""
         if not self.closed:
             return
@@ -291,7 +291,7 @@ class Core(State):
                 middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state
             )
             self._longest = math.sqrt(float(self.comm.max_into(np.array([longest2]))[0]))
-            self.memories = local.memories(transfer=True)
+            self.histories = local.histories(transfer=True)
             self._collect_events()
             self.where[self.number] = -1
             self._leave_storage()
@@ -304,9 +304,9 @@ class Core(State):
 
     def waiting_events(self) -> list[Crack]:
         """Joints that broke since the last rebuild, in order of steps, see `Crack`. Collective."""
-        local, clock, lattice = self.local, self.clock, self.lattice
+        local, clock, rebuild_state = self.local, self.clock, self.rebuild_state
         slots = np.flatnonzero(local.slot_state == BROKEN)
-        mine = np.column_stack([local.slot_face[slots].astype(float), local.slot_memory[slots, MODE:]])
+        mine = np.column_stack([local.slot_face[slots].astype(float), local.slot_history[slots, MODE:]])
         rows = np.concatenate(self.comm.allgather(mine)) if self.comm.size > 1 else mine
         if not len(rows):
             return []
@@ -321,36 +321,36 @@ class Core(State):
         return [
             Crack(
                 int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(both[k, 3]),
-                lattice.time + (int(first[k, 2]) - lattice.step) * dt, int(first[k, 4]), float(both[k, 5]),
+                rebuild_state.time + (int(first[k, 2]) - rebuild_state.step) * dt, int(first[k, 4]), float(both[k, 5]),
             )
             for k in np.lexsort((joints, first[:, 2])).tolist()
         ]  # fmt: skip
 
     def rebuild(self) -> None:
-        """Storage and lists anew at the present positions, as the step does from time to time."""
+        """Storage and lists again at the present positions, as the step does from time to time."""
         self.open_model()
         self.close_model()
 
     def _renew_lists(self) -> None:
         """Contact lists at the present positions; joints that broke become free faces. Storage stays."""
         with self.timers("neighbour"):
-            self.lattice.skin = self._skin()
+            self.rebuild_state.skin = self._skin()
             handed_over = self.local.handed_over()
             self._collect_events()
             self.local.renew_contacts(handed_over)
             self.listed = self.x[self.owned].copy()
-            self.lattice.age = 0
+            self.rebuild_state.age = 0
             self._note_time()
             self.rebuilds += 1
 
     def _note_time(self) -> None:
-        self.lattice.step, self.lattice.time = self.clock.step, self.clock.time
+        self.rebuild_state.step, self.rebuild_state.time = self.clock.step, self.clock.time
 
     def _skin(self) -> float:
         """Buffer of the next contact lists [m], from global values only."""
-        lattice = self.lattice
-        lattice.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
-        return lattice.skin_factor * self._mean_edge
+        rebuild_state = self.rebuild_state
+        rebuild_state.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
+        return rebuild_state.skin_factor * self._mean_edge
 
     def _collect_events(self) -> None:
         """Joints that broke since the last rebuild become free faces, on all ranks. Collective."""
@@ -362,7 +362,7 @@ class Core(State):
             self._open_faces(joints)
 
     def close_again(self) -> None:
-        """Close a restored model: its lattice stays as it was."""
+        """Close a restored model: its rebuild_state stays as it was."""
         self._close(frozen=True)
 
     def close_model(self) -> None:
@@ -371,20 +371,20 @@ class Core(State):
             self._close()
 
     def _close(self, frozen: bool = False) -> None:
-        """From open to closed. frozen: keep the lattice as it is (restart)."""
+        """From open to closed. frozen: keep the rebuild_state as it is (restart)."""
         self._check_ready()
         mesh = self.the_mesh()
         with self.timers("neighbour"):
             if self._topology_stale:
                 self._renew_topology()
-            if self.lattice.dt == 0.0:
+            if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
             middle = np.empty((len(self.number), 2))
             radius = build.middles(self.x, mesh.cells, self.number, middle)
-            self._choose_lattice(radius, frozen)
+            self._choose_reach(radius, frozen)
         middle = self._share_out(middle)
         with self.timers("neighbour"):
-            cell = keys(middle, self.lattice.side)
+            cell = keys(middle, self.rebuild_state.side)
             order = strips.global_order(cell, self.number)
             cell = cell[order]
         with self.timers("halo"):
@@ -394,7 +394,7 @@ class Core(State):
             if not frozen:
                 self.origin = self.x[self.owned].copy()
                 self.listed = self.origin.copy()
-                self.lattice.age = self.lattice.stored = 0
+                self.rebuild_state.age = self.rebuild_state.stored = 0
                 self._note_time()
             self.rebuilds += 1
         self.surface_loads.storage_rebuilt()
@@ -427,24 +427,24 @@ class Core(State):
         self.unused = np.full(len(lead), -1, np.int64)
         self._topology_stale = False
 
-    def _choose_lattice(self, radius: float, frozen: bool) -> None:
+    def _choose_reach(self, radius: float, frozen: bool) -> None:
         """Buffer and cell side for the next lists, from global values only."""
-        lattice = self.lattice
+        rebuild_state = self.rebuild_state
         radius = float(self.comm.max_into(np.array([radius]))[0])
         if frozen:
             return
-        lattice.skin = self._skin()
+        rebuild_state.skin = self._skin()
         room = ROOM * self._mean_edge if self.options.collision else 0.0
         needed = max(2.0 * radius, self._longest) * (1.0 + 1e-9) + room
-        if not needed <= lattice.side <= 1.2 * needed:
-            lattice.side = 1.05 * needed
+        if not needed <= rebuild_state.side <= 1.2 * needed:
+            rebuild_state.side = 1.05 * needed
 
     def _share_out(self, middle: np.ndarray) -> np.ndarray:
-        """Move borders if it pays, then send every element and its memories to the owner of its column.
+        """Move borders if it pays, then send every element and its histories to the owner of its column.
 
         Returns the middles of the elements that are owned now (n, 2) [m].
         """
-        side = self.lattice.side
+        side = self.rebuild_state.side
         cell = keys(middle, side)
         with self.timers("balance"):
             self.ownership.renew(columns(cell), side, self.clock.step, self.timers.seconds(), None, self._costs())
@@ -452,14 +452,14 @@ class Core(State):
             leave = strips.strays(cell, self.ownership.borders, self.comm.rank) if self.comm.size > 1 else cell[:0]
             migration = Migration(self.comm, len(cell), leave, self.ownership.owner_of(columns(cell[leave])))
             leave = migration.leave
-            hers = self.memories.take(leave)
+            leaving = self.histories.take(leave)
             rows = [self.number.view(np.float64)[:, None], self.x, self.v, middle, *self.cold.values()]
             table = np.hstack([part[leave] for part in rows])
-            arrived, counts, entries = migration.exchange(table, hers.counts(), hers.rows)
+            arrived, counts, entries = migration.exchange(table, leaving.counts(), leaving.rows)
             if not len(leave) and not len(arrived):
                 return middle
             stay = migration.stay()
-            self.memories = self.memories.take(stay).joined(counts, entries)
+            self.histories = self.histories.take(stay).joined(counts, entries)
             joined, at = [], 0
             for part in rows:
                 joined.append(np.concatenate([part[stay], arrived[:, at : at + part.shape[1]]]))
@@ -470,14 +470,14 @@ class Core(State):
         return middle
 
     def _costs(self) -> np.ndarray:
-        """Relative cost of the owned elements: broken zones are dearer."""
+        """Relative cost of the owned elements: broken zones cost more."""
         cost = np.ones(len(self.number))
-        cost += 0.5 * np.minimum(self.memories.counts(), 12)
+        cost += 0.5 * np.minimum(self.histories.counts(), 12)
         return cost
 
     def _store(self, order: np.ndarray, cell: np.ndarray) -> None:
         """Put the owned elements into storage order, with the ghosts around them."""
-        self.memories = self.memories.take(order)
+        self.histories = self.histories.take(order)
         self.cold = {name: values[order] for name, values in self.cold.items()}
         number, v = self.number[order], self.v[order]
         self.x, self.halo = connect(

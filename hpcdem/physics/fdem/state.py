@@ -1,4 +1,4 @@
-"""The state of a model of blocks as a rank holds it: elements with their corners and memories, clock, ownership.
+"""The state of a model of blocks as a rank holds it: elements with their corners and histories, clock, ownership.
 
 Its parts say what is in it; the step that moves it, and the rebuild of lists and ghosts, are in `simulation.py`.
 """
@@ -17,9 +17,9 @@ from hpcdem.core.rebuild import RebuildState
 from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem.memories import Memories
+from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
+from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.scene import Fading, Scene
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 
 NARROW, WIDE = 0.1, 0.3
@@ -27,7 +27,7 @@ NARROW, WIDE = 0.1, 0.3
 
 
 @dataclass
-class Lattice(RebuildState):
+class ListState(RebuildState):
     """Skin over the mean edge; stored: age of the storage in steps (`age`: of the contact lists); dt: time step of the
     dynamic mode [s], 0 if it must be estimated, and the step at which it was. step, time: when the contact lists were
     made; dt is the same since then.
@@ -55,8 +55,8 @@ class Crack(NamedTuple):
     peak_kinetic: float = math.nan
 
 
-class State(Scene):
-    """Scene, positions, velocities and memories of the elements that a rank holds."""
+class State(ModelDefinition):
+    """ModelDefinition, positions, velocities and histories of the elements that a rank holds."""
 
     number: np.ndarray
     """Of each element held here; when the model is closed [ghosts of the left | owned | ghosts of the right]."""
@@ -66,7 +66,7 @@ class State(Scene):
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
     """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
-    memories: Memories
+    histories: Histories
     halo: Any
     surface_loads: SurfaceLoads
     n_left: int
@@ -116,9 +116,9 @@ class State(Scene):
     def clear(self) -> None:
         """Start a new model: no mesh, step 0, default options."""
         self.release()
-        self.clear_scene()
+        self.clear_definition()
         self.clock = Clock()
-        self.lattice = Lattice()
+        self.rebuild_state = ListState()
         self.ownership = Ownership(self.comm, self.balance_on)
         self.rebuilds = 0
         self.event_rows: list[Crack] = []
@@ -136,7 +136,7 @@ class State(Scene):
         self.number = np.empty(0, np.int64)
         self.x, self.v = np.empty((0, 8)), np.empty((0, 6))
         self.cold = {}
-        self.memories = Memories.empty(0)
+        self.histories = Histories.empty(0)
 
     def release(self) -> None:
         """Give back what MPI holds for this simulation. Not collective."""
@@ -160,9 +160,9 @@ class State(Scene):
 
     def masses_change(self) -> bool:
         """Masses or the time step will be others with the next lists."""
-        return self.lattice.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
+        return self.rebuild_state.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
 
-    def has_faded(self, one: Fading) -> bool:
+    def has_ended(self, one: Relaxation) -> bool:
         """Forces left behind are gone, or belong to the other mode."""
         now = float(self.clock.step) if one.in_steps else self.clock.time
         return now >= one.begin + one.span or one.in_steps == self.options.dynamic

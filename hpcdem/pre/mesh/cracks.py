@@ -19,7 +19,7 @@ from hpcdem.pre.mesh.geometry import Curve, arc_of, distance_to_segment
 TOLERANCE = 1e-6
 """An edge lies on a line if it keeps to it within this part of its own length."""
 STRAYING = 4.0
-"""How much dearer a way along edges gets with the square of its distance from the trace, in edge lengths."""
+"""How the cost of a path along edges grows with the square of its distance from the trace, in edge lengths."""
 
 
 def edges_on(mesh: Mesh, curves: Sequence[Curve], tolerance: float | None = None) -> np.ndarray:

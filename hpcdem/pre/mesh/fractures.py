@@ -77,7 +77,7 @@ class Orientation:
 
 @dataclass(frozen=True)
 class Length:
-    """Length of traces [m], cut off below `least` and above `greatest` (and drawn anew from what remains).
+    """Length of traces [m], cut off below `least` and above `greatest` (and drawn again from what remains).
 
     kind: "fixed" (value); "exponential" (value: mean); "lognormal" (value, spread: mean and standard deviation of the
     length itself); "power" (density proportional to l ** -value between least and greatest). value and spread describe

@@ -24,7 +24,7 @@ from hpcdem.pre.mesh.planar import Plane
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.regions import GRID, edges_of_curve, faces, noded, polygon_of
 from hpcdem.pre.mesh.sizes import GROWTH, Refinement, SizeField, not_too_many
-from hpcdem.pre.mesh.smoothing import smoothed
+from hpcdem.pre.mesh.smooth import smoothed
 
 MOST_EDGES = 1_000_000
 """More elements, or edges on lines, are refused at once: the size is a slip of units."""

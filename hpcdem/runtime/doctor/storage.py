@@ -16,7 +16,7 @@ from hpcdem.io.disk import explain, publish
 from hpcdem.io.lock import FolderLock, Taken
 from hpcdem.runtime import cgroups
 from hpcdem.runtime.doctor.machine import CLOCK_SKEW, MIB, Findings, Machine, ok, problem, size, warning
-from hpcdem.runtime.warmup import cache_base, cache_folder, temporary_base
+from hpcdem.runtime.kernels import cache_base, cache_folder, temporary_base
 
 NETWORK = frozenset(
     "nfs nfs4 cifs smb3 smbfs ncpfs afs ceph 9p lustre gpfs mmfs beegfs pvfs2 orangefs panfs wekafs gfs2 ocfs2 "

@@ -98,10 +98,10 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     from bench.worker import versions
     from hpcdem import session
     from hpcdem.physics.fdem.model import Blocks
-    from hpcdem.physics.fdem.rehearsal import rehearse
+    from hpcdem.physics.fdem.warm_up import warm_up
 
     shared = session.current()
-    rehearse(job["threads"])
+    warm_up(job["threads"])
     sim = Blocks(shared.comm, job["threads"])
     workload = WORKLOADS[job["workload"]]
     MAKERS[workload.kind](sim, workload.side)

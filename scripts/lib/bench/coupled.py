@@ -59,12 +59,12 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     from bench.worker import versions
     from hpcdem import session
     from hpcdem.core.timers import Timers
-    from hpcdem.physics.coupling.rehearsal import rehearse
+    from hpcdem.physics.coupling.warm_up import warm_up
     from hpcdem.runtime.progress import BETWEEN
 
     shared = session.current()
     shared.prepare("coupled")
-    rehearse(job["threads"])
+    warm_up(job["threads"])
     both = make(shared.comm, job["threads"])
     both.advance(max(5, job["steps"] // 10))
     shared.comm.allgather(0)
@@ -92,7 +92,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
 
 def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     """Both models, coupled."""
-    from hpcdem.commands.dem import particles, properties, running, settings, walls
+    from hpcdem.commands.dem import cycles, particles, properties, settings, walls
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.physics.fdem.model import Blocks
@@ -106,7 +106,7 @@ def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     walls.box(sim, 0.0, width, 0.0, width + 1.0, kn=1e7, ks=5e6, fric=0.3)
     particles.gen_grid(sim, [RADIUS], (0.0, width), (0.0, width))
     properties.prop(sim, density=2500.0, kn=1e7, ks=5e6, fric=0.3)
-    running.prepare(sim)
+    cycles.prepare(sim)
     top = width - 1e-5
     blocks = Blocks(comm, threads)
     ends = (0.0, width, across - 1), (top, top + 20.0 * RADIUS, 10)

@@ -223,7 +223,7 @@ def peak() -> int:
 
 
 def forget_peak() -> None:
-    """From here on `peak` counts anew, where the kernel allows it."""
+    """From here on `peak` counts again, where the kernel allows it."""
     try:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:

@@ -47,7 +47,7 @@ def build(sim: hpcdem.Simulation) -> None:
 
 
 def right(sim: hpcdem.Simulation) -> None:
-    """The right wall, made anew: contacts with the old one are forgotten."""
+    """The right wall, made again: contacts with the old one are forgotten."""
     sim.wall(RIGHT, ((WIDTH, 0.0), (WIDTH, TOP)), kn=KN, ks=KN, fric=0.3)
 
 

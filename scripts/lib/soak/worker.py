@@ -20,7 +20,7 @@ import numpy as np
 
 import hpcdem
 from hpcdem import session
-from hpcdem.physics.dem import observe, simulation
+from hpcdem.physics.dem import diagnostics, simulation
 from soak import model
 
 PERIOD, WINDOW = 2500, 200
@@ -230,8 +230,8 @@ class Momentum:
         pull = mass * np.array([[s.gx], [s.gy]]) - s.lsm * v
         force = engine.lists.owned_forces()[:, :2].T + pull
         damping = self.sim["damp"] * np.abs(force) * np.where(v < 0.0, -1.0, 1.0)
-        on_particles, _ = observe.wall_rows(engine)
-        walls = on_particles[:, [observe.FORCE_X, observe.FORCE_Y]].sum(axis=0)
+        on_particles, _ = diagnostics.wall_rows(engine)
+        walls = on_particles[:, [diagnostics.FORCE_X, diagnostics.FORCE_Y]].sum(axis=0)
         return engine.clock.dt * (walls + (pull - damping).sum(axis=1))
 
     def residual(self) -> float | None:

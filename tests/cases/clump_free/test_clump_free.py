@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import clumps, particles, properties, running, walls
+from hpcdem.commands.dem import clumps, cycles, particles, properties, walls
 from hpcdem.io.clumps import Clumps, write_clumps
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from tests.clumped import bodies, of_discs
 from tests.support import model, only, steps
 
@@ -28,17 +28,17 @@ def test_free_motion_is_kept(tmp_path, n):
     clumps.clump(sim, tmp_path / "one.clumps")
     properties.prop(sim, density=2.0, kn=1e5, fric=0.3)
     properties.prop(sim, only(0), xv=v[0], yv=v[1], spin=w)
-    running.prepare(sim)
+    cycles.prepare(sim)
 
     def kept() -> list[float]:
-        c = {name: float(values[0]) for name, values in observe.clumps(sim).items()}
+        c = {name: float(values[0]) for name, values in diagnostics.clumps(sim).items()}
         turning = c["mass"] * (c["x"] * c["vy"] - c["y"] * c["vx"]) + c["inertia"] * c["spin"]
-        return [c["mass"] * c["vx"], c["mass"] * c["vy"], turning, observe.kinetic_energy(sim)]
+        return [c["mass"] * c["vx"], c["mass"] * c["vy"], turning, diagnostics.kinetic_energy(sim)]
 
     before = kept()
     steps(sim, n)
     assert kept() == pytest.approx(before, rel=1e-10)
-    c, t = observe.clumps(sim), n * dt
+    c, t = diagnostics.clumps(sim), n * dt
     assert (c["x"][0], c["y"][0]) == pytest.approx((1.0 + v[0] * t, 5.0 + v[1] * t), abs=1e-9)
     assert c["angle"][0] == pytest.approx(0.3 + w * t, rel=1e-10)
     p = sim.particles
@@ -72,7 +72,7 @@ def drops(folder, as_clumps: bool):
             particles.ball(sim, k, x, y, 0.5)
     properties.prop(sim, density=1.7, kn=1e4, ks=8e3, fric=0.3, damp=0.1)
     properties.fix(sim, ("x",), only(1))
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
@@ -87,12 +87,12 @@ def test_a_clump_of_one_disc_is_that_disc(tmp_path):
         for name in ("gid", "x", "y", "vx", "vy", "spin", "angle"):
             assert (a.particles[name] == b.particles[name]).all(), name
         assert (a.lists.owned_forces() == b.lists.owned_forces()).all()
-        assert observe.kinetic_energy(a) == observe.kinetic_energy(b)
-        seen = observe.survey(a), observe.survey(b)
+        assert diagnostics.kinetic_energy(a) == diagnostics.kinetic_energy(b)
+        seen = diagnostics.survey(a), diagnostics.survey(b)
         assert seen[0] == seen[1]
-        assert observe.lightest(a) == observe.lightest(b)
-        assert observe.highest_frequency(a) == pytest.approx(observe.highest_frequency(b), rel=1e-12)
-        touching.append(len(observe.contact_rows(a)[0]) + len(observe.wall_rows(a)[0]))
+        assert diagnostics.lightest(a) == diagnostics.lightest(b)
+        assert diagnostics.highest_frequency(a) == pytest.approx(diagnostics.highest_frequency(b), rel=1e-12)
+        touching.append(len(diagnostics.contact_rows(a)[0]) + len(diagnostics.wall_rows(a)[0]))
     assert max(touching) >= 2
 
 
@@ -106,10 +106,10 @@ def test_velocities_that_are_set_are_those_of_the_centre(tmp_path):
     properties.prop(sim, density=1.0, kn=1.0)
     for closed in (False, True):
         if closed:
-            running.prepare(sim)
+            cycles.prepare(sim)
             steps(sim, 3)
         properties.prop(sim, only(1), xv=0.2, spin=3.0)
-        c, p = observe.clumps(sim) if closed else None, sim.particles
+        c, p = diagnostics.clumps(sim) if closed else None, sim.particles
         angle = c["angle"][0] if closed else 0.5
         by_gid = np.argsort(p["gid"])
         assert p["vx"][by_gid] == pytest.approx([0.2 + 3.0 * math.sin(angle), 0.2 - 3.0 * math.sin(angle)], abs=1e-14)

@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, clumps, particles, properties, running, settings, walls
+from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
 from hpcdem.core.errors import CommandError
 from hpcdem.core.selection import Group, Ids, Interval
 from hpcdem.io.clumps import write_clumps
 from hpcdem.io.frame import Table
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import NAMES
 from hpcdem.post import stress
 from tests.clumped import bodies, kinds, write_lattice
@@ -34,7 +34,7 @@ def heap(folder, dt: float = 2e-3, seconds: float = 8.0, threads: int = 1, fric:
     clumps.clump(sim, folder / "bodies.clumps", x=0.0, y=0.0, group="rock", color=3)
     particles.gen(sim, 50, [2.5, 3.5], (0.0, 240.0), (0.0, 150.0), group="sand")
     properties.prop(sim, density=DENSITY, kn=K, ks=K, fric=fric, damp=0.3)
-    running.cycle(sim, round(seconds / dt))
+    cycles.cycle(sim, round(seconds / dt))
     return sim
 
 
@@ -50,9 +50,9 @@ def test_the_budget_closes(tmp_path):
     properties.fix(sim, ("x", "spin"), Interval("x", 40.0, 60.0))
     properties.prop(sim, Interval("x", 40.0, 60.0), spin=0.1, xv=-0.2)
     walls.wall(sim, 1, xv=4.0)
-    running.cycle(sim, 3000)
+    cycles.cycle(sim, 3000)
     particles.delete(sim, Interval("x", 200.0, 300.0))
-    running.cycle(sim, 3000)
+    cycles.cycle(sim, 3000)
     seen = sim.energy.look(sim)
     absent = ("box", "work_blocks", "elastic_bonds", "loss_stiffness", "closing")  # stiffness is constant (linear law)
     for name in NAMES[:-1]:
@@ -67,9 +67,9 @@ def test_an_elastic_heap_keeps_its_energy(tmp_path):
     for dt in (1e-3, 2.5e-4):
         sim = heap(tmp_path / f"{dt:g}", dt, 0.0, fric=0.0, energy=10**6)
         properties.prop(sim, damp=0.0)
-        running.cycle(sim, round(4.0 / dt))
+        cycles.cycle(sim, round(4.0 / dt))
         seen = sim.energy.look(sim)
-        assert len(observe.contact_rows(sim)[0]) + len(observe.wall_rows(sim)[0]) > 5
+        assert len(diagnostics.contact_rows(sim)[0]) + len(diagnostics.wall_rows(sim)[0]) > 5
         assert seen.loss_friction == seen.loss_local_damping == 0.0 and seen.work_gravity > 1e6
         errors.append(abs(seen.relative))
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 8.0
@@ -81,7 +81,7 @@ def test_an_elastic_heap_keeps_its_energy(tmp_path):
 def by_matrix(sim) -> float:
     """The highest eigenfrequency from the whole matrix, with numpy: one row and column per direction of a free disc or
     clump. A linear contact has the stiffness K/2 along and, with friction, across its normal."""
-    c, p = observe.clumps(sim), sim.particles
+    c, p = diagnostics.clumps(sim), sim.particles
     order = np.argsort(p["gid"])
     gid, x, y, of = (p[name][order] for name in ("gid", "x", "y")) and (
         p["gid"][order], p["x"][order], p["y"][order], p.clump[order],
@@ -108,16 +108,16 @@ def by_matrix(sim) -> float:
         strain = sum(rows)
         stiffness[:] += k * np.outer(strain, strain)
 
-    out, ids = observe.contact_rows(sim)
+    out, ids = diagnostics.contact_rows(sim)
     for numbers, (a, b, _) in zip(out, ids):
-        at = numbers[[observe.AT_X, observe.AT_Y]]
+        at = numbers[[diagnostics.AT_X, diagnostics.AT_Y]]
         normal = np.array(place[b][:2]) - np.array(place[a][:2])
         normal /= np.hypot(*normal)
         for direction in (normal, np.array([-normal[1], normal[0]])) if mu else (normal,):
             add([row(b, at, direction), -row(a, at, direction)], 0.5 * K)
-    out, ids = observe.wall_rows(sim)
+    out, ids = diagnostics.wall_rows(sim)
     for numbers, (a, _) in zip(out, ids):
-        at = numbers[[observe.AT_X, observe.AT_Y]]
+        at = numbers[[diagnostics.AT_X, diagnostics.AT_Y]]
         normal = at - np.array(place[a][:2])
         normal /= np.hypot(*normal)
         for direction in (normal, np.array([-normal[1], normal[0]])) if mu else (normal,):
@@ -131,13 +131,13 @@ def by_matrix(sim) -> float:
 @pytest.mark.parametrize("fric", [0.0, 0.3])
 def test_highest_frequency_against_the_matrix(tmp_path, fric):
     sim = heap(tmp_path, 2e-3, 6.0, fric=fric)
-    properties.fix(sim, ("spin",), Ids(0, int(observe.clumps(sim)["id"][2])))
-    running.prepare(sim)
-    found, expected = observe.highest_frequency(sim, within=1e-8), by_matrix(sim)
-    assert len(observe.contact_rows(sim)[0]) > 60
+    properties.fix(sim, ("spin",), Ids(0, int(diagnostics.clumps(sim)["id"][2])))
+    cycles.prepare(sim)
+    found, expected = diagnostics.highest_frequency(sim, within=1e-8), by_matrix(sim)
+    assert len(diagnostics.contact_rows(sim)[0]) > 60
     assert found == pytest.approx(expected, rel=1e-6)
     # Without shear springs Gershgorin's bound is omega^2 <= 2 max(sum k / m), so the estimate cannot be too large.
-    critical = observe.critical_dt(sim)
+    critical = diagnostics.critical_dt(sim)
     assert (critical < 2.0 / found) if fric == 0.0 else (critical < 1.3 * 2.0 / found)
     assert critical > 0.25 * 2.0 / found
 
@@ -153,12 +153,12 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
     clumps.clump(sim, tmp_path / "row.clumps")
     properties.prop(sim, density=DENSITY, kn=K, ks=K)
     assert bonds.bond(sim, n_bond=1e30, s_bond=1e30) == 3
-    running.prepare(sim)
-    sim.settings.dt = factor * 2.0 / observe.highest_frequency(sim, within=1e-9)
-    for k, i in enumerate(observe.clumps(sim)["id"]):
+    cycles.prepare(sim)
+    sim.settings.dt = factor * 2.0 / diagnostics.highest_frequency(sim, within=1e-9)
+    for k, i in enumerate(diagnostics.clumps(sim)["id"]):
         properties.prop(sim, only(int(i)), xv=1e-7 * (-1) ** k, spin=1e-8)
     steps(sim, n)
-    assert (float(np.abs(observe.clumps(sim)["vx"]).max()) < 1e-5) == stable
+    assert (float(np.abs(diagnostics.clumps(sim)["vx"]).max()) < 1e-5) == stable
 
 
 # ---- commands ------------------------------------------------------------------------------------------------------
@@ -166,18 +166,18 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
 
 def test_same_bits_on_threads_and_when_looked_at(tmp_path):
     one, three = heap(tmp_path / "1", seconds=2.0), heap(tmp_path / "3", seconds=2.0, threads=3)
-    assert observe.fingerprint(one) == observe.fingerprint(three)
-    assert observe.highest_frequency(one) == observe.highest_frequency(three)
-    observe.frame(one), observe.survey(one), observe.clumps(one)
+    assert diagnostics.fingerprint(one) == diagnostics.fingerprint(three)
+    assert diagnostics.highest_frequency(one) == diagnostics.highest_frequency(three)
+    diagnostics.frame(one), diagnostics.survey(one), diagnostics.clumps(one)
     steps(one, 10), steps(three, 10)
-    assert observe.fingerprint(one) == observe.fingerprint(three)
+    assert diagnostics.fingerprint(one) == diagnostics.fingerprint(three)
 
 
 def test_range_takes_clumps_as_a_whole(tmp_path):
     """By their centre where a place is asked for: neighbouring ranges share no clump and leave none out. By any member
     where ids are."""
     sim = heap(tmp_path, seconds=1.0)
-    p, c = sim.particles, observe.clumps(sim)
+    p, c = sim.particles, diagnostics.clumps(sim)
     x = dict(zip(c["id"].tolist(), c["x"]))
     at = c["x"][5] + 0.01  # through a rod
     left, right = (properties.chosen(sim, Interval("x", *ends)) for ends in ((-1e3, at), (at, 1e3)))
@@ -191,8 +191,8 @@ def test_range_takes_clumps_as_a_whole(tmp_path):
     number = sim.clumps.number
     assert particles.delete(sim, Interval("x", 100.0, 130.0)) == n
     assert len(sim.particles) == before - n and sim.clumps.number < number
-    running.prepare(sim)
-    left = observe.clumps(sim)
+    cycles.prepare(sim)
+    left = diagnostics.clumps(sim)
     assert sim.clumps.number == len(left["id"]) and not ((left["x"] >= 100.0) & (left["x"] < 130.0)).any()
     steps(sim, 50)
     particles.delete(sim)
@@ -205,11 +205,11 @@ def test_properties_are_those_of_the_whole_clump(tmp_path):
     p = sim.particles
     of = p.clump == p.clump[p["gid"] == 3]
     assert (sim.materials.rows["density"][p["material"][of]] == 5e3).all() and (p["color"][of] == 7).all()
-    running.prepare(sim)
-    c = observe.clumps(sim)
+    cycles.prepare(sim)
+    c = diagnostics.clumps(sim)
     assert c["mass"][0] == 5e3 * c["area"][0] and c["mass"][1] == DENSITY * c["area"][1]
     # Frames: shares of the mass by the area of the discs.
-    frame = observe.frame(sim).tables["particles"].columns
+    frame = diagnostics.frame(sim).tables["particles"].columns
     assert frame["mass"][frame["clump"] == 0].sum() == pytest.approx(c["mass"][0], rel=1e-14)
     assert (frame["angle"][frame["clump"] == 0] == c["angle"][0]).all()
     assert set(frame["clump"]) == {-1, *c["id"].tolist()}
@@ -219,7 +219,7 @@ def test_stress_is_that_of_whole_bodies(tmp_path):
     """Between bodies forces cancel, so that sum V s = sum c F - sum over walls of x f, c and F being the centre of each
     body and the contact force on it; to rounding, in any state. Half of that would be lost with members as bodies."""
     sim = heap(tmp_path, 2e-3, 3.0)
-    frame = observe.frame(sim)
+    frame = diagnostics.frame(sim)
     found, held = stress.moments(frame)
     p, w = frame.tables["particles"].columns, frame.tables["wall_contacts"].columns
     assert (p["clump_x"][p["clump"] < 0] == p["x"][p["clump"] < 0]).all()
@@ -234,7 +234,7 @@ def test_stress_is_that_of_whole_bodies(tmp_path):
     wrong = stress.moments(as_discs)[0].sum(axis=0)
     assert abs(wrong[3] / expected[3] - 1.0) > 0.1
     volume, thickness = stress.volume_rule(frame)
-    c = observe.clumps(sim)
+    c = diagnostics.clumps(sim)
     assert volume[p["clump"] >= 0].sum() == pytest.approx(c["area"].sum(), rel=1e-12) and thickness == 1.0
     first = p["clump"] == c["id"][0]
     assert held[first].all() or not held[first].any()
@@ -255,7 +255,7 @@ def test_the_box_deletes_a_clump_when_its_centre_leaves(tmp_path):
     steps(sim, 110)
     sim.rebuild()
     assert sim.clumps.number == 1 and sim.lost == 7 and len(sim.particles) == 7
-    assert (observe.clumps(sim)["id"] == 7).all()
+    assert (diagnostics.clumps(sim)["id"] == 7).all()
 
 
 def test_joined_particles_keep_their_momentum(tmp_path):
@@ -265,7 +265,7 @@ def test_joined_particles_keep_their_momentum(tmp_path):
         particles.ball(sim, 10 + k, 1.1 * k, 0.3 * k, 0.5 + 0.05 * k)
         properties.prop(sim, only(10 + k), density=3.0, kn=1e3, ks=1e3, fric=0.2)
         properties.prop(sim, only(10 + k), xv=rng.normal(), yv=rng.normal(), spin=rng.normal())
-    running.prepare(sim)
+    cycles.prepare(sim)
     steps(sim, 5)
 
     def kept() -> tuple[float, float, float]:
@@ -273,17 +273,17 @@ def test_joined_particles_keep_their_momentum(tmp_path):
         turning = m * (p["x"] * p["vy"] - p["y"] * p["vx"]) + i * p["spin"]
         return float((m * p["vx"]).sum()), float((m * p["vy"]).sum()), float(turning.sum())
 
-    before, energy = kept(), observe.kinetic_energy(sim)
+    before, energy = kept(), diagnostics.kinetic_energy(sim)
     assert clumps.join(sim, Ids(10, 15), group="body", color=2) == 6
-    running.prepare(sim)
-    c = {name: float(values[0]) for name, values in observe.clumps(sim).items()}
+    cycles.prepare(sim)
+    c = {name: float(values[0]) for name, values in diagnostics.clumps(sim).items()}
     turning = c["mass"] * (c["x"] * c["vy"] - c["y"] * c["vx"]) + c["inertia"] * c["spin"]
     assert (c["mass"] * c["vx"], c["mass"] * c["vy"], turning) == pytest.approx(before, rel=1e-12)
-    assert c["id"] == 10 and c["members"] == 6 and observe.kinetic_energy(sim) < energy
-    assert not len(observe.contact_rows(sim)[0]), "members of one clump do not touch each other"
-    energy = observe.kinetic_energy(sim)
+    assert c["id"] == 10 and c["members"] == 6 and diagnostics.kinetic_energy(sim) < energy
+    assert not len(diagnostics.contact_rows(sim)[0]), "members of one clump do not touch each other"
+    energy = diagnostics.kinetic_energy(sim)
     steps(sim, 1000)
-    assert observe.kinetic_energy(sim) == pytest.approx(energy, rel=1e-12)
+    assert diagnostics.kinetic_energy(sim) == pytest.approx(energy, rel=1e-12)
     assert {int(v) for v in sim.particles["color"]} == {2}
 
 
@@ -294,10 +294,10 @@ def test_what_cannot_be_joined_is_refused(tmp_path):
     properties.prop(sim, density=3.0, kn=1e3)
 
     def refused(message: str, first: int, last: int) -> None:
-        before = observe.fingerprint(sim)
+        before = diagnostics.fingerprint(sim)
         with pytest.raises(CommandError, match=message):
             clumps.join(sim, Ids(first, last))
-        assert observe.fingerprint(sim)["particles"] == before["particles"] and not sim.clumps
+        assert diagnostics.fingerprint(sim)["particles"] == before["particles"] and not sim.clumps
 
     refused("two particles or more, RANGE has 1", 0, 0)
     properties.prop(sim, only(1), density=4.0)
@@ -314,7 +314,7 @@ def test_what_cannot_be_joined_is_refused(tmp_path):
         clumps.join(sim, Ids(4, 5))
     settings.set_option(sim, "disk", "hex")
     with pytest.raises(CommandError, match="SET disk is hex: their mass is density times area"):
-        running.prepare(sim)
+        cycles.prepare(sim)
 
 
 def test_bonds_hold_clumps(tmp_path):
@@ -326,14 +326,14 @@ def test_bonds_hold_clumps(tmp_path):
     properties.prop(sim, density=DENSITY, kn=K, ks=K, damp=0.5)
     properties.fix(sim, ("x", "y", "spin"), only(7))
     assert bonds.bond(sim, tolerate=0.1, n_bond=1e30, s_bond=1e30) == 1
-    running.prepare(sim)
+    cycles.prepare(sim)
     steps(sim, 20000)
-    out, ids = observe.contact_rows(sim)
-    c = observe.clumps(sim)
+    out, ids = diagnostics.contact_rows(sim)
+    c = diagnostics.clumps(sim)
     weight = c["mass"][0] * G
     assert ids.tolist() == [[0, 7, 1]]
-    assert (out[0, observe.FORCE_X], out[0, observe.FORCE_Y]) == pytest.approx((0.0, weight), abs=1e-3 * weight)
-    assert observe.survey(sim).unbalanced < 1e-3
+    assert (out[0, diagnostics.FORCE_X], out[0, diagnostics.FORCE_Y]) == pytest.approx((0.0, weight), abs=1e-3 * weight)
+    assert diagnostics.survey(sim).unbalanced < 1e-3
 
 
 def test_gen_keeps_clear_of_clumps(tmp_path):
@@ -342,5 +342,5 @@ def test_gen_keeps_clear_of_clumps(tmp_path):
     clumps.clump(sim, tmp_path / "b.clumps")
     particles.gen(sim, 200, [1.0], (0.0, 90.0), (0.0, 90.0))
     properties.prop(sim, density=1.0, kn=1.0)
-    running.prepare(sim)
-    assert not len(observe.contact_rows(sim)[0]) and len(sim.particles) > 180
+    cycles.prepare(sim)
+    assert not len(diagnostics.contact_rows(sim)[0]) and len(sim.particles) > 180

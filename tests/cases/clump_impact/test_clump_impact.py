@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import clumps, properties, running, walls
+from hpcdem.commands.dem import clumps, cycles, properties, walls
 from hpcdem.io.clumps import write_clumps
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from tests.cases.clump_impact import exact
 from tests.clumped import bodies, of_discs
 from tests.support import model, only, steps
@@ -25,20 +25,20 @@ def falling(folder, theta: float, k: float, dt: float):
     write_clumps(folder / "one.clumps", bodies([kind], np.array([(0.0, height)]), np.array([theta])))
     clumps.clump(sim, folder / "one.clumps")
     properties.prop(sim, density=exact.DENSITY, kn=2.0 * k, yv=-exact.V0)
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
 def state(sim) -> tuple[float, float, float, float]:
     """y, velocity upwards, spin, velocity sideways."""
-    c = observe.clumps(sim)
+    c = diagnostics.clumps(sim)
     return float(c["y"][0]), float(c["vy"][0]), float(c["spin"][0]), float(c["vx"][0])
 
 
 def test_flat_on_the_floor_every_step_is_that_of_the_scheme(tmp_path):
     dt, seen = 1e-4, []
     sim = falling(tmp_path, 0.0, exact.K, dt)
-    assert observe.clumps(sim)["mass"][0] == exact.MASS and observe.clumps(sim)["inertia"][0] == exact.INERTIA
+    assert diagnostics.clumps(sim)["mass"][0] == exact.MASS and diagnostics.clumps(sim)["inertia"][0] == exact.INERTIA
     n = int(math.pi * math.sqrt(exact.MASS / (2.0 * exact.K)) / dt)
     for _ in range(n):
         steps(sim, 1)
@@ -60,11 +60,11 @@ def test_on_one_disc_it_bounces_and_turns(tmp_path, theta):
         folder.mkdir()
         lasts = exact.contact_time(theta, k)
         sim = falling(folder, theta, k, lasts / 2000.0)
-        before = observe.kinetic_energy(sim)
+        before = diagnostics.kinetic_energy(sim)
         steps(sim, 2100)
         _, up, spin, sideways = state(sim)
         assert sideways == 0.0
-        assert observe.kinetic_energy(sim) == pytest.approx(before, rel=2e-6)
+        assert diagnostics.kinetic_energy(sim) == pytest.approx(before, rel=2e-6)
         errors.append(np.abs([up, spin] - expected))
     assert (errors[1] < 0.02 * exact.V0).all()
     order = np.log(errors[0] / errors[1]) / np.log(64.0)
@@ -82,24 +82,24 @@ def test_two_clumps_keep_momentum_and_angular_momentum(tmp_path, fric):
     clumps.clump(sim, tmp_path / "two.clumps")
     properties.prop(sim, density=3.0, kn=2e5, ks=1e5, fric=fric)
     properties.prop(sim, only(0), xv=1.0, yv=0.2, spin=1.5)
-    running.prepare(sim)
+    cycles.prepare(sim)
 
     def kept() -> np.ndarray:
-        c = observe.clumps(sim)
+        c = diagnostics.clumps(sim)
         m, i = c["mass"], c["inertia"]
         turning = m * (c["x"] * c["vy"] - c["y"] * c["vx"]) + i * c["spin"]
         return np.array([(m * c["vx"]).sum(), (m * c["vy"]).sum(), turning.sum()])
 
-    before, energy = kept(), observe.kinetic_energy(sim)
+    before, energy = kept(), diagnostics.kinetic_energy(sim)
     touched = False
     for _ in range(300):
         steps(sim, 100)
-        touched |= bool(len(observe.contact_rows(sim)[0]))
-    assert touched and not len(observe.contact_rows(sim)[0])
-    change = observe.clumps(sim)["spin"]
+        touched |= bool(len(diagnostics.contact_rows(sim)[0]))
+    assert touched and not len(diagnostics.contact_rows(sim)[0])
+    change = diagnostics.clumps(sim)["spin"]
     assert abs(change[1]) > 0.05
     assert kept() == pytest.approx(before, rel=1e-10)
     if fric == 0.0:
-        assert observe.kinetic_energy(sim) == pytest.approx(energy, rel=1e-4)
+        assert diagnostics.kinetic_energy(sim) == pytest.approx(energy, rel=1e-4)
     else:
-        assert observe.kinetic_energy(sim) < energy
+        assert diagnostics.kinetic_energy(sim) < energy

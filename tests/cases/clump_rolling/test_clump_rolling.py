@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import clumps, properties, running, walls
+from hpcdem.commands.dem import clumps, cycles, properties, walls
 from hpcdem.io.clumps import write_clumps
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from tests.cases.clump_rolling import exact
 from tests.clumped import bodies
 from tests.support import model, steps
@@ -30,13 +30,13 @@ def rolls(folder, alpha: float, mu: float, discs: np.ndarray, area: float, momen
     )
     clumps.clump(sim, folder / "one.clumps")
     properties.prop(sim, density=DENSITY, kn=2.0 * k, ks=2.0 * k, fric=1.0)
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
 def motion(sim, alpha: float) -> tuple[float, float]:
     """Speed down the plane [m/s] and spin [rad/s]."""
-    c = observe.clumps(sim)
+    c = diagnostics.clumps(sim)
     return float(c["vx"][0] * math.cos(alpha) - c["vy"][0] * math.sin(alpha)), float(c["spin"][0])
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, walls
-from hpcdem.physics.dem import observe
+from hpcdem.commands.dem import cycles, particles, properties, walls
+from hpcdem.physics.dem import diagnostics
 from tests.cases.columns import exact
 from tests.support import at_wall, model, pair, value
 
@@ -18,7 +18,7 @@ def settle(folder, n: int, steps: int, dt: float, damp: float = 0.4, **law):
     for j in range(n):
         particles.ball(sim, j, 0.0, exact.RADIUS * (2.0 * (n - j) - 1.0), exact.RADIUS)
     properties.prop(sim, density=exact.DENSITY, damp=damp, **law)
-    running.cycle(sim, steps)
+    cycles.cycle(sim, steps)
     return sim
 
 
@@ -42,7 +42,7 @@ def test_v10_ten_hertz_balls(tmp_path):
     assert u.sum() == pytest.approx(26.6879, rel=1e-3)
     y = np.array([value(sim, "y", j) for j in range(10)])
     assert y == pytest.approx(exact.heights(exact.hertz(10)), abs=1e-3)
-    assert observe.wall_forces(sim)[0] == pytest.approx([0.0, -10.0 * exact.MASS * exact.GRAVITY], rel=1e-3)
+    assert diagnostics.wall_forces(sim)[0] == pytest.approx([0.0, -10.0 * exact.MASS * exact.GRAVITY], rel=1e-3)
     assert not sim.particles["x"].any(), "a straight column stays straight"
 
 

@@ -15,9 +15,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, particles, properties, running, walls
+from hpcdem.commands.dem import bonds, cycles, particles, properties, walls
 from hpcdem.core.selection import Ids
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.runtime.progress import Log
 from tests.support import body, model, only, steps, value
 
@@ -29,7 +29,7 @@ def chain(folder, n: int, dt: float = 1e-4, **law):
     sim = model(folder, dt)
     particles.gline(sim, (0.0, 0.0), (2.0 * R * (n - 0.5), 0.0), R)
     properties.prop(sim, density=1000.0, **{"kn": KN, **law})
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
@@ -38,7 +38,7 @@ def chain(folder, n: int, dt: float = 1e-4, **law):
 def test_free_chain(tmp_path, n):
     sim = chain(tmp_path, n)
     expected = 2.0 * math.sqrt(K / body(sim)[0]) * math.cos(math.pi / (2 * n))
-    found = observe.highest_frequency(sim)
+    found = diagnostics.highest_frequency(sim)
     assert found == pytest.approx(expected, rel=1e-3) and found <= expected * (1.0 + 1e-12)
 
 
@@ -47,28 +47,28 @@ def test_chain_between_walls(tmp_path, n):
     sim = chain(tmp_path, n)
     for wall, x in enumerate((-R + 1e-9, 2.0 * R * n - R - 1e-9)):  # a disc that only touches a wall has no contact
         walls.wall(sim, wall, ((x, -2.0), (x, 2.0)), kn=KN)
-    running.prepare(sim)
+    cycles.prepare(sim)
     expected = 2.0 * math.sqrt(K / body(sim)[0]) * math.cos(math.pi / (2 * (n + 1)))
-    assert observe.highest_frequency(sim) == pytest.approx(expected, rel=1e-3)
+    assert diagnostics.highest_frequency(sim) == pytest.approx(expected, rel=1e-3)
 
 
 def test_shear_and_rotation(tmp_path):
     sim = chain(tmp_path, 2, kn=1e-3, ks=KN, fric=0.5)
-    assert observe.highest_frequency(sim) == pytest.approx(math.sqrt(6.0 * K / body(sim)[0]), rel=1e-6)
+    assert diagnostics.highest_frequency(sim) == pytest.approx(math.sqrt(6.0 * K / body(sim)[0]), rel=1e-6)
     properties.prop(sim, fric=0.0)
-    running.prepare(sim)
+    cycles.prepare(sim)
     slips = math.sqrt(2.0 * 0.5e-3 / body(sim)[0])
-    assert observe.highest_frequency(sim) == pytest.approx(slips, rel=1e-6), "without friction nothing holds"
+    assert diagnostics.highest_frequency(sim) == pytest.approx(slips, rel=1e-6), "without friction nothing holds"
 
 
 def test_fixed_directions_do_not_swing(tmp_path):
     sim = chain(tmp_path, 2)
     properties.fix(sim, ("x",))
-    running.prepare(sim)
-    assert observe.highest_frequency(sim) == pytest.approx(0.0, abs=1e-6)
+    cycles.prepare(sim)
+    assert diagnostics.highest_frequency(sim) == pytest.approx(0.0, abs=1e-6)
     properties.fix(sim, ("y", "spin"))
-    running.prepare(sim)
-    assert observe.highest_frequency(sim) == 0.0
+    cycles.prepare(sim)
+    assert diagnostics.highest_frequency(sim) == 0.0
 
 
 def bed(folder, threads: int = 1):
@@ -83,7 +83,7 @@ def bed(folder, threads: int = 1):
     properties.prop(sim, density=2000.0, shear=1e8, poiss=0.25, hertz=True, fric=0.4)
     bonds.bond(sim, ebmod=4e8, gbmod=3e8, tstrength=1e12, sstrength=1e12, tolerate=0.2)
     properties.fix(sim, ("x", "spin"), Ids(0, 2))
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
@@ -133,21 +133,21 @@ def by_matrix(sim) -> float:
 
 def test_against_the_matrix(tmp_path):
     sim = bed(tmp_path)
-    overlaps = observe.contact_rows(sim)[0][:, observe.OVERLAP]
+    overlaps = diagnostics.contact_rows(sim)[0][:, diagnostics.OVERLAP]
     assert (overlaps < 0.0).sum() > 3 and (overlaps > 0.0).sum() > 50, "bonds both open and closed"
-    found, expected = observe.highest_frequency(sim, within=1e-8), by_matrix(sim)
+    found, expected = diagnostics.highest_frequency(sim, within=1e-8), by_matrix(sim)
     assert found == pytest.approx(expected, rel=1e-6)
-    assert observe.highest_frequency(sim) == pytest.approx(expected, rel=2e-3)
+    assert diagnostics.highest_frequency(sim) == pytest.approx(expected, rel=2e-3)
 
 
 def test_threads_and_looking_change_no_bit(tmp_path):
     one, three = bed(tmp_path, 1), bed(tmp_path, 3)
-    assert observe.highest_frequency(one) == observe.highest_frequency(three)
+    assert diagnostics.highest_frequency(one) == diagnostics.highest_frequency(three)
     steps(three, 20)
     steps(one, 10)
-    observe.highest_frequency(one)
+    diagnostics.highest_frequency(one)
     steps(one, 10)
-    assert observe.fingerprint(one) == observe.fingerprint(three)
+    assert diagnostics.fingerprint(one) == diagnostics.fingerprint(three)
 
 
 @pytest.mark.parametrize(("factor", "n", "stable"), [(0.98, 400, True), (1.02, 25, False)])
@@ -156,8 +156,8 @@ def test_it_is_the_limit_of_stability(tmp_path, factor, n, stable):
     |z| = 1.49 a step, z^2 - (2 - 2.04^2) z + 1 = 0: by 2e4 in 25 steps."""
     sim = chain(tmp_path, 5)
     bonds.bond(sim, n_bond=1e30, s_bond=1e30)
-    running.prepare(sim)
-    sim.settings.dt = factor * 2.0 / observe.highest_frequency(sim)
+    cycles.prepare(sim)
+    sim.settings.dt = factor * 2.0 / diagnostics.highest_frequency(sim)
     for gid in range(5):
         properties.prop(sim, only(gid), xv=1e-6 * (-1) ** gid)
     steps(sim, n)
@@ -169,9 +169,9 @@ def test_what_the_log_says(tmp_path):
     said = {}
     for factor in (0.25, 0.7, 1.1):
         sim = chain(tmp_path, 5)
-        sim.settings.dt = factor * 2.0 / observe.highest_frequency(sim)
+        sim.settings.dt = factor * 2.0 / diagnostics.highest_frequency(sim)
         sim.log = Log(stream=io.StringIO())
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
         said[factor] = sim.log._stream.getvalue()
     assert "2 / omega" not in said[0.25]
     assert "0.70 of 2 / omega" in said[0.7] and "unstable" not in said[0.7]

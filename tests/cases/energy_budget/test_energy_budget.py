@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import bonds, particles, properties, running, settings, walls
+from hpcdem.commands.dem import bonds, cycles, particles, properties, settings, walls
 from hpcdem.core.selection import Ids
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Energy, stored_energy
 from hpcdem.physics.dem.simulation import Watcher
 from tests.cases.elastic_bond import exact as bond
@@ -39,10 +39,10 @@ def one_ball(folder, dt: float, hertz: bool = False, **options):
 def test_linear_bounce_to_the_last_digit(tmp_path, dt):
     """It closes at every step in contact; the step in which it leaves does half a spring force too much on the gap."""
     sim = one_ball(tmp_path, dt)
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
     (mass, _), last = body(sim), 0.0
     for _ in range(round(4.0 * math.sqrt(mass / 1e6) / dt)):
-        running.cycle(sim, 1)
+        cycles.cycle(sim, 1)
         seen, contact = budget(sim), at_wall(sim)
         if contact is None:
             break
@@ -59,12 +59,12 @@ def hertz_bounce(folder, dt: float) -> tuple[float, float, float]:
     """Closing error half way in, largest elastic energy seen [J], mass."""
     sim = one_ball(folder, dt, hertz=True)
     k = exact.hertz_factor(1e6, 0.2, 2.0 * R)
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
     mass, _ = body(sim)
     down = 0.5 * 2.94328 * exact.deepest(mass, 1.0, k)
-    running.cycle(sim, round(0.5 * down / dt))
+    cycles.cycle(sim, round(0.5 * down / dt))
     half_way = budget(sim).closing
-    running.cycle(sim, round(down / dt) - sim.clock.step)
+    cycles.cycle(sim, round(down / dt) - sim.clock.step)
     return half_way, budget(sim).elastic_normal, mass
 
 
@@ -85,7 +85,7 @@ def test_sliding_block(tmp_path):
     held_for_a_step(sim)
     properties.fix(sim, ("y", "spin"))
     properties.prop(sim, xv=5.0)
-    running.cycle(sim, 4000)
+    cycles.cycle(sim, 4000)
     seen, way, strain = budget(sim), value(sim, "x"), mu * n / ks
     assert seen.loss_friction == pytest.approx(mu * n * (way - strain), rel=1e-5)
     assert seen.elastic_shear == pytest.approx(0.5 * mu * n * strain, rel=1e-10)
@@ -98,7 +98,7 @@ def test_damped_fall(tmp_path):
     sim = model(tmp_path, 1e-2, energy=10**6, gravity=(0.0, -9.8))
     particles.ball(sim, 0, 0.0, 100.0, R)
     properties.prop(sim, density=1000.0, damp=0.4, yv=-1.0)
-    running.cycle(sim, 200)
+    cycles.cycle(sim, 200)
     seen, work = budget(sim), body(sim)[0] * 9.8 * (100.0 - value(sim, "y"))
     assert seen.work_gravity == pytest.approx(work, rel=1e-12)
     assert seen.loss_local_damping == pytest.approx(0.4 * work, rel=1e-12)
@@ -109,7 +109,7 @@ def test_lattice_solid_damping(tmp_path):
     sim = model(tmp_path, 1e-2, energy=10**6, lsm=1e4)
     particles.ball(sim, 0, 0.0, 0.0, R)
     properties.prop(sim, density=1000.0, xv=3.0)
-    running.cycle(sim, 40)
+    cycles.cycle(sim, 40)
     seen = budget(sim)
     expected = exact.lattice_loss(body(sim)[0], 3.0, 1e4, 1e-2, 40)
     assert seen.loss_lattice_damping == pytest.approx(expected, rel=1e-12) and expected > 100.0
@@ -126,7 +126,7 @@ def test_a_wall_compresses_a_row(tmp_path):
     properties.prop(sim, density=1000.0, kn=2e6, damp=0.3)
     properties.fix(sim, ("y", "spin"))
     walls.wall(sim, 1, xv=-0.05)
-    running.imple(sim, 1, xmove=-0.3)
+    cycles.imple(sim, 1, xmove=-0.3)
     seen = budget(sim)
     stored = 0.3**2 / (2.0 * 6.0 / 1e6)
     assert seen.elastic_normal == pytest.approx(stored, rel=0.02)
@@ -142,7 +142,7 @@ def sheared(folder, u: float = 0.5, fric: float = 10.0):
     particles.ball(sim, 1, 2.0 * bond.RADIUS - u, 0.0, bond.RADIUS)
     properties.prop(sim, density=1.0, shear=bond.SHEAR, poiss=bond.NU, hertz=True, fric=fric)
     properties.fix(sim, ("x", "y", "spin"))
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     return sim
 
 
@@ -151,9 +151,9 @@ def move(sim, x: float = 0.0, slide: float = 0.0, n: int = 100) -> None:
     t = n * sim.settings.dt
     arm = bond.RADIUS - 0.5 * (pair(sim).overlap if pair(sim) else 0.0)
     properties.prop(sim, only(1), xv=x / t, spin=-slide / arm / t)
-    running.cycle(sim, n)
+    cycles.cycle(sim, n)
     properties.prop(sim, only(1), xv=0.0, spin=0.0)
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
 
 
 def test_stiffness_of_mindlin(tmp_path):
@@ -188,13 +188,13 @@ def deep_in_walls(folder, *ends, start: tuple[float, float]):
     particles.ball(sim, 0, *start, R)
     properties.prop(sim, density=1000.0, kn=2e6)
     properties.fix(sim, ("x", "y", "spin"))
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     return sim
 
 
 def lead(sim, x: float, y: float, n: int) -> None:
     properties.prop(sim, xv=x / (n * sim.settings.dt), yv=y / (n * sim.settings.dt))
-    running.cycle(sim, n)
+    cycles.cycle(sim, n)
 
 
 def test_a_wall_contact_is_dropped_in_a_corner(tmp_path):
@@ -226,7 +226,7 @@ def test_a_bond_breaks_in_tension(tmp_path, n):
     """The released energy is S g^2 / 2 up to the last step; the work of pulling equals it to rounding."""
     sim = sheared(tmp_path, u=0.0)
     bonds.bond(sim, ebmod=bond.E, gbmod=bond.G, tstrength=bond.T, sstrength=bond.C)
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     move(sim, x=0.5 * bond.GAP, n=n)
     seen = budget(sim)
     assert seen.elastic_bonds == pytest.approx(0.125 * bond.STIFFNESS * bond.GAP**2, rel=1e-9)
@@ -242,7 +242,7 @@ def test_a_bond_breaks_in_shear(tmp_path):
     """Loaded to C A + mu Fn the spring holds Fs^2/(2 ks); mu Fn is left, and friction from then on."""
     sim = sheared(tmp_path, u=0.5, fric=bond.MU)
     bonds.bond(sim, ebmod=bond.E, gbmod=bond.G, tstrength=bond.T, sstrength=bond.C)
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     limit = bond.C * bond.AREA + bond.MU * bond.normal_force(0.5)
     ks, left = bond.shear_stiffness(0.5), bond.MU * bond.normal_force(0.5)
     move(sim, slide=limit / ks * 1.001, n=2000)
@@ -262,20 +262,20 @@ def test_commands_are_booked_as_such(tmp_path):
     for gid in range(2):
         particles.ball(sim, gid, 3.0 * gid, 0.0, R)
     properties.prop(sim, density=1000.0, kn=2e6)
-    running.cycle(sim, 2)
+    cycles.cycle(sim, 2)
     assert budget(sim).commands == 0.0
     properties.prop(sim, only(0), xv=2.0)
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
     mass, _ = body(sim)
     assert budget(sim).commands == pytest.approx(2.0 * mass, rel=1e-12)
     particles.ball(sim, 2, 4.9, 0.0, R)
     properties.prop(sim, only(2), density=1000.0, kn=2e6)
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
     assert budget(sim).commands == pytest.approx(2.0 * mass + 0.5 * 1e6 * 0.1**2, rel=1e-10)
-    running.cycle(sim, 20)
+    cycles.cycle(sim, 20)
     before = budget(sim)
     particles.delete(sim, only(0))
-    running.cycle(sim, 0)
+    cycles.cycle(sim, 0)
     assert budget(sim).commands == pytest.approx(before.commands - 2.0 * mass, rel=1e-12)
     assert abs(budget(sim).closing) < 1e-3 * mass, "the pair pushed apart, to second order"
 
@@ -287,7 +287,7 @@ def test_particles_that_leave_the_box_take_their_energy(tmp_path):
         particles.ball(sim, gid, 0.0, 4.0 * gid - 4.0, R)
     properties.prop(sim, density=1000.0, kn=2e6)
     properties.prop(sim, only(1), xv=20.0)
-    running.cycle(sim, 200)
+    cycles.cycle(sim, 200)
     seen = budget(sim)
     assert sim.lost == 1 and len(sim.particles) == 2
     assert seen.box == pytest.approx(-0.5 * body(sim, 0)[0] * 400.0, rel=1e-12) and seen.closing == 0.0
@@ -300,7 +300,7 @@ def bed(folder, dt: float, seconds: float = 12.0, account: int = 10**6, looks: i
     """Some 300 spheres fall, are bonded, pushed by a wall; some are deleted, a base is driven; all kinds of losses."""
     sim = model(folder, dt, disk="off", energy=account, gravity=(0.0, -9.8), lsm=2e6)
     if looks:
-        sim.watchers.append(Watcher(looks, lambda: observe.critical_dt(sim) < 0.0))
+        sim.watchers.append(Watcher(looks, lambda: diagnostics.critical_dt(sim) < 0.0))
     walls.box(sim, 0.0, 4200.0, -10.0, 4000.0)
     walls.wall(sim, 0, ((0.0, 10.0), (4100.0, 10.0)), fric=0.2, kn=1e10, ks=1e10)
     walls.wall(sim, 1, ((10.0, 3900.0), (10.0, 10.0)), kn=1e10, ks=1e10)
@@ -309,14 +309,14 @@ def bed(folder, dt: float, seconds: float = 12.0, account: int = 10**6, looks: i
     law = {"kn": 1e10, "ks": 1e10} if linear else {"shear": 2.9e9, "poiss": 0.2, "hertz": True}
     properties.prop(sim, density=2.5e3, fric=0.3, damp=0.2, **law)
     n = round(seconds / dt)
-    running.cycle(sim, n)
+    cycles.cycle(sim, n)
     bonds.bond(sim, ebmod=2e8, gbmod=2e8, tstrength=1e6, sstrength=1e6, fric=0.3)
     properties.fix(sim, ("x", "y", "spin"), Ids(0, 4))
     properties.prop(sim, Ids(0, 4), xv=1.0)
     walls.wall(sim, 1, xv=20.0)
-    running.cycle(sim, n)
+    cycles.cycle(sim, n)
     particles.delete(sim, Ids(100, 110))
-    running.cycle(sim, n)
+    cycles.cycle(sim, n)
     return sim
 
 
@@ -346,7 +346,7 @@ def test_looking_and_booking_change_no_bit(tmp_path):
         bed(tmp_path / str(k), 0.05, 4.0, account, looks)
         for k, (account, looks) in enumerate([(50, 0), (0, 0), (50, 7)])
     )
-    assert observe.fingerprint(with_it) == observe.fingerprint(without) == observe.fingerprint(looked_at)
+    assert diagnostics.fingerprint(with_it) == diagnostics.fingerprint(without) == diagnostics.fingerprint(looked_at)
     assert budget(with_it) == budget(looked_at) and without.energy is None
     assert (tmp_path / "0/energy.csv").read_bytes() == (tmp_path / "2/energy.csv").read_bytes()
     assert not (tmp_path / "1/energy.csv").exists()
@@ -356,8 +356,8 @@ def test_the_file(tmp_path):
     """The first row is the beginning, then one per interval; the numbers are those of the budget."""
     sim = one_ball(tmp_path, 1e-3)
     settings.set_option(sim, "energy", 10)
-    running.cycle(sim, 25)
-    running.cycle(sim, 15)
+    cycles.cycle(sim, 25)
+    cycles.cycle(sim, 15)
     with open(tmp_path / "energy.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["step"]) for row in rows] == [0, 10, 20, 30, 40]
@@ -369,7 +369,7 @@ def test_the_file(tmp_path):
 
 def test_numbers_that_are_none_do_not_hide(tmp_path):
     sim = one_ball(tmp_path, 1e-3)
-    running.cycle(sim, 1)
+    cycles.cycle(sim, 1)
     sim.energy.accounts[0] += sim.energy._integer(np.zeros((2, 2112), np.int64))
     bad = np.zeros((2, 2112), np.int64)
     bad[1, 0] = 1

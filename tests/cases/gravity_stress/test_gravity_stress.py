@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.selection import Interval
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 from tests import support
 
@@ -38,12 +38,19 @@ def particle_stress(sim: Simulation) -> np.ndarray:
         at = order[np.searchsorted(gids, ids)]
         np.subtract.at(total, at, (place - centre[at])[:, :, None] * force[:, None, :])
 
-    out, ids = observe.contact_rows(sim)
-    force, place = out[:, observe.FORCE_X : observe.FORCE_Y + 1], out[:, observe.AT_X : observe.AT_Y + 1]
+    out, ids = diagnostics.contact_rows(sim)
+    force, place = (
+        out[:, diagnostics.FORCE_X : diagnostics.FORCE_Y + 1],
+        out[:, diagnostics.AT_X : diagnostics.AT_Y + 1],
+    )
     add(ids[:, 0], force, place)
     add(ids[:, 1], -force, place)
-    out, ids = observe.wall_rows(sim)
-    add(ids[:, 0], out[:, observe.FORCE_X : observe.FORCE_Y + 1], out[:, observe.AT_X : observe.AT_Y + 1])
+    out, ids = diagnostics.wall_rows(sim)
+    add(
+        ids[:, 0],
+        out[:, diagnostics.FORCE_X : diagnostics.FORCE_Y + 1],
+        out[:, diagnostics.AT_X : diagnostics.AT_Y + 1],
+    )
     return total
 
 
@@ -122,5 +129,5 @@ def test_published_bed(manual_scripts: Path) -> None:
     walls.wall(sim, 1, ((10.0, 10000.0), (10.0, 10.0)))
     walls.wall(sim, 2, ((40000.0, 10.0), (40000.0, 10000.0)))
     properties.prop(sim, **PROPERTIES)
-    running.prepare(sim)
+    cycles.prepare(sim)
     check(sim, 39990.0)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, walls
+from hpcdem.commands.dem import cycles, particles, properties, walls
 from tests.cases.oblique_impact import exact
 from tests.support import body, model, steps, value, velocity
 
@@ -21,7 +21,7 @@ def test_v14_gross_slip(tmp_path, disk, slope):
     particles.ball(sim, 0, *(exact.RADIUS * n), exact.RADIUS)
     properties.prop(sim, density=exact.DENSITY)
     walls.wall(sim, 0, (tuple(-9.0 * t), tuple(9.0 * t)), fric=exact.MU)
-    running.prepare(sim)
+    cycles.prepare(sim)
     mass, inertia = body(sim)
     kn = 2.0 * mass * exact.W**2
     walls.wall(sim, 0, kn=kn, ks=kn)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import bonds, particles, properties
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from tests.support import force, model, steps
 
 
@@ -60,7 +60,7 @@ def test_v23_only_nearest_neighbours_are_bonded(tmp_path, angle, rext, neighbour
     assert made == sum(n - k for k in range(1, neighbours + 1))
     steps(sim, 1)
     assert sim.bonds_left() == made
-    _, ids = observe.contact_rows(sim)
+    _, ids = diagnostics.contact_rows(sim)
     bonded = ids[ids[:, 2] > 0]
     assert set(map(tuple, bonded[:, :2])) == {(i, i + k) for k in range(1, neighbours + 1) for i in range(n - k)}
     # Overlapping neighbours (k = 1 and 2) push with the full radii whether they are bonded or not.

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.selection import Interval
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
 
 G = 9.8
@@ -41,25 +41,25 @@ def bed(manual_scripts: Path) -> Simulation:
     sim = Simulation()
     particles.load(sim, manual_scripts / "init_xyr.dat")
     deck(sim)
-    running.prepare(sim)
+    cycles.prepare(sim)
     return sim
 
 
 def floor_force(sim: Simulation) -> float:
     """Force on floor and BOX bottom over the total weight."""
-    force = observe.wall_forces(sim)
+    force = diagnostics.wall_forces(sim)
     carried = -(force[sim.walls.row(0), 1] + force[sim.walls.row(100), 1])
     return carried / (sim.body[:, 0].sum() * G)
 
 
 def test_cuts_carry_the_weight_above(bed: Simulation) -> None:
     """A2: at all 16 depths within 0.5 %; coordination 4.92 and K0 = 0.98 of the published state."""
-    out, iout = observe.contact_rows(bed)
+    out, iout = diagnostics.contact_rows(bed)
     p = bed.particles
     row = np.argsort(p["gid"])
     y, weight = p["y"], bed.body[:, 0] * G
     first, second = row[iout[:, 0]], row[iout[:, 1]]
-    fy_first = out[:, observe.FORCE_Y]
+    fy_first = out[:, diagnostics.FORCE_Y]
     for depth in np.linspace(300.0, 3800.0, 16):
         first_above, second_above = y[first] > depth, y[second] > depth
         lifted = fy_first[first_above & ~second_above].sum() - fy_first[~first_above & second_above].sum()
@@ -71,7 +71,7 @@ def test_cuts_carry_the_weight_above(bed: Simulation) -> None:
     heights = np.linspace(10.0, 4110.0, 400)
     above = np.array([weight[y > h].sum() for h in heights])
     vertical = float(((above[1:] + above[:-1]) / 2.0 * np.diff(heights)).sum()) / 39950.0
-    x, fx_first = p["x"], out[:, observe.FORCE_X]
+    x, fx_first = p["x"], out[:, diagnostics.FORCE_X]
     pushed = []
     for at in np.linspace(3000.0, 37000.0, 16):
         left, right = x[first] < at, x[second] < at
@@ -98,11 +98,11 @@ def test_settling_reproduces_the_published_bed() -> None:
     deck(sim)
     particles.gen(sim, 100000, [60.0, 80.0], (10.0, 40000.0), (10.0, 10000.0))
     properties.prop(sim, density=2.5e3, fric=0.0, shear=2.9e9, poiss=0.2, damp=0.4, hertz=True)
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(5000):
         sim.step()
     particles.delete(sim, Interval("y", 4000.0, 999000.0))
-    running.prepare(sim)
+    cycles.prepare(sim)
     for _ in range(1000):
         sim.step()
     p = sim.particles

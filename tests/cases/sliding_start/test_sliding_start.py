@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, walls
+from hpcdem.commands.dem import cycles, particles, properties, walls
 from tests.cases.sliding_start import exact
 from tests.support import at_wall, body, held_for_a_step, model, value, watch
 
@@ -18,7 +18,7 @@ def test_v17_the_ball_ends_up_rolling(tmp_path, disk):
     walls.wall(sim, 0, ((-10.0, 0.0), (80.0, 0.0)), fric=exact.MU)
     particles.ball(sim, 0, 0.0, exact.RADIUS - exact.GRAVITY / W**2, exact.RADIUS)
     properties.prop(sim, density=exact.DENSITY, fric=1.0)
-    running.prepare(sim)
+    cycles.prepare(sim)
     mass, inertia = body(sim)
     walls.wall(sim, 0, kn=2.0 * mass * W**2, ks=2.0 * mass * W**2)
     properties.prop(sim, kn=2.0 * mass * W**2, ks=2.0 * mass * W**2)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, walls
+from hpcdem.commands.dem import cycles, particles, properties, walls
 from tests.cases.slope import exact
 from tests.support import at_wall, body, held_for_a_step, model, position, value, velocity, watch
 
@@ -24,7 +24,7 @@ def on_slope(folder, angle: float, mu: float, disk: str, damp: float = 0.0, fix:
     start = (exact.RADIUS - exact.GRAVITY * math.cos(angle) / W**2) * out
     particles.ball(sim, 0, *start, exact.RADIUS)
     properties.prop(sim, density=exact.DENSITY, fric=1.0, damp=damp)
-    running.prepare(sim)
+    cycles.prepare(sim)
     k = body(sim)[0] * W**2
     walls.wall(sim, 0, kn=2.0 * k, ks=2.0 * k)
     properties.prop(sim, kn=2.0 * k, ks=2.0 * k)

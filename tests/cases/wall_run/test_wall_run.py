@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import pytest
 
-from hpcdem.commands.dem import particles, properties, running, settings, walls
+from hpcdem.commands.dem import cycles, particles, properties, settings, walls
 from hpcdem.core.errors import CommandError
 from hpcdem.io.frames import list_frames, read_frame
 from tests.support import model, position, value
@@ -37,7 +37,7 @@ def stems(*steps: int, ini: tuple[int, ...] = (), suffix: str = ".dat") -> list[
 
 def test_v24_a_wall_goes_3000_m(tmp_path):
     sim = flight(tmp_path)
-    running.imple(sim, 4, xmove=3000.0, print=1000.0)
+    cycles.imple(sim, 4, xmove=3000.0, print=1000.0)
     assert sim.clock.step == 30000 and sim.clock.time == pytest.approx(1500.0, rel=1e-12)
     for suffix in (".dat", ".vtkhdf"):
         assert names(tmp_path, suffix) == stems(10000, 20000, 30000, ini=(0,), suffix=suffix)
@@ -58,9 +58,9 @@ def test_way_of_a_wall_counts_from_the_start_of_the_command(tmp_path):
     """CYC 7 printing every 5 steps, then IMPLE over 3 m (30 steps) printing and saving every metre."""
     sim = flight(tmp_path)
     settings.set_option(sim, "print", 5)
-    running.cycle(sim, 7)
-    running.imple(sim, 4, xmove=3.0, print=1.0, save=1.5, vtk=3.0, ps=2.0)
-    running.cycle(sim, 8)
+    cycles.cycle(sim, 7)
+    cycles.imple(sim, 4, xmove=3.0, print=1.0, save=1.5, vtk=3.0, ps=2.0)
+    cycles.cycle(sim, 8)
     assert names(tmp_path, ".dat") == stems(5, 17, 27, 37, 40, 45, ini=(0, 7, 37))
     assert names(tmp_path, ".sav") == ["0000000022.sav", "0000000037.sav"]
     assert names(tmp_path, ".vtk") == ["all_0000000037.vtk", "wall_0000000037.vtk"]
@@ -70,12 +70,12 @@ def test_way_of_a_wall_counts_from_the_start_of_the_command(tmp_path):
 def test_v24_the_manuals_list_of_ini_files(tmp_path):
     """Six commands of the lengths in the manual's example, a thousandth of it."""
     sim = flight(tmp_path)
-    running.cycle(sim, 0)
-    running.imple(sim, 4, xmove=0.5)
-    running.cycle(sim, 1)
-    running.imple(sim, 4, xmove=3.0)
-    running.cycle(sim, 20)
-    running.imple(sim, 4, xmove=0.2)
+    cycles.cycle(sim, 0)
+    cycles.imple(sim, 4, xmove=0.5)
+    cycles.cycle(sim, 1)
+    cycles.imple(sim, 4, xmove=3.0)
+    cycles.cycle(sim, 20)
+    cycles.imple(sim, 4, xmove=0.2)
     assert names(tmp_path, "_ini.dat") == stems(ini=(0, 5, 6, 36, 56))
     assert names(tmp_path, ".dat") == stems(5, 36, 58, ini=(0, 5, 6, 36, 56))
 
@@ -83,9 +83,9 @@ def test_v24_the_manuals_list_of_ini_files(tmp_path):
 def test_frames_of_a_step_are_written_anew_when_the_model_was_changed(tmp_path):
     """By the next command, if the one before has made no step."""
     sim = flight(tmp_path)
-    running.imple(sim, 4, xmove=0.0)
+    cycles.imple(sim, 4, xmove=0.0)
     properties.prop(sim, xv=-7.0)
-    running.imple(sim, 4, xmove=0.0)
+    cycles.imple(sim, 4, xmove=0.0)
     assert names(tmp_path, ".dat") == stems(0, ini=(0,))
     for path in (tmp_path / "data").glob("all_*"):
         assert read_frame(path).tables["particles"].columns["vx"] == [-7.0]
@@ -94,23 +94,23 @@ def test_frames_of_a_step_are_written_anew_when_the_model_was_changed(tmp_path):
 @pytest.mark.parametrize(("way", "steps"), [(0.1, 1), (0.14, 1), (0.16, 2), (0.7, 7), (0.04, 0), (1e-9, 0)])
 def test_the_number_of_steps_is_the_nearest_one(tmp_path, way, steps):
     sim = flight(tmp_path)
-    running.imple(sim, 4, xmove=way)
+    cycles.imple(sim, 4, xmove=way)
     assert sim.clock.step == steps
 
 
 def test_the_way_is_taken_as_positive(tmp_path):
     """Also up and down, and against the sign of the velocity."""
     sim = flight(tmp_path)
-    running.imple(sim, 4, xmove=-1.0)
+    cycles.imple(sim, 4, xmove=-1.0)
     assert sim.clock.step == 10 and sim.walls.p1[0] == pytest.approx([1.0, 0.0])
     walls.wall(sim, 4, xv=0.0, yv=-4.0)
-    running.imple(sim, 4, ymove=2.0)
+    cycles.imple(sim, 4, ymove=2.0)
     assert sim.clock.step == 20 and sim.walls.p2[0] == pytest.approx([1.0, 98.0])
 
 
 def test_a_wall_that_stands_is_an_error(tmp_path):
     sim = flight(tmp_path)
     with pytest.raises(CommandError, match="wall 4 does not move"):
-        running.imple(sim, 4, ymove=1.0)
+        cycles.imple(sim, 4, ymove=1.0)
     with pytest.raises(CommandError, match="no wall with id 5"):
-        running.imple(sim, 5, xmove=1.0)
+        cycles.imple(sim, 5, xmove=1.0)

@@ -50,7 +50,7 @@ PAIR = 4
 ALL_EDGES = 4 * 63
 # What a pair remembers (m, 6): F_s [N/m] of the edges of the first, then of the second triangle.
 EDGES = 6
-# Normal damping, where a model asks for it: table (m, 3) of T [Pa], exponent b, dashpot [Pa s/m], memory (m, 12):
+# Normal damping, where a model asks for it: table (m, 3) of T [Pa], exponent b, dashpot [Pa s/m], history (m, 12):
 # largest overlap [m] of the six edges, then the normal stress there [Pa].
 LARGEST_STRESS, EXPONENT, DASHPOT = 0, 1, 2
 DAMPER = 3
@@ -260,10 +260,10 @@ def _edge_loop(side, m):
     """The loop over edge m of triangle A (side 0) or B in the other one; it adds to the lanes FORCES... One function
     each: distances between lanes must be constants."""
     own, other = (_A, _B) if side == 0 else (_B, _A)
-    mine, hers = (_VA, _VB) if side == 0 else (_VB, _VA)
+    mine, other = (_VA, _VB) if side == 0 else (_VB, _VA)
     m2 = (m + 1) % 3
     (xa, ya), (xb, yb), (ua, wa), (ub, wb) = own[m], own[m2], mine[m], mine[m2]
-    (u1, w1), (u2, w2), (u3, w3) = hers
+    (u1, w1), (u2, w2), (u3, w3) = other
     (a1, a2, a3), (b1, b2, b3) = (_IN_B, _IN_A)[side][m], (_IN_B, _IN_A)[side][m2]
     old, aside, on = lane(36 + 3 * side + m), (WITHIN_B, WITHIN_A)[side], lane(ON + 3 * side + m)
     first, second, target = (lane(FORCES + k) for k in (6 * side + 2 * m, 6 * side + 2 * m2, 6 - 6 * side))
@@ -447,7 +447,7 @@ def _damped_edges(n, slots, dampers, largest, dt, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, dt, lanes):
+def _law(n, slots, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, dt, lanes):
     """Forces of n overlapping pairs into the lanes FORCES...; their histories move on by dt."""
     _corners(0, n, slots, first, second, x_place, x, lanes, AX1, BX1)
     _corners(0, n, slots, first, second, v_place, v, lanes, AVX1, BVX1)
@@ -456,9 +456,9 @@ def _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers
         four_columns(lanes, P + e, pairs, (k0 * _FOUR, k1 * _FOUR, k2 * _FOUR, k3 * _FOUR))
         six = U(EDGES)
         at = (k0 * six, k1 * six, k2 * six, k3 * six)
-        four_columns(lanes, FS + e, memory, at)
+        four_columns(lanes, FS + e, history, at)
         two_columns(
-            lanes, FS + U(4 * CAPACITY) + e, memory, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
+            lanes, FS + U(4 * CAPACITY) + e, history, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
         )
     for e in range(U(n)):
         code = as_bits(lanes[WHICH + e])
@@ -482,7 +482,7 @@ def _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _put(n, slots, out, memory, lanes):
+def _put(n, slots, out, history, lanes):
     """Forces and histories of n pairs from lanes to their rows."""
     forces, twelve, six = U(FORCES * CAPACITY), U(12), U(EDGES)
     whole = n // GROUP * GROUP
@@ -492,25 +492,30 @@ def _put(n, slots, out, memory, lanes):
             at = (k0 * twelve + c, k1 * twelve + c, k2 * twelve + c, k3 * twelve + c)
             put_four_columns(out, at, lanes, forces + c * U(CAPACITY) + e)
         at = (k0 * six, k1 * six, k2 * six, k3 * six)
-        put_four_columns(memory, at, lanes, FS + e)
+        put_four_columns(history, at, lanes, FS + e)
         at = (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
-        put_two_columns(memory, at, lanes, FS + U(4 * CAPACITY) + e)
+        put_two_columns(history, at, lanes, FS + U(4 * CAPACITY) + e)
     for e in range(U(whole), U(n)):
         k = U(slots[e])
         for c in range(U(12)):
             out[k * twelve + c] = lanes[forces + c * U(CAPACITY) + e]
         for c in range(U(EDGES)):
-            memory[k * six + c] = lanes[FS + c * U(CAPACITY) + e]
+            history[k * six + c] = lanes[FS + c * U(CAPACITY) + e]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _forces(
-    t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin, choices,
+    t, threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin, choices,
     touching, out, dt,
 ):  # fmt: skip
     lanes, slots = np.zeros(LANES * CAPACITY), np.zeros(ROOM, np.int64)
     candidates, flags = np.zeros(BATCH + GROUP, np.int64), np.zeros(BATCH + GROUP, np.int64)
-    x, v, pairs, memory = x.reshape(x.size), v.reshape(v.size), pairs.reshape(pairs.size), memory.reshape(memory.size)
+    x, v, pairs, history = (
+        x.reshape(x.size),
+        v.reshape(v.size),
+        pairs.reshape(pairs.size),
+        history.reshape(history.size),
+    )
     dampers, largest, out = dampers.reshape(dampers.size), largest.reshape(largest.size), out.reshape(out.size)
     m = len(first)
     at, stop = m * t // threads, m * (t + 1) // threads
@@ -529,7 +534,7 @@ def _forces(
                 n += flags[e]
                 if touching[k] > flags[e]:
                     for q in range(EDGES):
-                        memory[EDGES * k + q] = 0.0
+                        history[EDGES * k + q] = 0.0
                     for q in range(min(len(largest), 2 * EDGES)):
                         largest[2 * EDGES * k + q] = 0.0
                 touching[k] = flags[e]
@@ -541,8 +546,8 @@ def _forces(
         if len(chosen) > 0:
             _choose(n, slots, first, second, x_place, x, pairs, dampers, chosen, choice_begin, choices)
         if n > 0:
-            _law(n, slots, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, dt, lanes)
-        _put(n, slots, out, memory, lanes)
+            _law(n, slots, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, dt, lanes)
+        _put(n, slots, out, history, lanes)
         n = 0
 
 
@@ -551,7 +556,7 @@ def forces(threads, *args):
     """Forces of all pairs; histories move on by dt.
 
     first, second (m,) i8: bodies of each pair; x_place, v_place (bodies,) i8: where their corners begin in x and v
-    (flat); pairs (m, 4), memory (m, 6), dampers (m, 3), largest (m, 12): see above, the last two without rows if
+    (flat); pairs (m, 4), history (m, 6), dampers (m, 3), largest (m, 12): see above, the last two without rows if
     nothing is damped; chosen (m,) i8: rows whose properties are chosen, number in choice_begin, else -1; choice_begin
     (n + 1,) i8: rows of choices (q, 10); without rows if there are none; touching (m,) u1: pairs that overlap; out
     (m, 12) [N/m]: forces on the corners of the first and of the second body, valid where they touch.
@@ -562,13 +567,13 @@ def forces(threads, *args):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def forces_threaded(
-    threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin, choices,
+    threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin, choices,
     touching, out, dt,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _forces(
-            t, threads, first, second, x_place, v_place, x, v, pairs, memory, dampers, largest, chosen, choice_begin,
+            t, threads, first, second, x_place, v_place, x, v, pairs, history, dampers, largest, chosen, choice_begin,
             choices, touching, out, dt,
         )  # fmt: skip
 

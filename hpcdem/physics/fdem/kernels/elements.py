@@ -21,7 +21,7 @@ from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
 from hpcdem.physics.fdem.kernels import joints, laws
-from hpcdem.physics.fdem.kernels.joints import INTACT, KINETIC, MEMORY, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
+from hpcdem.physics.fdem.kernels.joints import HISTORY, INTACT, KINETIC, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
 
 BLOCK = 64
 """Triangles worked on together: their lanes stay in the first-level cache."""
@@ -230,7 +230,7 @@ def _kinetic(e, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow, table, beyond, step, lanes, tally):
+def _slow_joints(b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally):
     """Joints behind their peak: those on the list of block b, and those that get there now."""
     if _any_past_peak(n, lanes) < 0:
         for e in range(n):
@@ -239,9 +239,9 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow
                 if law[slot] != 0 and lanes[(LEFT0, LEFT1, LEFT2)[k] + U(e)] < 0.0:
                     law[slot], state[slot] = 0, YIELDED
                     follow[slot], head[b] = head[b], slot
-                    for m in range(MEMORY):
-                        memory[slot, m] = 0.0
-                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
+                    for m in range(HISTORY):
+                        history[slot, m] = 0.0
+                    history[slot, PEAK_STEP], history[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
                     tally[NEW_YIELDED] += 1
     slot = head[b]
     while slot >= 0:
@@ -253,12 +253,12 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, memory, head, follow
         row = kind[slot]
         fax, fay, fbx, fby, now = joints.yielded_edge(
             lanes[xa], lanes[xa + _NEXT], lanes[xb], lanes[xb + _NEXT], x[p], x[p + 1], x[p + 2], x[p + 3],
-            table, beyond, row, memory, slot, state[slot],
+            table, beyond, row, history, slot, state[slot],
         )  # fmt: skip
         lanes[out], lanes[out + _NEXT], lanes[out + _B], lanes[out + _B + _NEXT] = fax, fay, fbx, fby
         if now != state[slot]:
             state[slot] = now
-            memory[slot, STEP], memory[slot, KINETIC] = step, _kinetic(e, lanes)
+            history[slot, STEP], history[slot, KINETIC] = step, _kinetic(e, lanes)
             tally[NEW_BROKEN] += 1
         slot = follow[slot]
 
@@ -294,7 +294,7 @@ def _store_joints(n, first, rows, force, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _triangles(
-    t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head, follow,
+    t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
     table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
     of_joints, keep_joints, gx, gy, alpha, step, tally,
 ):  # fmt: skip
@@ -315,7 +315,7 @@ def _triangles(
         _edge_loop_2(n, lanes)
         if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
             _slow_joints(
-                b, n, first, x, partner, law, kind, state, memory, head, follow, table, beyond, step, lanes, tally[t]
+                b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally[t]
             )
         if keep_joints:
             _store_joints(n, first, rows, of_joints, lanes)
@@ -335,7 +335,7 @@ def triangles(threads, *args):
     count: triangles, in storage order; rows (count + 3,) i4: their storage rows; wide: x and v are (n, 12); c
     (count, 12), see `TRIANGLE`; s0 (count, 4) [Pa]: initial stress xx, yy, xy, zz, read if `stressed`; small: small
     strains; partner (3 count,) i4: where in x the partner's edge begins, law (3 count,) i4: row of the table of joint
-    laws as long as the joint is before its peak, else 0; kind: that row whatever its state; state, memory: see
+    laws as long as the joint is before its peak, else 0; kind: that row whatever its state; state, history: see
     joints.py; head (blocks,), follow (3 count,) i4: lists of joints behind their peak; contact_*: which contact forces
     `pushed` (k, 8) fall on which lane of which block; special (count,), some_special (blocks,) bool; force, of_joints
     (n, 8) [N/m]; alpha: local damping; tally (threads, 8) i8.
@@ -346,14 +346,14 @@ def triangles(threads, *args):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def triangles_threaded(
-    threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head, follow,
+    threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
     table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
     of_joints, keep_joints, gx, gy, alpha, step, tally,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _triangles(
-            t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, memory, head,
+            t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
             follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
             of_joints, keep_joints, gx, gy, alpha, step, tally,
         )  # fmt: skip
@@ -501,7 +501,7 @@ def _quad_kinetic(c, vel):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _quads(
-    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
 ):  # fmt: skip
     flat = x.reshape(x.size)
@@ -523,18 +523,18 @@ def _quads(
                 left = joints.past_peak(ax, ay, bx, by, px, py, qx, qy, table[row])
                 if left < 0.0:
                     state[slot] = YIELDED
-                    memory[slot] = 0.0
-                    memory[slot, PEAK_STEP], memory[slot, PEAK_KINETIC] = step, _quad_kinetic(c[i], vel)
+                    history[slot] = 0.0
+                    history[slot, PEAK_STEP], history[slot, PEAK_KINETIC] = step, _quad_kinetic(c[i], vel)
                     tally[t, NEW_YIELDED] += 1
             before = state[slot]
             fax, fay, fbx, fby, now = joints.yielded_edge(
-                ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, before
+                ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, before
             )
             if before == INTACT:
-                memory[slot] = 0.0
+                history[slot] = 0.0
             elif now != before:
                 state[slot] = now
-                memory[slot, STEP], memory[slot, KINETIC] = step, _quad_kinetic(c[i], vel)
+                history[slot, STEP], history[slot, KINETIC] = step, _quad_kinetic(c[i], vel)
                 tally[t, NEW_BROKEN] += 1
             bound[2 * k] += fax
             bound[2 * k + 1] += fay
@@ -560,13 +560,13 @@ def quads(threads, *args):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def quads_threaded(
-    threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+    threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _quads(
-            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, memory, table, beyond,
+            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
             slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
         )  # fmt: skip
 

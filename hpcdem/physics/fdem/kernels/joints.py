@@ -29,7 +29,7 @@ PER_O_T, PER_S_T, PER_KOP, PER_HALF_SHEAR = range(4)
 # broke (0: it has not), at which step, and the kinetic energy of the element at that moment; and step and kinetic
 # energy when it passed its peak.
 OPENED, SLIPPED, DAMAGE, MODE, STEP, KINETIC, PEAK_STEP, PEAK_KINETIC = 0, 3, 6, 9, 10, 11, 12, 13
-MEMORY = 14
+HISTORY = 14
 
 NONE, INTACT, YIELDED, BROKEN = 0, 1, 2, 3
 """State of an edge. BROKEN: its strength is gone; it presses and rubs until contact takes over at the next rebuild."""
@@ -52,15 +52,15 @@ def end_forces(tx, ty, s0, s1, s2, t0, t1, t2):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state):
+def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state):
     """Stresses at the points of a joint that has passed its peak, which remembers more by it.
 
-    table (rows, 8), beyond (rows, 4): of the laws, and the row of this one; memory (slots, 12), and the slot. (Rows are
-    not handed over as such: counting references to views takes longer than the law.) Returns the mid-line from a to b
-    (tx, ty) [m], normal (s0, s1, s2) and shear (t0, t1, t2) stresses [Pa] at the points from a to b, and the state:
-    BROKEN when two of the three points have no strength left; memory[slot, MODE] then says how, from 1 (opened) to 2
-    (slid). At a joint before its peak, whose memory is zero, this is the law of `laws.intact_point`. (Inlined: the nine
-    numbers would go through memory, a fifth of the time of a joint.)
+    table (rows, 8), beyond (rows, 4): of the laws, and the row of this one; history (slots, 12), and the slot. (Rows
+    are not handed over as such: counting references to views takes longer than the law.) Returns the mid-line from a to
+    b (tx, ty) [m], normal (s0, s1, s2) and shear (t0, t1, t2) stresses [Pa] at the points from a to b, and the state:
+    BROKEN when two of the three points have no strength left; history[slot, MODE] then says how, from 1 (opened) to 2
+    (slid). At a joint before its peak, whose history is zero, this is the law of `laws.intact_point`. (Inlined: the
+    nine numbers would go through memory, a fifth of the time of a joint.)
     """
     tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
     h = math.sqrt(h2)
@@ -72,34 +72,36 @@ def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, s
     per_kop, per_half_shear = beyond[row, PER_KOP], beyond[row, PER_HALF_SHEAR]
     s0, t0, o0, u0, d0, f0, g0 = laws.yielded_point(
         NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear, memory[slot, OPENED], memory[slot, SLIPPED], memory[slot, DAMAGE],
+        per_s_t, per_kop, per_half_shear, history[slot, OPENED], history[slot, SLIPPED], history[slot, DAMAGE],
     )  # fmt: skip
     s1, t1, o1, u1, d1, f1, g1 = laws.yielded_point(
         0.5 * (oa + ob), 0.5 * (sa + sb), h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear, memory[slot, OPENED + 1], memory[slot, SLIPPED + 1], memory[slot, DAMAGE + 1],
+        per_s_t, per_kop, per_half_shear,
+        history[slot, OPENED + 1], history[slot, SLIPPED + 1], history[slot, DAMAGE + 1],
     )  # fmt: skip
     s2, t2, o2, u2, d2, f2, g2 = laws.yielded_point(
         FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear, memory[slot, OPENED + 2], memory[slot, SLIPPED + 2], memory[slot, DAMAGE + 2],
+        per_s_t, per_kop, per_half_shear,
+        history[slot, OPENED + 2], history[slot, SLIPPED + 2], history[slot, DAMAGE + 2],
     )  # fmt: skip
     gone = (d0 >= 1.0) + (d1 >= 1.0) + (d2 >= 1.0)
     if state == YIELDED and gone >= 2:
         state = BROKEN
         opened2, slid2 = max(f0, f1, f2), max(g0, g1, g2)
-        memory[slot, MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
+        history[slot, MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
         d0 = d1 = d2 = 1.0
-    memory[slot, OPENED], memory[slot, OPENED + 1], memory[slot, OPENED + 2] = o0, o1, o2
-    memory[slot, SLIPPED], memory[slot, SLIPPED + 1], memory[slot, SLIPPED + 2] = u0, u1, u2
-    memory[slot, DAMAGE], memory[slot, DAMAGE + 1], memory[slot, DAMAGE + 2] = d0, d1, d2
+    history[slot, OPENED], history[slot, OPENED + 1], history[slot, OPENED + 2] = o0, o1, o2
+    history[slot, SLIPPED], history[slot, SLIPPED + 1], history[slot, SLIPPED + 2] = u0, u1, u2
+    history[slot, DAMAGE], history[slot, DAMAGE + 1], history[slot, DAMAGE + 2] = d0, d1, d2
     return tx, ty, s0, s1, s2, t0, t1, t2, state
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state):
+def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state):
     """Forces on a and b of a joint that has passed its peak (fax, fay, fbx, fby [N/m]), and its state; see
     `yielded_points`."""
     tx, ty, s0, s1, s2, t0, t1, t2, state = yielded_points(
-        ax, ay, bx, by, px, py, qx, qy, table, beyond, row, memory, slot, state
+        ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state
     )
     fax, fay, fbx, fby = end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
     return fax, fay, fbx, fby, state

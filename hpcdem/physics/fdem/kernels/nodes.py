@@ -45,7 +45,7 @@ def tractions(edges, corner_a, corner_b, row, table, x, applied):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fading(corner, fx, fy, left, applied):
+def relax(corner, fx, fy, left, applied):
     """Add forces that die down: `left` (m,) is what is left of each, 1 to 0."""
     applied = applied.reshape(applied.size)
     for m in range(len(corner)):

@@ -154,7 +154,7 @@ def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
     for _ in range(min(300, steps)):
         engine.step()
     if not case["pushed"]:  # young lists would get the wide skin, and laid beds are always young
-        engine.lattice.age, engine.lattice.skin_factor = 0, NARROW
+        engine.rebuild_state.age, engine.rebuild_state.skin_factor = 0, NARROW
         rebuild(engine)
     row = {
         "name": case["name"], "fit": case["fit"], "tall": case["tall"], "pushed": case["pushed"], "particles": n,
@@ -166,7 +166,7 @@ def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
     owned, left, right, slots, arrays = zip(*comm.allgather(mine), strict=True)
     row |= {"owned": owned, "ghosts": [a + b for a, b in zip(left, right, strict=True)], "left": left, "slots": slots}
     row |= {"arrays_b": sum(arrays) / n, "waits": waits(engine)}
-    engine.lattice.age, engine.lattice.skin_factor = 0, NARROW
+    engine.rebuild_state.age, engine.rebuild_state.skin_factor = 0, NARROW
     row["rebuild_s"] = best(comm, lambda: rebuild(engine), 1, 2 if few else 4)
     if bed.particles == 8 * bed.unit and case["settled"] and not case["pushed"]:
         row |= frame(sim)
@@ -178,7 +178,7 @@ def columns(engine: Any) -> int:
     from hpcdem.core import cells
 
     p = engine.particles
-    cx = cells.columns(cells.keys(p.hot[p.owned], engine.lattice.side))
+    cx = cells.columns(cells.keys(p.hot[p.owned], engine.rebuild_state.side))
     ends = engine.comm.max_into(np.array([-cx.min(), cx.max()]))
     return int(ends[0] + ends[1] + 1)
 
@@ -252,8 +252,8 @@ def waits(engine: Any) -> dict[str, int]:
     if not comm.crowded:  # there a reduction is a wait already
         comm._reduce_into = counted(plain[1])
     found = {}
-    engine.lattice.countdown = 2
-    for name, do in (("step", engine.step), ("look", engine._look), ("rebuild", engine.rebuild)):
+    engine.rebuild_state.countdown = 2
+    for name, do in (("step", engine.step), ("look", engine._check_rebuild), ("rebuild", engine.rebuild)):
         count[0] = 0
         do()
         found[name] = count[0]

@@ -37,7 +37,7 @@ def _damaged(case: Case, damage: Callable[[bytearray], bytes | bytearray]) -> No
 
 
 def _goes_on(case: Case, damaged: list[Path]) -> None:
-    """What could not be taken is named; it stays as it is, and may be written anew."""
+    """What could not be taken is named; it stays as it is, and may be written again."""
     case.spoiled |= {path.name for path in damaged}
     expected = judge.newest(case.data)
     job = case.start()

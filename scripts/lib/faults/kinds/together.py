@@ -64,7 +64,7 @@ def old_folder(case: Case) -> None:
     left = set(strangers) - set(own())
     case.spoiled |= {name for name in files(case.data) if name in left or not name.endswith(".sav")}
     case.end(case.start(), {DONE})
-    # Everything of this run was written anew by now, so it is looked at like that of any other.
+    # Everything of this run was written again by now, so it is looked at like that of any other.
     case.spoiled -= mine
 
 

@@ -12,10 +12,10 @@ from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.model import Blocks
-from hpcdem.physics.fdem.rehearsal import ROCK
+from hpcdem.physics.fdem.warm_up import ROCK
 
 
-def rehearse(threads: int = 1) -> None:
+def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     blocks = Blocks(SerialComm(), threads)
     blocks.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, 3)]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.commands.fdem.choosing import chosen, everything
+from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField

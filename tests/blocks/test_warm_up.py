@@ -1,4 +1,4 @@
-"""After a rehearsal nothing has to be compiled: asked of a process of its own, as kernels stay compiled."""
+"""After a warm-up nothing has to be compiled: asked of a process of its own, as kernels stay compiled."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from tests.conftest import ROOT, run
 PROGRAM = """
 import numpy as np
 from hpcdem.physics.fdem.model import Blocks
-from hpcdem.physics.fdem import build, memories, pairs
-from hpcdem.physics.fdem.rehearsal import rehearse
+from hpcdem.physics.fdem import build, histories, pairs
+from hpcdem.physics.fdem.warm_up import warm_up
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, stiffness
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():
-    modules = (build, connectivity, contact, detect, elements, energy, limits, memories, nodes, pairs, stiffness)
+    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, stiffness)
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 
-rehearse(1)
+warm_up(1)
 before = compiled()
 for kind in ("cross", "quad", "mixed"):
     sim = model(rectangle(4, 4, 1.0, 1.0, kind=kind))
@@ -61,7 +61,7 @@ print({k: (n, after[k]) for k, n in before.items() if after[k] != n})
 
 
 @pytest.mark.slow
-def test_a_rehearsal_leaves_nothing_to_compile(tmp_path):
+def test_a_warm_up_leaves_nothing_to_compile(tmp_path):
     done = run([sys.executable, "-c", PROGRAM], tmp_path, env={"PYTHONPATH": str(ROOT)})
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.strip() == "{}"

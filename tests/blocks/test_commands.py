@@ -1,4 +1,4 @@
-"""Verbs that look at a model or change it between steps."""
+"""Commands that look at a model or change it between steps."""
 
 from __future__ import annotations
 

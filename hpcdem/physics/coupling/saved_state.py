@@ -14,8 +14,8 @@ from hpcdem.io import checkpoint
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.coupling.links import Touching
 from hpcdem.physics.coupling.model import Coupled
-from hpcdem.physics.dem import saving as of_particles
-from hpcdem.physics.fdem import saving as of_blocks
+from hpcdem.physics.dem import saved_state as of_particles
+from hpcdem.physics.fdem import saved_state as of_blocks
 
 KIND, PREFIX, CONTACTS = checkpoint.BOTH, checkpoint.OF_PARTICLES, checkpoint.LINKS
 

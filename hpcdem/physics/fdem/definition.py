@@ -84,7 +84,7 @@ class Reference:
 
 
 @dataclass
-class Fading:
+class Relaxation:
     """Forces that elements which were taken out leave behind: corners (element * 4 + k), forces (n, 2) [N/m], from
     when on and for how long they die down (model time, or steps in static mode)."""
 
@@ -95,13 +95,13 @@ class Fading:
     in_steps: bool
 
 
-class Scene:
+class ModelDefinition:
     """Mesh and assignments. Methods that assign raise CommandError, alike on all ranks, and change nothing then."""
 
     def __init__(self) -> None:
-        self.clear_scene()
+        self.clear_definition()
 
-    def clear_scene(self) -> None:
+    def clear_definition(self) -> None:
         """Nothing is there."""
         self.mesh: Mesh | None = None
         self.options = Options()
@@ -112,7 +112,7 @@ class Scene:
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
-        self.fading: list[Fading] = []
+        self.relaxations: list[Relaxation] = []
         self.born = np.empty(0, np.int64)
         """Elements that came back after they were taken out, ascending."""
         self.birthplace = np.empty((0, 4, 2))
@@ -220,7 +220,7 @@ class Scene:
 
     def _put(self, mesh: Mesh) -> None:
         kept = self.options, self.tables, self.fields
-        self.clear_scene()
+        self.clear_definition()
         self.options, self.tables, self.fields = kept
         self.mesh = mesh
         self._make_arrays(len(mesh.cells), len(mesh.points))
@@ -694,7 +694,7 @@ class Scene:
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 
-    def scene_state(self) -> dict[str, Any]:
+    def definition_state(self) -> dict[str, Any]:
         """All but the arrays, as JSON values."""
         return {
             "options": asdict(self.options),
@@ -707,12 +707,12 @@ class Scene:
             "conditions": [asdict(one) for one in self.conditions],
             "loads": [asdict(one) for one in self.loads],
             "fading": [
-                {**asdict(one), "corner": one.corner.tolist(), "force": one.force.tolist()} for one in self.fading
+                {**asdict(one), "corner": one.corner.tolist(), "force": one.force.tolist()} for one in self.relaxations
             ],
         }
 
-    def take_scene_state(self, state: dict[str, Any]) -> None:
-        """Inverse of `scene_state`."""
+    def take_definition_state(self, state: dict[str, Any]) -> None:
+        """Inverse of `definition_state`."""
         self._closed = None
         self.options = Options(**state["options"])
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
@@ -723,8 +723,8 @@ class Scene:
         self.joint_rows = Rows.restored(state["joint_rows"])
         self.conditions = [NodeCondition(**{**one, "way": tuple(one["way"])}) for one in state["conditions"]]
         self.loads = [Traction(**one) for one in state["loads"]]
-        self.fading = [
-            Fading(
+        self.relaxations = [
+            Relaxation(
                 np.array(one["corner"], np.int64), np.array(one["force"]).reshape(-1, 2), one["begin"], one["span"],
                 one["in_steps"],
             )

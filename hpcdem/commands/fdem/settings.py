@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hpcdem.commands.fdem.choosing import chosen
+from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES
 from hpcdem.core.errors import CommandError

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpcdem.physics.dem import saving
+from hpcdem.physics.dem import saved_state
 from hpcdem.physics.dem.simulation import Simulation
 
 
 def save(sim: Simulation, path: Path | str) -> None:
     """SAV: write the state to this name."""
-    saving.save(sim, path)
+    saved_state.save(sim, path)
 
 
 def restore(sim: Simulation, path: Path | str) -> None:
     """RES: go on from a file written by SAV; the place in the present script stays."""
-    saving.restore(sim, path)
+    saved_state.restore(sim, path)
     sim.restored = Path(path), sim.clock.step
     if sim.energy is not None and sim.energy.running:
         sim.energy.pause(sim)  # the CYC in which the file was written is not taken up

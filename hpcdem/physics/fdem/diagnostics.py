@@ -11,12 +11,12 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.budget import Budget
+from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC
-from hpcdem.physics.fdem.scene import Numbers
 from hpcdem.physics.fdem.simulation import Core
 from hpcdem.physics.fdem.state import Crack
 
@@ -92,7 +92,7 @@ _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for 
 
 
 class Looking(Core):
-    """Verbs of `Blocks` that only look."""
+    """Commands of `Blocks` that only look."""
 
     # ---- quantities ------------------------------------------------------------------------------------------------
 
@@ -266,7 +266,7 @@ class Looking(Core):
         if wanted & {"mode", "break_time", "break_energy"}:
             columns |= self._last_events(lower, broken | (now == BROKEN))
         if "damage" in wanted:
-            damage = local.slot_memory[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
+            damage = local.slot_history[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
             columns["damage"] = np.where(broken, 1.0, damage)
         held = np.flatnonzero(now != NONE)
         if set(_MEANS) & wanted:

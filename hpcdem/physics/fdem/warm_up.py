@@ -15,7 +15,7 @@ JOINT = {
 }  # fmt: skip
 
 
-def rehearse(threads: int = 1) -> None:
+def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     points = [(x, y) for x in (0.0, 1.0, 2.0, 3.0) for y in (0.0, 1.0)] + [(0.5, 0.999), (1.5, 0.999), (1.0, 2.0)]
     quads = [[0, 2, 3, 1], [2, 4, 5, 3]]

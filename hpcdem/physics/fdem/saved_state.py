@@ -15,13 +15,13 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.fdem.budget import Budget
-from hpcdem.physics.fdem.memories import WORDS, Memories
+from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.state import Crack
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
-    from hpcdem.physics.fdem.solving import Solving
+    from hpcdem.physics.fdem.convergence import Solving
 
 KIND = checkpoint.BLOCKS
 ARRAYS = {
@@ -45,8 +45,8 @@ def state_of(sim: Solving, extra: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "kind": KIND,
         "clock": dataclasses.asdict(sim.clock),
-        "lattice": dataclasses.asdict(sim.lattice),
-        "scene": sim.scene_state(),
+        "lattice": dataclasses.asdict(sim.rebuild_state),
+        "scene": sim.definition_state(),
         "events": [list(row) for row in sim.event_rows],
         "closed": sim.closed,
         "longest": sim._longest,
@@ -89,10 +89,10 @@ def tables(sim: Solving) -> dict[str, Table]:
         for c in range(rows.shape[1]):
             columns[f"{name}_{c}"] = rows[:, c].copy()
     tables["state"] = to_slabs(sim.comm, ("number",), columns)
-    memories = sim.local.memories(transfer=False) if sim.closed else sim.memories
-    keys = memories.keys()
-    order = {"number": number[memories.owners()], "key": keys.copy()}
-    order.update({f"m{c}": memories.rows[:, c].copy() for c in range(1, memories.rows.shape[1])})
+    histories = sim.local.histories(transfer=False) if sim.closed else sim.histories
+    keys = histories.keys()
+    order = {"number": number[histories.owners()], "key": keys.copy()}
+    order.update({f"m{c}": histories.rows[:, c].copy() for c in range(1, histories.rows.shape[1])})
     tables["memories"] = to_slabs(sim.comm, ("number", "key"), order)
     return tables
 
@@ -113,7 +113,7 @@ def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
 
 
 def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
-    """Take the blocks of a checkpoint that holds particles as well (hpcdem/physics/coupling/saving.py), without the
+    """Take the blocks of a checkpoint that holds particles as well (physics/coupling/saved_state.py), without the
     kernels of these; returns `extra`, or None if the file is not one of both. Collective."""
     try:
         state, tables = checkpoint.read(path, sim.comm, _replicated)
@@ -126,7 +126,7 @@ def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
 
 
 def _replicated(table: str) -> bool:
-    """Whether all ranks have all of this table: what is said about the model, see scene.py."""
+    """Whether all ranks have all of this table: what is said about the model, see definition.py."""
     return table not in ("state", "memories", checkpoint.LINKS) and not table.startswith(checkpoint.OF_PARTICLES)
 
 
@@ -176,10 +176,10 @@ def put(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> None:
         if "born" in tables:
             born_at = np.column_stack([tables["born"][f"p{k}"] for k in range(8)])
             sim.take_births(tables["born"]["number"].astype(np.int64), born_at.reshape(-1, 4, 2))
-    sim.take_scene_state(state["scene"])
+    sim.take_definition_state(state["scene"])
     sim.clock = Clock(**state["clock"])
     sim.untouched = sim.clock.step == 0
-    sim.lattice = type(sim.lattice)(**{"step": sim.clock.step, "time": sim.clock.time, **state["lattice"]})
+    sim.rebuild_state = type(sim.rebuild_state)(**{"step": sim.clock.step, "time": sim.clock.time, **state["lattice"]})
     sim.event_rows = [Crack(*row) for row in state["events"]]
     sim._longest = state["longest"]
     if state["mesh"] is None:
@@ -208,12 +208,12 @@ def _take_rows(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -
     for c in range(1, words.shape[1]):
         words[:, c] = kept[f"m{c}"]
     _, number, words = sim.comm.to_ranks(holders(sim.comm, sim.number, kept["number"]), kept["number"], words)
-    sim.memories = Memories.of(len(sim.number), np.searchsorted(sim.number, number), words)
+    sim.histories = Histories.of(len(sim.number), np.searchsorted(sim.number, number), words)
     return {name: table(name, width) for name in ("origin", "listed")}
 
 
 def _close_as_it_was(sim: Solving, state: dict[str, Any], places: dict[str, np.ndarray]) -> None:
-    """Storage and lists anew at the present positions: no sum depends on them. When they are due to be made anew does
+    """Storage and lists again at the present positions: no sum depends on them. When they are due to be made again does
     depend on the positions at which they were, which are put back."""
     sim.cold.update(places)
     sim.close_again()

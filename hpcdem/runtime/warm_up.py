@@ -13,10 +13,10 @@ from hpcdem.decomp import strips
 from hpcdem.io import slabs, textnum
 from hpcdem.numerics import exact_sum, lanes, rng
 
-__all__ = ["lanes", "rehearse"]
+__all__ = ["lanes", "warm_up"]
 
 
-def rehearse(threads: int = 1) -> None:
+def warm_up(threads: int = 1) -> None:
     """Call them as runs with this many threads per rank do. Writes nothing."""
     cell = cells.keys(np.zeros((2, 2)), 1.0)
     ids = np.array([2, 1])

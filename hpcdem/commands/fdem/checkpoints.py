@@ -163,7 +163,7 @@ def _take(project: Project, state: dict[str, Any]) -> None:
 
 def _history(given: dict[str, Any]) -> History:
     rows = [(int(step), float(time), float(value)) for step, time, value in given["rows"]]
-    return History(**{**given, "rows": rows, "filed": 0})  # its file begins anew, with all that was recorded
+    return History(**{**given, "rows": rows, "filed": 0})  # its file begins again, with all that was recorded
 
 
 def _curve(given: dict[str, Any]) -> Curve:

@@ -13,7 +13,7 @@ import numpy as np
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.engine import output
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.guards import NAMED
 from hpcdem.physics.dem.kernels.contacts import MODEL
@@ -85,7 +85,9 @@ def stop(sim: Simulation) -> None:
     """STOP: the end of the script; histories are closed."""
     output.finish(sim)
     if sim.log is not None and sim.log.has_warned(LATE):
-        sim.log.info(f"in all, particles outran the contact search {sim.lattice.late} times in {sim.clock.step} steps")
+        sim.log.info(
+            f"in all, particles outran the contact search {sim.rebuild_state.late} times in {sim.clock.step} steps"
+        )
 
 
 def _nearest(steps: float) -> int:
@@ -160,7 +162,7 @@ def _check_laws(sim: Simulation) -> None:
     """Pairs in the list of which one particle is Hertz and the other linear have no law."""
     if not np.isnan(sim.pair_laws[:, MODEL]).any():
         return
-    _, iout = observe.contact_rows(sim)
+    _, iout = diagnostics.contact_rows(sim)
     p = sim.particles
     hertz = dict(zip(p.ihot[:, 7].tolist(), sim.materials.rows["hertz"][p.ihot[:, 6]].tolist(), strict=True))
     mixed = [(a, b) for a, b, _ in iout.tolist() if hertz[a] != hertz[b]]
@@ -183,7 +185,7 @@ def time_step(sim: Simulation) -> float:
         return s.dt
     if s.frac <= 0.0:
         raise CommandError("no time step: SET DT or SET frac must come before the first cycle")
-    light = observe.lightest(sim)
+    light = diagnostics.lightest(sim)
     if not math.isfinite(light):
         raise CommandError(
             "SET frac: no particle is free to move, so there is no mass to find a time step from; use SET DT"
@@ -194,9 +196,9 @@ def time_step(sim: Simulation) -> float:
     walls = sim.wall_laws.reshape(-1, n, 4)[:, used].reshape(-1, 4)
     rows = np.concatenate([pairs, walls])
     stiffest = float(np.max(rows[rows[:, 0] == 0.0, 1], initial=0.0))
-    out, _ = observe.contact_rows(sim)
-    wout, _ = observe.wall_rows(sim)
-    now = np.concatenate([out[:, observe.STIFFNESS], wout[:, observe.STIFFNESS]])
+    out, _ = diagnostics.contact_rows(sim)
+    wout, _ = diagnostics.wall_rows(sim)
+    now = np.concatenate([out[:, diagnostics.STIFFNESS], wout[:, diagnostics.STIFFNESS]])
     hertz = rows[rows[:, 0] == 1.0]
     largest = np.array([now.max() if len(now) and len(hertz) else 0.0])
     touching = float(sim.comm.max_into(largest)[0])
@@ -243,7 +245,7 @@ def start(
     first = sim.clock.step
     sim.progress = {
         "name": name, "first": first, "last": None if steps is None else first + steps, "origin": origin,
-        "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.lattice.late,
+        "intervals": intervals, "final_frame": final_frame, "position": sim.position, "late": sim.rebuild_state.late,
     }  # fmt: skip
     _warn_about_the_time_step(sim)
     if initial_frame:
@@ -259,10 +261,10 @@ def start(
 def _warn_about_the_time_step(sim: Simulation) -> None:
     """dt beside its limits where it comes near the estimate of the critical step; once, a warning if it is beyond one,
     or if lattice-solid damping reverses a velocity."""
-    critical, dt = observe.critical_dt(sim), sim.clock.dt
-    damping = sim.settings.lsm * dt / observe.lightest(sim)
+    critical, dt = diagnostics.critical_dt(sim), sim.clock.dt
+    damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
-    highest = observe.highest_frequency(sim) if near else 0.0
+    highest = diagnostics.highest_frequency(sim) if near else 0.0
     if sim.log is None:
         return
     if highest > 0.0:
@@ -420,7 +422,7 @@ def _run(sim: Simulation) -> None:
 
 
 def _calls(sim: Simulation) -> list[Task]:
-    """The moments at which watchers are called; asked for anew each time, as they may come and go."""
+    """The moments at which watchers are called; asked for again each time, as they may come and go."""
     return [Task(watcher.every, 0, watcher.call) for watcher in sim.watchers]
 
 
@@ -468,7 +470,7 @@ def _answer(sim: Simulation, request: int) -> None:
 
 def warn_about_late_lists(sim: Simulation, progress: dict) -> None:
     """At the end of a command that stepped. Only the first time; `stop` says how often it was in all."""
-    late = sim.lattice.late - progress["late"]
+    late = sim.rebuild_state.late - progress["late"]
     if late and sim.log is not None:
         sim.log.warn_once(
             LATE,

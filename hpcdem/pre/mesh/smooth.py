@@ -23,7 +23,7 @@ def smoothed(points: np.ndarray, cells: np.ndarray, held: np.ndarray) -> tuple[n
     many others had to stay, as triangles would have become sharp. cells (ne, 4): triangles.
 
     The middle of all neighbours is a linear system (Tutte 1963); where the outline is not convex triangles may turn
-    over, so corners of those that would are held too, and the rest is solved anew.
+    over, so corners of those that would are held too, and the rest is solved again.
     """
     edges = edges_of(cells, len(points)).points
     a, b = edges.T

@@ -15,7 +15,7 @@ import urllib.request
 import pytest
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.page import serving
+from hpcdem.page import lifetime
 from hpcdem.page.limits import LIMITS
 from hpcdem.page.maker import request_of, values_of
 from hpcdem.pre.specimen import Request
@@ -108,9 +108,9 @@ def test_without_a_window_no_browser_is_opened(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    assert not serving.can_open()
+    assert not lifetime.can_open()
     monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
-    assert serving.can_open()
+    assert lifetime.can_open()
 
 
 def test_the_page_begins_with_the_request_of_the_command_line(wanted):
@@ -130,17 +130,17 @@ def test_the_page_begins_with_the_request_of_the_command_line(wanted):
 def test_what_the_page_cannot_show_is_refused_at_once(values, message):
     request = Request(sizes=(2.0, 1.0), percents=(100.0, 50.0), **values)
     with pytest.raises(HpcdemError, match=message):
-        serving.serve(request, browser=False)
+        lifetime.serve(request, browser=False)
 
 
 def test_all_files_of_the_page_are_there_and_served():
-    folder = serving.resources.files("hpcdem.page") / "static"
-    assert {file.name for file in folder.iterdir()} == set(serving.KINDS)
+    folder = lifetime.resources.files("hpcdem.page") / "static"
+    assert {file.name for file in folder.iterdir()} == set(lifetime.KINDS)
     page = (folder / "index.html").read_text(encoding="utf-8")
     for name in re.findall(r'(?:src|href)="([\w.]+)"', page):
-        assert name in serving.KINDS
+        assert name in lifetime.KINDS
 
 
 def test_a_port_out_of_range_is_a_clear_error():
     with pytest.raises(UsageError, match="--port 70000: cannot listen there"):
-        serving.PageServer({}, {}, 70000)
+        lifetime.PageServer({}, {}, 70000)

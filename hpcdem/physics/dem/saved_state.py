@@ -42,7 +42,7 @@ from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.neighbours import Histories
 from hpcdem.physics.dem.particles import free_rows
 from hpcdem.physics.dem.settings import Settings
-from hpcdem.physics.dem.simulation import Lattice, Simulation
+from hpcdem.physics.dem.simulation import ListState, Simulation
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime.checkpoints import newest_first
@@ -68,7 +68,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
     return {
         "clock": dataclasses.asdict(sim.clock),
         "settings": dataclasses.asdict(sim.settings),
-        "lattice": dataclasses.asdict(sim.lattice),
+        "lattice": dataclasses.asdict(sim.rebuild_state),
         "fast": sim.fast.state(),
         "closed": closed,
         "longest2": float(sim.comm.max_into(longest2)[0]),
@@ -226,7 +226,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     sim.clear()
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
-    sim.lattice = Lattice(**state["lattice"])
+    sim.rebuild_state = ListState(**state["lattice"])
     sim.fast = Fast.restored(state.get("fast", []))
     sim.walls.take_columns(state["walls"])
     for name in ("materials", "bond_types"):
@@ -300,7 +300,7 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     """Lists as they were when the state was saved: built from the positions and walls of that rebuild, then the present
     positions put in. Order, ownership and lists depend on the former alone."""
     p, walls = sim.particles, sim.walls
-    saved_lattice = dataclasses.replace(sim.lattice)
+    saved_lattice = dataclasses.replace(sim.rebuild_state)
     travel = walls.travel.copy()
     now = walls.p1.copy(), walls.p2.copy()
     gid, moving = p["gid"].copy(), np.hstack([p.positions(), p.cold[:, FX : TORQUE + 1]])
@@ -308,7 +308,7 @@ def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray)
     walls.p1, walls.p2 = walls.p1 - travel, walls.p2 - travel
     sim._close(frozen=True)
     walls.p1, walls.p2, walls.travel = now[0], now[1], travel
-    sim.lattice = saved_lattice
+    sim.rebuild_state = saved_lattice
     gid, moving = sim.trail.follow(sim.comm, p["gid"], gid, moving)
     order = np.argsort(gid)
     moving = moving[order[np.searchsorted(gid, p["gid"], sorter=order)]]

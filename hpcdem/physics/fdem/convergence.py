@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import connectivity
-from hpcdem.physics.fdem.changing import Changing
+from hpcdem.physics.fdem.changes import Changing
 
 RATIO = 1e-5
 """Balance at which a model counts as being at rest, if nothing else is asked for."""
@@ -90,7 +90,7 @@ class Moving:
 
 
 class Solving(Changing):
-    """Verbs of `Blocks` that step. All collective."""
+    """Commands of `Blocks` that step. All collective."""
 
     def advance(self, steps: int) -> int:
         """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""

@@ -9,10 +9,10 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity
 from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem.definition import Numbers, Relaxation, _finite
+from hpcdem.physics.fdem.diagnostics import Looking
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.looking import Looking
 from hpcdem.physics.fdem.properties import ELEMENT, model
-from hpcdem.physics.fdem.scene import Fading, Numbers, _finite
 from hpcdem.physics.fdem.tables import Value
 
 TORN = 0.1
@@ -21,7 +21,7 @@ elements that come back do not hang together with it. Others may reach into them
 
 
 class Changing(Looking):
-    """Verbs of `Blocks` that act on what moves. All collective."""
+    """Commands of `Blocks` that act on what moves. All collective."""
 
     def option(
         self,
@@ -70,10 +70,10 @@ class Changing(Looking):
         stay = np.flatnonzero(~dying[self.number])
         self.number, self.x, self.v = self.number[stay], self.x[stay], self.v[stay]
         self.cold = {name: values[stay] for name, values in self.cold.items()}
-        self.memories = self.memories.take(stay).without_partners(dying)
+        self.histories = self.histories.take(stay).without_partners(dying)
         if left is not None:
             begin = self.clock.time if self.options.dynamic else float(self.clock.step)
-            self.fading.append(Fading(*left, begin, span, not self.options.dynamic))
+            self.relaxations.append(Relaxation(*left, begin, span, not self.options.dynamic))
         self.ownership.wanted = True
         self._changed(topology=True)
 
@@ -197,7 +197,7 @@ class Changing(Looking):
         for name, values in self.cold.items():
             new = rows(places - shown, 8) if name == "home" else np.zeros((len(back), values.shape[1]))
             self.cold[name] = np.concatenate([values, new])
-        self.memories = self.memories.joined(np.zeros(len(back), np.int64), self.memories.rows[:0])
+        self.histories = self.histories.joined(np.zeros(len(back), np.int64), self.histories.rows[:0])
 
     def _move_as_one(self, back: np.ndarray, corner: np.ndarray, v: np.ndarray, mass: np.ndarray) -> None:
         """Corners that have become one node by elements that came back get one velocity: that of those that were there
@@ -300,7 +300,7 @@ class Changing(Looking):
         at = at[(self.joint_row[at] > 0) & ~self.open[at]]
         forget = np.zeros(len(self.partner), bool)
         forget[at] = forget[self.partner[at]] = True
-        self.memories = self.memories.without_joints(self.number, forget)
+        self.histories = self.histories.without_joints(self.number, forget)
         self._changed()
 
     def _chosen_corners(self, nodes: Numbers) -> np.ndarray:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpcdem.commands.dem import bonds, clumps, particles, properties, running, settings, walls
+from hpcdem.commands.dem import bonds, clumps, cycles, particles, properties, settings, walls
 from hpcdem.core.selection import Ids
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.dem import observe
+from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.kernels import laws
 from hpcdem.physics.dem.simulation import Simulation
 
 
-def rehearse(threads: int = 1) -> None:
+def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     sim = Simulation(SerialComm(), threads=threads, outdir=Path("."))
     particles.start(sim)
@@ -24,10 +24,10 @@ def rehearse(threads: int = 1) -> None:
     particles.gen(sim, 2, [0.5], (3.0, 6.0), (1.0, 6.0))
     particles.gline(sim, (6.5, 1.0), (8.5, 1.0), 0.5)
     properties.prop(sim, density=1.0, shear=1e3, poiss=0.2, hertz=True)
-    running.prepare(sim)
+    cycles.prepare(sim)
     sim.step()
     clumps.join(sim, Ids(4, 6))
-    running.prepare(sim)
+    cycles.prepare(sim)
     sim.step()
     sim.particles["x"][0] += 0.1  # much faster than all others
     sim.rebuild()
@@ -36,15 +36,15 @@ def rehearse(threads: int = 1) -> None:
     bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
     bonds.break_bonds(sim, Ids(0, 1))
     settings.set_option(sim, "frac", 0.1)
-    running.prepare(sim)
+    cycles.prepare(sim)
     walls.wall(sim, 0, xv=0.1)
-    running.prepare(sim)
+    cycles.prepare(sim)
     sim.energy = Budget()
     sim.energy.begin(sim)
     sim.rebuild()
     sim.step()
     sim.energy.look(sim)
-    observe.highest_frequency(sim)
-    observe.frame(sim)
-    observe.critical_dt(sim)
+    diagnostics.highest_frequency(sim)
+    diagnostics.frame(sim)
+    diagnostics.critical_dt(sim)
     laws.tangent_normal_stiffness(1.0, 1.0, 1.0, 1.0)  # SET frac where nothing touches

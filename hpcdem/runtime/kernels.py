@@ -38,9 +38,9 @@ QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
 
 
-def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callable[[], None]]) -> Path:
+def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[[], None]]) -> Path:
     """Collective: load or compile kernels, those of one kind after those of another; returns the last cache folder of
-    this rank. rehearsals: by kind, what calls all of its kernels once; each kind has a folder of its own. Rank 0 says
+    this rank. warm_ups: by kind, what calls all of its kernels once; each kind has a folder of its own. Rank 0 says
     how far it is.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
@@ -48,8 +48,8 @@ def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callabl
     so that nothing is compiled twice on a shared file system and each local disk gets its copy.
     """
     folder, writable = cache_folder()
-    folders = [folder.with_name(f"{folder.name}-{kind}") if kind else folder for kind in rehearsals]
-    missing = sum(KERNELS.get(kind, 0) for kind, folder in zip(rehearsals, folders) if not folder.is_dir())
+    folders = [folder.with_name(f"{folder.name}-{kind}") if kind else folder for kind in warm_ups]
+    missing = sum(KERNELS.get(kind, 0) for kind, folder in zip(warm_ups, folders) if not folder.is_dir())
     if comm.rank == 0 and missing:
         threaded = os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
         log.info(
@@ -57,12 +57,12 @@ def prepare_kernels(comm: SerialComm, log: Log, rehearsals: Mapping[str, Callabl
             f"on this machine{'; runs with one thread, -j 1, have their own' if threaded else ''})"
         )
     with _progress(log, missing):
-        damaged = [_prepare(comm, *one) for one in zip(folders, rehearsals.values())]
+        damaged = [_prepare(comm, *one) for one in zip(folders, warm_ups.values())]
 
     if comm.any(not writable):
         log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
     if comm.any(any(damaged)):
-        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it anew")
+        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it again")
     if comm.rank == 0:
         for folder in folders:
             tidy(folder)
@@ -145,14 +145,14 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
 
 
 late: list[str] = []
-"""Kernels that this process has compiled for itself, as they were not in their folder: a rehearsal lacks them."""
+"""Kernels that this process has compiled for itself, as they were not in their folder: a warm-up lacks them."""
 _only_read: set[Path] = set()
 _plain_save: Any = None
 
 
 def _protect_complete_folders() -> None:
     """See to it that numba writes nothing into complete folders: neither now, when kernels that are compiled have those
-    of other folders in them, nor later, when many processes may do so at the same time. A rehearsal that compiles with
+    of other folders in them, nor later, when many processes may do so at the same time. A warm-up that compiles with
     its folder complete is late as well: its kernels were imported before their folder was known."""
     global _plain_save
     from numba.core.caching import FunctionCache
@@ -258,8 +258,8 @@ def kernel_sources(package: Path) -> list[Path]:
         found |= more
         wanted += more
     callers = {path for path, used in imports.items() if used & kernels}
-    rehearsals = set(package.rglob("rehearsal.py"))
-    return sorted(found | callers | rehearsals)  # what they call is what the folders hold
+    warm_ups = set(package.rglob("warm_up.py"))
+    return sorted(found | callers | warm_ups)  # what they call is what the folders hold
 
 
 def _imported(text: str, package: Path) -> set[Path]:

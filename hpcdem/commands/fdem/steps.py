@@ -8,11 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hpcdem.commands.fdem import coupling, cracks, frames, histories, saving
+from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, histories
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.io.behind import under_way
-from hpcdem.physics.fdem.solving import RATIO, Watch
+from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
 
@@ -164,7 +164,7 @@ def _advance(
         if coupling.checkpoint_is_due(project):
             histories.flush(project)
             cracks.flush(project)
-            saving.write_checkpoint(project)
+            checkpoints.write_checkpoint(project)
         if reason:  # a request is answered by the next command: nothing is left to do in this one
             break
         if request:
@@ -238,7 +238,7 @@ def _answer(project: Project, request: int) -> None:
         return
     histories.flush(project)
     cracks.flush(project)
-    path = saving.write_checkpoint(project, automatic=what == "auto")
+    path = checkpoints.write_checkpoint(project, automatic=what == "auto")
     if what == "stop":
         raise StoppedWithCheckpoint(
             f"stopped at step {step} by {stop.reason}; checkpoint {path} written, go on with {_onwards(project, path)}"

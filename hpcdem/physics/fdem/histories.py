@@ -19,7 +19,7 @@ KEY, STATE, FIRST = 0, 1, 2
 
 
 @dataclass
-class Memories:
+class Histories:
     """Rows rows[ptr[i] : ptr[i + 1]] belong to the i-th of the owned elements; ptr (n + 1,) i8, rows (m, 14) f8.
 
     Keys are int64 bits.
@@ -29,17 +29,17 @@ class Memories:
     rows: np.ndarray
 
     @staticmethod
-    def empty(n: int) -> Memories:
+    def empty(n: int) -> Histories:
         """n elements without any."""
-        return Memories(np.zeros(n + 1, np.int64), np.empty((0, WORDS)))
+        return Histories(np.zeros(n + 1, np.int64), np.empty((0, WORDS)))
 
     @staticmethod
-    def of(n: int, owner: np.ndarray, rows: np.ndarray) -> Memories:
+    def of(n: int, owner: np.ndarray, rows: np.ndarray) -> Histories:
         """From rows and the element (0 .. n - 1) each belongs to, in any order."""
         key = rows.view(np.int64)[:, KEY]
         order = np.lexsort((key, owner))
         ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=n)))).astype(np.int64)
-        return Memories(ptr, np.ascontiguousarray(rows[order]))
+        return Histories(ptr, np.ascontiguousarray(rows[order]))
 
     def counts(self) -> np.ndarray:
         """Rows per element (n,)."""
@@ -53,35 +53,35 @@ class Memories:
         """(m,) i8."""
         return self.rows.view(np.int64)[:, KEY]
 
-    def take(self, which: np.ndarray) -> Memories:
+    def take(self, which: np.ndarray) -> Histories:
         """Those of the elements `which`, in that order."""
         counts = self.counts()[which]
         if not len(self.rows):
-            return Memories.empty(len(which))
+            return Histories.empty(len(which))
         ends = np.cumsum(counts)
         at = np.repeat(self.ptr[which] - (ends - counts), counts) + np.arange(int(counts.sum()))
-        return Memories(np.concatenate(([0], ends)).astype(np.int64), self.rows[at])
+        return Histories(np.concatenate(([0], ends)).astype(np.int64), self.rows[at])
 
-    def joined(self, counts: np.ndarray, rows: np.ndarray) -> Memories:
+    def joined(self, counts: np.ndarray, rows: np.ndarray) -> Histories:
         """With more elements behind."""
         ends = self.ptr[-1] + np.cumsum(counts)
-        return Memories(
+        return Histories(
             np.concatenate([self.ptr, ends]).astype(np.int64), np.ascontiguousarray(np.concatenate([self.rows, rows]))
         )
 
-    def keep(self, rows: np.ndarray) -> Memories:
+    def keep(self, rows: np.ndarray) -> Histories:
         """Those rows (m,) bool alone."""
         owner = self.owners()[rows]
         ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(self.ptr) - 1))))
-        return Memories(ptr.astype(np.int64), np.ascontiguousarray(self.rows[rows]))
+        return Histories(ptr.astype(np.int64), np.ascontiguousarray(self.rows[rows]))
 
-    def without_partners(self, gone: np.ndarray) -> Memories:
+    def without_partners(self, gone: np.ndarray) -> Histories:
         """Without contacts with elements flagged in `gone` (ne,)."""
         key = self.keys()
         other = np.where(key >= 0, key // 4, 0)
         return self.keep((key < 0) | ~gone[other])
 
-    def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Memories:
+    def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Histories:
         """Without the joints on faces flagged in `forget` (4 ne,); number (n,): the elements."""
         key = self.keys()
         face = 4 * number[self.owners()] + np.where(key < 0, -1 - key, 0)
@@ -89,16 +89,16 @@ class Memories:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_joints(slot, rows, of_triangles, law, state, memory, head, follow):
-    """Give slots their memories; triangles' slots go to the list of their block."""
+def place_joints(slot, rows, of_triangles, law, state, history, head, follow):
+    """Give slots their histories; triangles' slots go to the list of their block."""
     for i in range(len(slot)):
         s = slot[i]
         if state[s] == joints.NONE:  # opened meanwhile, or its partner was taken out
             continue
         law[s] = 0
         state[s] = np.uint8(rows[i, STATE])
-        for m in range(joints.MEMORY):
-            memory[s, m] = rows[i, FIRST + m]
+        for m in range(joints.HISTORY):
+            history[s, m] = rows[i, FIRST + m]
         if s < of_triangles:
             b = s // (3 * elements.BLOCK)
             follow[s], head[b] = head[b], s
