@@ -18,17 +18,13 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from hpcdem.core.cells import columns, keys
-from hpcdem.core.clock import Clock
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.core.fields import CLUMP, FIELDS, FX, GID, RADIUS, TORQUE, WIDTH, X, Y
 from hpcdem.core.memory import aligned, take_rows
 from hpcdem.core.rebuild import LONGEST_WAIT, RebuildState
-from hpcdem.core.timers import Timers
 from hpcdem.decomp import strips
-from hpcdem.halo.comm import SerialComm
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration, Trail
-from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.dem import guards
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels import contacts, fast, mass, motion, neighbours, pair_forces, slips
@@ -39,6 +35,7 @@ from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.walls import Walls
+from hpcdem.physics.model import Model
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
@@ -97,11 +94,10 @@ class ParticlePhysics(Protocol):
         """Call every kernel once."""
 
 
-class Simulation:
-    """One model on one communicator.
+class Simulation(Model):
+    """One model of particles on one communicator, see `Model`.
 
-    comm: halo.comm; threads: per rank; outdir: where results go; log and stop: see runtime (None: silent, never
-    stopped). watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
+    watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
     draws: DRAW makes pictures; lost: particles that left the BOX so far; rows: first id of each row of GLINE and the
     one after its last; physics: on the particles, beside their motion, in the order in which they act; fast: particles
     with a reach of their own in the lists (physics/dem/kernels/fast.py); energy: the account of SET energy
@@ -117,33 +113,26 @@ class Simulation:
         stop: Any = None,
         balance_on: bool = True,
     ) -> None:
-        self.comm = comm if comm is not None else SerialComm()
-        self.threads = threads
-        self.outdir = Path(outdir)
+        super().__init__(comm, threads, outdir, log, stop, balance_on)
         self.folder_made = False
         self.job: Any = None  # runtime.run_folder.Job: what was started
         self.resumed = False  # goes on from a checkpoint that lies where it writes
         self.restored: tuple[Path, int] | None = None  # the checkpoint that the script named, and its step
         self.keep = 0  # numbered checkpoints that are kept, 0: all
-        self.log, self.stop = log, stop
         self.watchers: list[Watcher] = []
         self.number = 0  # of the simulations of a program, in the order in which they were made
         self.prepare_kernels: Callable[[str], object] = lambda kind: None  # compiles those of added physics
         self.coupled = False  # to blocks, which step them both (physics/coupling)
         self.goes_on_with = "--resume"
         self.draws = False
-        self.balance_on = balance_on
-        self.timers = Timers()
         self.script = ""
         self.position = 0
         self.line = 0
-        self.halo: Any = None
         self.clear()
 
     def clear(self) -> None:
         """Start a new model: no particles, no walls, default settings, step 0."""
-        self.release()
-        self.clock = Clock()
+        self.restart()
         self.settings = Settings()
         self.particles = Particles()
         self.physics: list[ParticlePhysics] = []
@@ -177,19 +166,11 @@ class Simulation:
         self._drift: np.ndarray | None = None
         self._hist: Histories | None = Histories.empty(0)
         self._lists: neighbours.ContactLists | None = None
-        self.ownership = Ownership(self.comm, self.balance_on)
         self.trail = Trail()
         self.origin = np.empty((0, 2))
-        self.rebuilds = 0
         self._longest2 = 0.0
         self._tables_stale = True
         self._pushed, self._push = np.empty(0, np.int64), np.empty((0, 2))
-
-    def release(self) -> None:
-        """Give back what MPI holds for this simulation."""
-        if self.halo is not None:
-            self.halo.close()
-        self.halo = None
 
     # ---- one step ------------------------------------------------------------------------------------------------
 

@@ -12,15 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hpcdem.core.clock import Clock
 from hpcdem.core.rebuild import RebuildState
-from hpcdem.core.timers import Timers
-from hpcdem.halo.comm import SerialComm
-from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
+from hpcdem.physics.model import Model
 
 NARROW, WIDE = 0.1, 0.3
 """Buffer of the contact search over the mean edge, at rest and in fast motion."""
@@ -55,7 +52,7 @@ class Crack(NamedTuple):
     peak_kinetic: float = math.nan
 
 
-class State(ModelDefinition):
+class State(ModelDefinition, Model):
     """ModelDefinition, positions, velocities and histories of the elements that a rank holds."""
 
     number: np.ndarray
@@ -67,7 +64,6 @@ class State(ModelDefinition):
     cold: dict[str, np.ndarray]
     """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
     histories: Histories
-    halo: Any
     surface_loads: SurfaceLoads
     n_left: int
     n_own: int
@@ -102,25 +98,15 @@ class State(ModelDefinition):
         stop: Any = None,
         balance_on: bool = True,
     ) -> None:
-        self.comm = comm if comm is not None else SerialComm()
-        self.threads = threads
-        self.outdir = Path(outdir)
-        self.log, self.stop = log, stop
-        self.balance_on = balance_on
-        self.timers = Timers()
-        self.halo = None
+        Model.__init__(self, comm, threads, outdir, log, stop, balance_on)
         self.surface_loads = SurfaceLoads()
-        super().__init__()
         self.clear()
 
     def clear(self) -> None:
         """Start a new model: no mesh, step 0, default options."""
-        self.release()
+        self.restart()
         self.clear_definition()
-        self.clock = Clock()
         self.rebuild_state = ListState()
-        self.ownership = Ownership(self.comm, self.balance_on)
-        self.rebuilds = 0
         self.event_rows: list[Crack] = []
         self.closed = False
         self.budget: Any = None
@@ -137,12 +123,6 @@ class State(ModelDefinition):
         self.x, self.v = np.empty((0, 8)), np.empty((0, 6))
         self.cold = {}
         self.histories = Histories.empty(0)
-
-    def release(self) -> None:
-        """Give back what MPI holds for this simulation. Not collective."""
-        if self.halo is not None:
-            self.halo.close()
-        self.halo = None
 
     @property
     def wide(self) -> bool:
