@@ -1,0 +1,221 @@
+"""Plastic flow after Mohr and Coulomb with a tension cut-off: where a trial stress outside the yield surface returns to.
+
+Principal stresses s1 <= s2 <= s3 (tension positive; in plane strain the one out of the plane is among them),
+N_a = (1 + sin a) / (1 - sin a), friction angle phi, dilation angle psi, cohesion c, tensile strength T <= c / tan(phi):
+
+    shear     f_s = -s1 + N_phi s3 - 2 c sqrt(N_phi) <= 0,   potential g_s = -s1 + N_psi s3
+    tension   f_t = s3 - T <= 0,                             potential g_t = s3
+
+The plastic strain of a step is that of Koiter: a sum of l dg/ds, l >= 0, over the surfaces that are active at its end;
+the stress is the trial stress less D times it, D with a = K + 4 G / 3 on the diagonal and b = K - 2 G / 3 beside it. By
+symmetry f_s also holds for the pairs (s2, s3), (s1, s2), and f_t for s2, s1. So the end lies in one of
+
+- the plane f_s: l = f_s / p, p = a - b N_psi - b N_phi + a N_phi N_psi;
+- its edge s1 = s2: pairs (s1, s3) and (s2, s3) active, [p q; q p] l = f, q = p - (a - b);
+- its edge s2 = s3: pairs (s1, s3) and (s1, s2), q = p - N_phi N_psi (a - b);
+- the plane s3 = T, its edge s2 = s3 = T, its corner s1 = s2 = s3 = T;
+- the line of both planes, s3 = T, s1 = N_phi T - 2 c sqrt(N_phi), and its two ends s2 = s1 and s2 = s3.
+
+They are tried in this order. Where two planes meet the matrix of their multipliers has positive principal minors (both
+planes: a^2 - b^2), so that there is one answer (Cottle, Pang & Stone 1992, theorem 3.3.7). The plastic work is not
+negative as long as psi <= phi. Formulas of the planes: Itasca, FLAC; of edges and corners: Clausen, Damkilde & Andersen
+2007 (Computers & Structures 85, 1795).
+
+Strains are split in the frame that turns with the element: sigma = sigma_0 + D (U - 1 - e_p), where e_p is the plastic
+strain. This is incremental (e_p depends on the way), objective for rotations of any size (the rate is that of Green and
+Naghdi), and as long as nothing yields the very formula of an elastic element. -D e_p is added to the initial stress,
+so the loop over triangles is the elastic one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels.elements import LAMBDA, TWO_MU
+
+SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
+"""Bits of the state of an element."""
+
+# Columns of the table of element models (rows, 4): N_phi, N_psi, 2 c sqrt(N_phi) [Pa], tensile strength [Pa]; infinite
+# strength: this model does not yield.
+N_PHI, N_PSI, STRENGTH, TENSILE = range(4)
+YIELD = 4
+# Columns of what an element remembers (n, 9): plastic strain 11, 22, 12, 33 in the frame that turns with it; shear and
+# volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0: never);
+# plastic work [J/m].
+E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
+MEMORY = 9
+
+
+@njit(cache=True, error_model="numpy")
+def principal_return(s1, s2, s3, n, m, k, t, a, b):
+    """Where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW.
+
+    n, m: N_phi, N_psi; k = 2 c sqrt(N_phi); t: tensile strength, at most k / (n - 1); a = K + 4 G / 3, b = K - 2 G / 3
+    [Pa].
+    """
+    shear, tension = n * s3 - s1 - k, s3 - t
+    if not (shear > 0.0 or tension > 0.0):
+        return s1, s2, s3, 0
+    p = a - b * m - b * n + a * n * m
+    along, aside, back = a - b * m, b * (1.0 - m), a * m - b
+    if shear > 0.0:
+        one = shear / p
+        r1, r2, r3 = s1 + one * along, s2 + one * aside, s3 - one * back
+        if r1 > r2:
+            other, q = n * s3 - s2 - k, p - (a - b)
+            r3 = s3 - (shear + other) / (p + q) * back
+            r1 = r2 = n * r3 - k
+        elif r2 > r3:
+            other, q = n * s2 - s1 - k, p - n * m * (a - b)
+            r1 = s1 + (shear + other) / (p + q) * along
+            r2 = r3 = (r1 + k) / n
+        if r3 <= t:
+            return r1, r2, r3, SHEAR_NOW
+    low = n * t - k
+    if tension > 0.0:
+        r1, r2 = s1 - b * (tension / a), s2 - b * (tension / a)
+        if r2 > t:
+            r1, r2 = s1 - b * ((tension + (s2 - t)) / (a + b)), t
+        if r1 > t:
+            r1 = t
+        if r1 >= low:
+            return r1, r2, t, TENSION_NOW
+    det = a * a - b * b
+    one, two = (a * shear - (n * a - b) * tension) / det, (p * tension - back * shear) / det
+    return low, min(max(s2 + one * aside - two * b, low), t), t, SHEAR_NOW | TENSION_NOW
+
+
+@njit(cache=True, error_model="numpy")
+def plastic_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
+    """Plastic strain (11, 22, 12, 33) that brings a trial stress [Pa] back, and SHEAR_NOW | TENSION_NOW; zero, and 0,
+    for a stress that is not outside. lame, two_mu: moduli [Pa]; others see `principal_return`."""
+    mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+    radius = math.sqrt(half * half + s12 * s12)
+    high, low = mean + radius, mean - radius
+    a, b = lame + two_mu, lame
+    if s33 > high:
+        r_low, r_high, r33, bits = principal_return(low, high, s33, n, m, k, t, a, b)
+    elif s33 < low:
+        r33, r_low, r_high, bits = principal_return(s33, low, high, n, m, k, t, a, b)
+    else:
+        r_low, r33, r_high, bits = principal_return(low, s33, high, n, m, k, t, a, b)
+    if bits == 0:
+        return 0.0, 0.0, 0.0, 0.0, 0
+    d_high, d_low, d33 = high - r_high, low - r_low, s33 - r33
+    common = lame / (3.0 * lame + two_mu) * (d_high + d_low + d33)
+    e_mean, e_half = (0.5 * (d_high + d_low) - common) / two_mu, 0.5 * (d_high - d_low) / two_mu
+    cos2, sin2 = (half / radius, s12 / radius) if radius > 0.0 else (1.0, 0.0)
+    return e_mean + e_half * cos2, e_mean - e_half * cos2, e_half * sin2, (d33 - common) / two_mu, bits
+
+
+@njit(cache=True, error_model="numpy")
+def relieve(memory, base, lame, two_mu, s0):
+    """Into s0 (4,) the stress [Pa] of an element without strain: its initial stress base (4,) less D e_p."""
+    pressure = lame * (memory[E11] + memory[E22] + memory[E33])
+    s0[0] = base[0] - (pressure + two_mu * memory[E11])
+    s0[1] = base[1] - (pressure + two_mu * memory[E22])
+    s0[2] = base[2] - two_mu * memory[E12]
+    s0[3] = base[3] - (pressure + two_mu * memory[E33])
+
+
+@njit(cache=True, error_model="numpy")
+def flow(s11, s22, s12, s33, law, c, base, step, memory, s0):
+    """Let an element whose trial stress [Pa] is outside flow: memory (9,) and s0 (4,) become those after it.
+
+    law (4,): row of the table of models; c (12,): row of the table of triangles; base (4,): initial stress [Pa].
+    """
+    lame, two_mu = c[LAMBDA], c[TWO_MU]
+    e11, e22, e12, e33, bits = plastic_strain(
+        s11, s22, s12, s33, law[N_PHI], law[N_PSI], law[STRENGTH], law[TENSILE], lame, two_mu
+    )
+    if bits == 0:
+        return
+    memory[E11] += e11
+    memory[E22] += e22
+    memory[E12] += e12
+    memory[E33] += e33
+    volume = e11 + e22 + e33
+    third = volume / 3.0
+    squares = (e11 - third) ** 2 + (e22 - third) ** 2 + (e33 - third) ** 2 + 2.0 * e12 * e12
+    memory[SHEAR] += math.sqrt(0.5 * squares)
+    memory[VOLUME] += volume
+    if bits & SHEAR_NOW:
+        memory[IN_SHEAR] = step + 1.0
+    if bits & TENSION_NOW:
+        memory[IN_TENSION] = step + 1.0
+    pressure = lame * volume
+    work = (s11 - (pressure + two_mu * e11)) * e11 + (s22 - (pressure + two_mu * e22)) * e22
+    work += 2.0 * (s12 - two_mu * e12) * e12 + (s33 - (pressure + two_mu * e33)) * e33
+    memory[WORK] += 0.5 / (c[0] * c[3] - c[1] * c[2]) * work
+    relieve(memory, base, lame, two_mu, s0)
+
+
+@njit(cache=True, error_model="numpy")
+def _flow(t, threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0):
+    for i in range(count * t // threads, count * (t + 1) // threads):
+        law = kind[i]
+        if table[law, STRENGTH] == np.inf:
+            continue
+        r = rows[i]
+        x1, y1 = x[r, 0], x[r, 1]
+        ux, uy, wx, wy = x[r, 2] - x1, x[r, 3] - y1, x[r, 4] - x1, x[r, 5] - y1
+        f11, f12 = ux * c[i, 0] + wx * c[i, 2], ux * c[i, 1] + wx * c[i, 3]
+        f21, f22 = uy * c[i, 0] + wy * c[i, 2], uy * c[i, 1] + wy * c[i, 3]
+        cs, sn = laws.rotation(f11, f12, f21, f22)
+        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
+        e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+        p, m = c[i, LAMBDA] * (e11 + e22), c[i, TWO_MU]
+        s11, s22 = s0[i, 0] + (p + m * e11), s0[i, 1] + (p + m * e22)
+        s12, s33 = s0[i, 2] + m * e12, s0[i, 3] + p
+        mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+        radius = math.sqrt(half * half + s12 * s12)
+        high, low = max(mean + radius, s33), min(mean - radius, s33)
+        if table[law, N_PHI] * high - low > table[law, STRENGTH] or high > table[law, TENSILE]:
+            flow(s11, s22, s12, s33, table[law], c[i], base[i], step, memory[r - first], s0[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flows(threads, *args):
+    """Let the triangles that are outside their yield surface at the present positions flow.
+
+    count: triangles; rows (count,): their rows of x, of which the first owned one is `first`; c (count, 12), see
+    `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; kind (count,): row of the table (rows, 4) of models, see
+    `YIELD`; small: small strains; step: number of this step; memory (n_own, 9), see `MEMORY`; s0 (count, 4) [Pa]:
+    stress without strain.
+    """
+    for t in range(threads):
+        _flow(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def flows_threaded(threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0):
+    """The same on several threads."""
+    for t in prange(threads):
+        _flow(t, threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def relieve_all(rows, first, c, base, memory, s0):
+    """`relieve` for triangles: s0 (count, 4) [Pa]; arguments as for `flows`."""
+    for i in range(len(rows)):
+        relieve(memory[rows[i] - first], base[i], c[i, LAMBDA], c[i, TWO_MU], s0[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def locked_in(rows, first, c, base, memory, out):
+    """Add to out (n_own,) what the elastic energy [J/m] differs by from that of an element with the initial stress s0:
+    with e = U - 1 it is A [(e - e_p) : D (e - e_p) / 2 + base : (e - e_p)] = A [e : D e / 2 + s0 : e] +
+    A [e_p : D e_p / 2 - base : e_p], s0 = base - D e_p."""
+    for i in range(len(rows)):
+        j = rows[i] - first
+        e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
+        trace = e11 + e22 + e33
+        squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
+        own = base[i, 0] * e11 + base[i, 1] * e22 + 2.0 * base[i, 2] * e12 + base[i, 3] * e33
+        area = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
+        out[j] += area * (0.5 * (c[i, LAMBDA] * trace * trace + c[i, TWO_MU] * squares) - own)
