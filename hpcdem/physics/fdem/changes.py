@@ -11,8 +11,9 @@ from hpcdem.physics.fdem import backfill, build, connectivity
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, _finite
 from hpcdem.physics.fdem.diagnostics import Looking
+from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, model
+from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
 from hpcdem.physics.fdem.tables import Value
 
 TORN = 0.1
@@ -80,8 +81,12 @@ class Changing(Looking):
     def element_model(self, elements: Numbers, name: str, given: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements; None: to all that are there.
         Elements among these numbers that were taken out come back (see `_bring_back`)."""
+        asked = np.flatnonzero(self.alive)
         if elements is not None:
             asked = self._numbers(elements, np.ones(len(self.alive), bool), "element")
+        if name == MECH_MOHR_COULOMB.name and len(quads := asked[self.the_mesh().cells[asked, 3] >= 0]):
+            raise CommandError(f"element {quads[0]} is a quad: {name} is for triangles")
+        if elements is not None:
             self._complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
             back = asked[~self.alive[asked]]
             if len(back):
@@ -283,9 +288,17 @@ class Changing(Looking):
         self._changed(stiffness=False)
 
     def reset_state(self, elements: Numbers = None) -> None:
-        """Forget what elements remember of yielding. No law of this version remembers anything, which the log says."""
+        """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on.
+        Stresses stay, and so does the plastic strain that they depend on. Where no element has a model that yields
+        the log says that nothing was changed."""
         at = self.numbers_of_elements(elements)
-        if self.log is not None:
+        if "plastic" in self.cold:
+            self._before_change()
+            mine = np.isin(self.number, at)
+            for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
+                self.cold["plastic"][mine, column] = 0.0
+            self._changed(stiffness=False)
+        if self.log is not None and not self.yielding()[at].any():
             names = sorted({self.element_rows.name(row) for row in np.unique(self.element_row[at]).tolist() if row})
             self.log.warn_once(
                 f"reset state {names}",

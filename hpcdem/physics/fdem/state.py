@@ -65,7 +65,8 @@ class State(ModelDefinition):
     v: np.ndarray
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
-    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
+    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
+    "plastic" (what is remembered of yielding, see plasticity.py)."""
     histories: Histories
     halo: Any
     surface_loads: SurfaceLoads

@@ -1,4 +1,4 @@
-"""Plastic flow after Mohr and Coulomb with a tension cut-off: where a trial stress outside the yield surface returns to.
+"""Plastic flow after Mohr and Coulomb with a tension cut-off: where stresses outside the yield surface return to.
 
 Principal stresses s1 <= s2 <= s3 (tension positive; in plane strain the one out of the plane is among them),
 N_a = (1 + sin a) / (1 - sin a), friction angle phi, dilation angle psi, cohesion c, tensile strength T <= c / tan(phi):
