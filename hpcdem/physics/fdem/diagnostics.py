@@ -218,7 +218,8 @@ class Looking(Core):
         return columns
 
     def _plastic_columns(self, some: slice | np.ndarray) -> dict[str, np.ndarray]:
-        """What elements remember of yielding; zero for those that never had a model that yields."""
+        """What elements remember of yielding; zero for those that never had a model that yields. They yield now if they
+        did in the last step or do at the present positions."""
         if "plastic" in self.cold:
             memory = self.local.flowed()[0][some]
         else:
@@ -234,7 +235,7 @@ class Looking(Core):
             (plasticity.IN_TENSION, plasticity.TENSION_NOW, plasticity.TENSION_PAST),
         ):
             last = memory[:, column]
-            state += np.where(last > self.clock.step, now, np.where(last > 0.0, past, 0))
+            state += np.where(last == 0.0, 0, np.where(last >= self.clock.step, now, past))
         return {**found, "plastic_state": state}
 
     def _node_columns(self, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
