@@ -355,7 +355,10 @@ RECORDED = {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
         "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m",
     },
-    "element": {"stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa"},
+    "element": {
+        "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
+        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m",
+    },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
         "normal-stress-largest": "Pa", "normal-stress-first": "Pa", "normal-stress-middle": "Pa",
@@ -365,8 +368,8 @@ RECORDED = {
     "model": {
         "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
-        "contact-energy": "J/m", "viscous-loss": "J/m", "gravity-work": "J/m", "outside-work": "J/m",
-        "disc-work": "J/m", "energy-error": "J/m",
+        "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "gravity-work": "J/m",
+        "outside-work": "J/m", "disc-work": "J/m", "energy-error": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
