@@ -158,7 +158,7 @@ class Local:
         if self.plastic:
             rows = self.triangle_rows[:count]
             self.initial = self.s0[:count].copy()
-            self.law = sim.element_row[sim.number[rows]]
+            self.law = sim.element_row[sim.number[self.triangle_rows]]
             self.yield_table = yield_table(sim.element_rows)
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, sim.cold["plastic"], self.s0)
 
@@ -435,7 +435,7 @@ class Local:
         sim = self.sim
         kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
         kernel(
-            sim.threads, self.count, self.triangle_rows, sim.n_left, sim.x, self.c, self.initial, self.law,
+            sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
             self.yield_table, not sim.options.large_strain, sim.clock.step, memory, s0,
         )  # fmt: skip
 

@@ -34,8 +34,9 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
 from hpcdem.physics.fdem.kernels import laws
-from hpcdem.physics.fdem.kernels.elements import LAMBDA, TWO_MU
+from hpcdem.physics.fdem.kernels.elements import BLOCK, LAMBDA, TWO_MU
 
 SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
 """Bits of the state of an element."""
@@ -49,6 +50,12 @@ YIELD = 4
 # plastic work [J/m].
 E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
 MEMORY = 9
+
+(
+    X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, _, L_STRENGTH, L_TENSILE, OUTSIDE,
+) = (lane(k) for k in range(21))  # fmt: skip
+LANES = 21
+_1, _2, _3, _FOUR, _TWELVE = U(1), U(2), U(3), U(4), U(12)
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,48 +162,89 @@ def flow(s11, s22, s12, s33, law, c, base, step, memory, s0):
     relieve(memory, base, lame, two_mu, s0)
 
 
-@njit(cache=True, error_model="numpy")
-def _flow(t, threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0):
-    for i in range(count * t // threads, count * (t + 1) // threads):
-        law = kind[i]
-        if table[law, STRENGTH] == np.inf:
-            continue
-        r = rows[i]
-        x1, y1 = x[r, 0], x[r, 1]
-        ux, uy, wx, wy = x[r, 2] - x1, x[r, 3] - y1, x[r, 4] - x1, x[r, 5] - y1
-        f11, f12 = ux * c[i, 0] + wx * c[i, 2], ux * c[i, 1] + wx * c[i, 3]
-        f21, f22 = uy * c[i, 0] + wy * c[i, 2], uy * c[i, 1] + wy * c[i, 3]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather(n, first, rows, wide, x, c, s0, law, table, lanes):
+    """Corners, moduli, stress without strain and yield surfaces of the triangles first : first + n into lanes."""
+    wx = U(12 if wide else 8)
+    for e in range(U(0), U(n), _FOUR):
+        i = U(first) + e
+        at = U(rows[i]) * wx, U(rows[i + _1]) * wx, U(rows[i + _2]) * wx, U(rows[i + _3]) * wx
+        four_columns(lanes, X1 + e, x, at)
+        two_columns(lanes, X3 + e, x, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
+        q0 = i * _TWELVE
+        q1, q2, q3 = q0 + _TWELVE, q0 + U(24), q0 + U(36)
+        four_columns(lanes, CA + e, c, (q0, q1, q2, q3))
+        two_columns(lanes, LAM + e, c, (q0 + _FOUR, q1 + _FOUR, q2 + _FOUR, q3 + _FOUR))
+        q0 = i * _FOUR
+        four_columns(lanes, S11 + e, s0, (q0, q0 + _FOUR, q0 + U(8), q0 + _TWELVE))
+        four_columns(
+            lanes, L_PHI + e, table,
+            (U(law[i]) * _FOUR, U(law[i + _1]) * _FOUR, U(law[i + _2]) * _FOUR, U(law[i + _3]) * _FOUR),
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _try(n, small, lanes):
+    """Trial stresses, in the place of those without strain, and by how much they are outside."""
+    for e in range(U(n)):
+        x1, y1 = lanes[X1 + e], lanes[Y1 + e]
+        ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
+        a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
+        f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
         cs, sn = laws.rotation(f11, f12, f21, f22)
         cs, sn = (1.0 if small else cs), (0.0 if small else sn)
         e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
-        p, m = c[i, LAMBDA] * (e11 + e22), c[i, TWO_MU]
-        s11, s22 = s0[i, 0] + (p + m * e11), s0[i, 1] + (p + m * e22)
-        s12, s33 = s0[i, 2] + m * e12, s0[i, 3] + p
+        p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
+        s11, s22 = lanes[S11 + e] + (p + m * e11), lanes[S22 + e] + (p + m * e22)
+        s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + p
         mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
         radius = math.sqrt(half * half + s12 * s12)
-        high, low = max(mean + radius, s33), min(mean - radius, s33)
-        if table[law, N_PHI] * high - low > table[law, STRENGTH] or high > table[law, TENSILE]:
-            flow(s11, s22, s12, s33, table[law], c[i], base[i], step, memory[r - first], s0[i])
+        high, low = mean + radius, mean - radius
+        high, low = (s33 if s33 > high else high), (s33 if s33 < low else low)
+        shear, tension = lanes[L_PHI + e] * high - low - lanes[L_STRENGTH + e], high - lanes[L_TENSILE + e]
+        lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e] = s11, s22, s12, s33
+        lanes[OUTSIDE + e] = shear if shear > tension else tension
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
+    lanes = np.zeros(LANES * CAPACITY)
+    flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
+    flat_table = table.reshape(table.size)
+    blocks = -(-count // BLOCK)
+    for b in range(blocks * t // threads, blocks * (t + 1) // threads):
+        first = b * BLOCK
+        n = min(BLOCK, count - first)
+        _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
+        _try(n, small, lanes)
+        for k in range(n):
+            e = U(k)
+            if lanes[OUTSIDE + e] > 0.0:
+                i = first + k
+                flow(
+                    lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e], table[law[i]], c[i], base[i], step,
+                    memory[rows[i] - first_row], s0[i],
+                )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def flows(threads, *args):
     """Let the triangles that are outside their yield surface at the present positions flow.
 
-    count: triangles; rows (count,): their rows of x, of which the first owned one is `first`; c (count, 12), see
-    `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; kind (count,): row of the table (rows, 4) of models, see
-    `YIELD`; small: small strains; step: number of this step; memory (n_own, 9), see `MEMORY`; s0 (count, 4) [Pa]:
-    stress without strain.
+    count: triangles; rows (count + 3,) i4: their rows of x, of which the first owned one is `first_row`; wide: x is
+    (n, 12); c (count + 3, 12), see `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; law (count + 3,): row of
+    the table (rows, 4) of models, see `YIELD`; small: small strains; step: number of this step; memory (n_own, 9), see
+    `MEMORY`; s0 (count + 3, 4) [Pa]: stress without strain.
     """
     for t in range(threads):
         _flow(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0):
+def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
     """The same on several threads."""
     for t in prange(threads):
-        _flow(t, threads, count, rows, first, x, c, base, kind, table, small, step, memory, s0)
+        _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
