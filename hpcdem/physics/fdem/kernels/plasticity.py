@@ -52,9 +52,10 @@ E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
 MEMORY = 9
 
 (
-    X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, _, L_STRENGTH, L_TENSILE, OUTSIDE,
-) = (lane(k) for k in range(21))  # fmt: skip
-LANES = 21
+    X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, L_PSI, L_STRENGTH, L_TENSILE, OUTSIDE,
+    P11, P22, P12, P33, T11, T22, T12, T33, P_LAM, P_MU2, P_PER_AREA, P_SHEAR, P_VOLUME, P_WORK,
+) = (lane(k) for k in range(35))  # fmt: skip
+LANES = 35
 _1, _2, _3, _FOUR, _TWELVE = U(1), U(2), U(3), U(4), U(12)
 
 
@@ -115,51 +116,23 @@ def plastic_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
         return 0.0, 0.0, 0.0, 0.0, 0
     d_high, d_low, d33 = high - r_high, low - r_low, s33 - r33
     common = lame / (3.0 * lame + two_mu) * (d_high + d_low + d33)
-    e_mean, e_half = (0.5 * (d_high + d_low) - common) / two_mu, 0.5 * (d_high - d_low) / two_mu
-    cos2, sin2 = (half / radius, s12 / radius) if radius > 0.0 else (1.0, 0.0)
-    return e_mean + e_half * cos2, e_mean - e_half * cos2, e_half * sin2, (d33 - common) / two_mu, bits
+    per = 1.0 / two_mu
+    e_mean = (0.5 * (d_high + d_low) - common) * per
+    along = 0.5 * (d_high - d_low) * per / radius if radius > 0.0 else 0.0  # else both are equal
+    return e_mean + along * half, e_mean - along * half, along * s12, (d33 - common) * per, bits
 
 
 @njit(cache=True, error_model="numpy")
-def relieve(memory, base, lame, two_mu, s0):
-    """Into s0 (4,) the stress [Pa] of an element without strain: its initial stress base (4,) less D e_p."""
-    pressure = lame * (memory[E11] + memory[E22] + memory[E33])
-    s0[0] = base[0] - (pressure + two_mu * memory[E11])
-    s0[1] = base[1] - (pressure + two_mu * memory[E22])
-    s0[2] = base[2] - two_mu * memory[E12]
-    s0[3] = base[3] - (pressure + two_mu * memory[E33])
-
-
-@njit(cache=True, error_model="numpy")
-def flow(s11, s22, s12, s33, law, c, base, step, memory, s0):
-    """Let an element whose trial stress [Pa] is outside flow: memory (9,) and s0 (4,) become those after it.
-
-    law (4,): row of the table of models; c (12,): row of the table of triangles; base (4,): initial stress [Pa].
-    """
-    lame, two_mu = c[LAMBDA], c[TWO_MU]
-    e11, e22, e12, e33, bits = plastic_strain(
-        s11, s22, s12, s33, law[N_PHI], law[N_PSI], law[STRENGTH], law[TENSILE], lame, two_mu
-    )
-    if bits == 0:
-        return
-    memory[E11] += e11
-    memory[E22] += e22
-    memory[E12] += e12
-    memory[E33] += e33
-    volume = e11 + e22 + e33
-    third = volume / 3.0
-    squares = (e11 - third) ** 2 + (e22 - third) ** 2 + (e33 - third) ** 2 + 2.0 * e12 * e12
-    memory[SHEAR] += math.sqrt(0.5 * squares)
-    memory[VOLUME] += volume
-    if bits & SHEAR_NOW:
-        memory[IN_SHEAR] = step + 1.0
-    if bits & TENSION_NOW:
-        memory[IN_TENSION] = step + 1.0
-    pressure = lame * volume
-    work = (s11 - (pressure + two_mu * e11)) * e11 + (s22 - (pressure + two_mu * e22)) * e22
-    work += 2.0 * (s12 - two_mu * e12) * e12 + (s33 - (pressure + two_mu * e33)) * e33
-    memory[WORK] += 0.5 / (c[0] * c[3] - c[1] * c[2]) * work
-    relieve(memory, base, lame, two_mu, s0)
+def relieve(i, j, c, base, memory, s0):
+    """Into row i of s0 the stress [Pa] of a triangle without strain: its initial stress less D e_p; j: its row of
+    memory."""
+    e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
+    two_mu = c[i, TWO_MU]
+    pressure = c[i, LAMBDA] * (e11 + e22 + e33)
+    s0[i, 0] = base[i, 0] - (pressure + two_mu * e11)
+    s0[i, 1] = base[i, 1] - (pressure + two_mu * e22)
+    s0[i, 2] = base[i, 2] - two_mu * e12
+    s0[i, 3] = base[i, 3] - (pressure + two_mu * e33)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -207,8 +180,67 @@ def _try(n, small, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _return(n, lanes, who, bits):
+    """Plastic strains of those that are outside, one after the other from the first place; who, bits (BLOCK,) i8: which
+    they are and how they yield. Returns their number."""
+    m = 0
+    for k in range(n):
+        e, at = U(k), U(m)
+        if lanes[OUTSIDE + e] > 0.0:
+            s11, s22, s12, s33 = lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e]
+            lame, two_mu = lanes[LAM + e], lanes[MU2 + e]
+            e11, e22, e12, e33, how = plastic_strain(
+                s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_PSI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e],
+                lame, two_mu,
+            )  # fmt: skip
+            lanes[P11 + at], lanes[P22 + at], lanes[P12 + at], lanes[P33 + at] = e11, e22, e12, e33
+            lanes[T11 + at], lanes[T22 + at], lanes[T12 + at], lanes[T33 + at] = s11, s22, s12, s33
+            lanes[P_LAM + at], lanes[P_MU2 + at] = lame, two_mu
+            lanes[P_PER_AREA + at] = 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
+            who[m], bits[m] = k, how
+            m += 1
+    return m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure(m, lanes):
+    """Shear, volume and work of the m plastic strains."""
+    for e in range(U(m)):
+        e11, e22, e12, e33 = lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e]
+        volume, two_mu = e11 + e22 + e33, lanes[P_MU2 + e]
+        third, pressure = volume / 3.0, lanes[P_LAM + e] * volume
+        d11, d22, d33 = e11 - third, e22 - third, e33 - third
+        work = (lanes[T11 + e] - (pressure + two_mu * e11)) * e11 + (lanes[T22 + e] - (pressure + two_mu * e22)) * e22
+        work += 2.0 * (lanes[T12 + e] - two_mu * e12) * e12 + (lanes[T33 + e] - (pressure + two_mu * e33)) * e33
+        lanes[P_SHEAR + e] = math.sqrt(0.5 * (d11 * d11 + d22 * d22 + d33 * d33 + 2.0 * e12 * e12))
+        lanes[P_VOLUME + e] = volume
+        lanes[P_WORK + e] = work / lanes[P_PER_AREA + e]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0):
+    """Add what has flowed to memory and s0."""
+    for k in range(m):
+        e, i = U(k), first + who[k]
+        j = rows[i] - first_row
+        memory[j, E11] += lanes[P11 + e]
+        memory[j, E22] += lanes[P22 + e]
+        memory[j, E12] += lanes[P12 + e]
+        memory[j, E33] += lanes[P33 + e]
+        memory[j, SHEAR] += lanes[P_SHEAR + e]
+        memory[j, VOLUME] += lanes[P_VOLUME + e]
+        if bits[k] & SHEAR_NOW:
+            memory[j, IN_SHEAR] = step + 1.0
+        if bits[k] & TENSION_NOW:
+            memory[j, IN_TENSION] = step + 1.0
+        memory[j, WORK] += lanes[P_WORK + e]
+        relieve(i, j, c, base, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
     lanes = np.zeros(LANES * CAPACITY)
+    who, bits = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
     flat_table = table.reshape(table.size)
     blocks = -(-count // BLOCK)
@@ -217,14 +249,10 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, smal
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
         _try(n, small, lanes)
-        for k in range(n):
-            e = U(k)
-            if lanes[OUTSIDE + e] > 0.0:
-                i = first + k
-                flow(
-                    lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e], table[law[i]], c[i], base[i], step,
-                    memory[rows[i] - first_row], s0[i],
-                )  # fmt: skip
+        m = _return(n, lanes, who, bits)
+        if m > 0:
+            _measure(m, lanes)
+            _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -251,7 +279,7 @@ def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, table
 def relieve_all(rows, first, c, base, memory, s0):
     """`relieve` for triangles: s0 (count, 4) [Pa]; arguments as for `flows`."""
     for i in range(len(rows)):
-        relieve(memory[rows[i] - first], base[i], c[i, LAMBDA], c[i, TWO_MU], s0[i])
+        relieve(i, rows[i] - first, c, base, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
