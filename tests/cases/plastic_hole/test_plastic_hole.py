@@ -6,11 +6,12 @@ With N = (1 + sin phi) / (1 - sin phi), q = 2 c sqrt(N), a the radius of the hol
     r < R: s_r = q / (N - 1) [1 - (r / a)^(N - 1)],   s_t = q / (N - 1) [1 - N (r / a)^(N - 1)]
     r > R: s_r, s_t = -P0 +- (P0 - (2 P0 - q) / (N + 1)) (R / r)^2
 
-from equilibrium d s_r / dr = (s_t - s_r) / r and s_t = N s_r - q, whatever the dilation, and s_r = -(2 P0 - q) / (N + 1)
-on both sides of R. K 3.9 GPa, G 2.8 GPa, c 3.45 MPa, phi 30 degrees, P0 30 MPa: R = 1.735 a, s_r = -12.01 MPa there.
+from equilibrium d s_r / dr = (s_t - s_r) / r and s_t = N s_r - q, whatever the dilation, and s_r = -(2 P0 - q) /
+(N + 1) on both sides of R. K 3.9 GPa, G 2.8 GPa, c 3.45 MPa, phi 30 degrees, P0 30 MPa: R = 1.735 a, s_r = -12.01 MPa
+there.
 
-Where psi < phi the answer is not the only one: finer meshes than this one, or a hole that is made in fewer stages, leave
-bands that flow and parts between them that unload. Stresses are compared as means of cells of four triangles.
+Where psi < phi the answer is not the only one: finer meshes than this one, or a hole that is made in fewer stages,
+leave bands that flow and parts between them that unload. Stresses are compared as means of cells of four triangles.
 """
 
 from __future__ import annotations
