@@ -158,7 +158,8 @@ class Local:
         if self.plastic:
             rows = self.triangle_rows[:count]
             self.initial = self.s0[:count].copy()
-            self.law = sim.element_row[sim.number[self.triangle_rows]]
+            self.law = np.zeros(count + 3, np.int32)
+            self.law[:count] = sim.element_row[sim.number[rows]]
             self.yield_table = yield_table(sim.element_rows)
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, sim.cold["plastic"], self.s0)
 
