@@ -10,7 +10,7 @@ import pytest
 from hpcdem.commands.fdem import Project
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang.pcdc.execute import Interpreter
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 PILLAR = """
 pcdc mesh structured (0,0) (1,2) cells 4 8 diagonal alternate

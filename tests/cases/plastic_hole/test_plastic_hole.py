@@ -21,8 +21,9 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 N, Q, P0 = 3.0, 2.0 * 3.45e6 * math.sqrt(3.0), 30e6
 ROCK = {
@@ -68,7 +69,7 @@ def hole(dilation: float) -> Blocks:
     """The pressure in the hole is lowered in stages, and the one outside follows the exact solution."""
     sim = Blocks()
     sim.take_mesh(quarter())
-    sim.element_model(None, "mech_mohr_coulomb", {**ROCK, "dilation": dilation})
+    changes.element_model(sim, None, "mech_mohr_coulomb", {**ROCK, "dilation": dilation})
     sim.option(dynamic=False, collision=False, large_strain=False)
     sim.initial_stress(None, xx=-P0, yy=-P0, zz=-P0)
     x, y = sim.mesh.points.T
@@ -83,10 +84,10 @@ def hole(dilation: float) -> Blocks:
         sim.stress_condition(faces[(far > OUTSIDE - 1e-6).all(axis=1)], normal=drop / OUTSIDE**2 - P0)
         sim.stress_condition(faces[(far < 1.0 + 1e-6).all(axis=1)], normal=-pressure)
         for _ in range(40):
-            sim.advance(50)
-            if sim.unbalanced_ratio() < (1e-4 if stage < STAGES else 1e-6):
+            convergence.advance(sim, 50)
+            if diagnostics.unbalanced_ratio(sim) < (1e-4 if stage < STAGES else 1e-6):
                 break
-    assert sim.unbalanced_ratio() < 2e-6
+    assert diagnostics.unbalanced_ratio(sim) < 2e-6
     return sim
 
 
@@ -95,7 +96,7 @@ def test_stresses_and_plastic_zone(dilation):
     sim = hole(dilation)
     areas, centres = sim.mesh.areas(), sim.mesh.centroids()
     c, s = centres.T / np.hypot(*centres.T)
-    xx, yy, xy = (sim.values(f"stress_{name}") for name in ("xx", "yy", "xy"))
+    xx, yy, xy = (diagnostics.values(sim, f"stress_{name}") for name in ("xx", "yy", "xy"))
     found = xx * c * c + yy * s * s + 2.0 * xy * c * s, xx * s * s + yy * c * c - 2.0 * xy * c * s
     cells = areas.reshape(-1, 4).sum(axis=1)
     means = [(areas * part).reshape(-1, 4).sum(axis=1) / cells for part in found]
@@ -104,7 +105,7 @@ def test_stresses_and_plastic_zone(dilation):
     near = np.where(r < 5.0, cells, 0.0)
     for mean, want in zip(means, wanted):
         assert math.sqrt((near * (mean - want) ** 2).sum() / (near * want**2).sum()) < 0.01
-    zone = math.sqrt(1.0 + 4.0 / math.pi * areas[sim.values("plastic_state") > 0].sum())
+    zone = math.sqrt(1.0 + 4.0 / math.pi * areas[diagnostics.values(sim, "plastic_state") > 0].sum())
     assert zone == pytest.approx(radius(0.0), rel=0.02) and radius(0.0) == pytest.approx(1.735, abs=5e-4)
     rings = means[0].reshape(ALONG, AROUND).mean(axis=1)
     there = np.interp(radius(0.0), r.reshape(ALONG, AROUND).mean(axis=1), rings)
