@@ -84,6 +84,35 @@ def flight(sim: Blocks) -> None:
     diagnostics.account_energy(sim)
 
 
+def yielding(sim: Blocks) -> None:
+    """Two blocks that yield, one of them jointed, hit each other while both fly to the right, through the strips of all
+    ranks; a part of the other is elastic."""
+    one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
+    two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13), 0.2, seed=2)
+    sim.take_mesh(joined(one, two))
+    rock = {**ROCK, "friction": 25.0, "cohesion": 2e6, "tensile": 1e6, "dilation": 10.0, "damp_factor": 0.05}
+    changes.element_model(sim, None, "mech_mohr_coulomb", rock)
+    sim.element_property(np.arange(0, len(one.cells), 3), {"cohesion": 3e6, "dilation": 0.0})
+    changes.element_model(sim, np.arange(len(one.cells), len(one.cells) + 6), "mech_iso_elastic", ROCK)
+    edges = sim.mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    sim.joint_model(inner[inner < 4 * len(one.cells)], COHESIVE, WEAK)
+    sim.initial_stress(None, xx=-1e4, yy=-2e4, zz=-1e4)
+    n = len(one.points)
+    changes.set_velocity(sim, np.arange(n), vx=203.0, vy=0.0)
+    changes.set_velocity(sim, np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)
+    diagnostics.account_energy(sim)
+
+
+def yield_more(sim: Blocks) -> None:
+    """What happens to them."""
+    if sim.clock.step == 600:
+        changes.reset_state(sim, np.arange(20))
+    if sim.clock.step == 800:
+        sim.element_property(np.arange(30, 60), {"cohesion": 0.5e6})
+        changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
+
+
 def opening(sim: Blocks) -> None:
     """A stressed bed of triangles and quads, jointed on the left, with a crack; a hole is made in it, then blasted."""
     mesh = shaken(rectangle(16, 8, 1.6, 0.8, kind="mixed"), 0.15)
@@ -182,7 +211,7 @@ def nothing(sim: Blocks) -> None:
 
 
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
-         "opening": (opening, open_up), "backfill": (backfill, fill_up),
+         "yielding": (yielding, yield_more), "opening": (opening, open_up), "backfill": (backfill, fill_up),
          "borders": (report_borders, nothing)}  # fmt: skip
 
 
@@ -217,6 +246,8 @@ def main() -> None:
         "shear_stress_largest",
         "shear_stress_first",
     ):
+        found[name] = diagnostics.values(sim, name)
+    for name in ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work"):
         found[name] = diagnostics.values(sim, name)
     found.update({f"event_{name}": values for name, values in diagnostics.events(sim).items()})
     found["counts"] = np.array(diagnostics.joint_counts(sim))

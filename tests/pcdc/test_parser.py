@@ -199,7 +199,6 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 
 LATER = [
-    ("element c-model mech-m-c den 1", "plasticity comes later"),
     ("element c-model mech-burgers den 1", "creep comes later"),
     ("element c-model therm-iso-h con 1", "heat comes later"),
     ("face-joint c-model hydr-p-m f-den 1", "fluid in fractures comes later"),

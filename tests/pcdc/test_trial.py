@@ -10,6 +10,7 @@ from hpcdem.lang.pcdc import check
 
 ROCK = "element c-model mech-iso-e property density 2500 "
 JOINT = "face-joint c-model c-i-c-i property cohesion 1e6 tensile-strength 1e6 "
+SOIL = "element c-model mech-m-c property density 2000 young 1e8 poisson-ratio 0.3 cohesion 1e4 "
 REFUSED = [
     (JOINT + "gf1 1 gf2 1 np 7", "expected 3, the points of a joint"),
     (JOINT + "gf1 0 gf2 1", "gf1 must be > 0"), (JOINT + "gf1 1 gf2 0", "gf2 must be > 0"),
@@ -24,6 +25,9 @@ REFUSED = [
     (ROCK + "young 1e9 poisson-ratio 0.3 shear 1e9", "needs two of"),
     ("element property young 1e9 shear 0.2e9", "Poisson's ratio 1.5"),
     ("element property friction 89.9", "expected an angle from 0 to 89 [degrees] for 'friction'"),
+    (SOIL + "tensile 1 friction 20 dilation 30", "dilation must not be above friction (20 degrees), got 30"),
+    (SOIL + "friction 20", "lacks ten{sile}"), (SOIL + "tensile -1", "expected a number, not negative"),
+    ("element property cohesion -1", "expected a number, not negative"),
     ("element-face c-model contact-m-c property damping-b 0.5", "expected a number, at least 1 for 'damping-b'"),
     ("element-face property damping-b 0.5", "expected a number, at least 1 for 'damping-b'"),
     ("model new dim 1", "expected 2 or 3"), ("model new dim 3", "dim 3 is not there yet"),

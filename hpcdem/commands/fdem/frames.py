@@ -113,11 +113,14 @@ def whole(project: Project) -> MeshState | None:
 
 def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
-    joints; of properties those that a table or a field has made different from object to object."""
+    joints; of properties those that a table or a field has made different from object to object; of plastic flow only
+    where elements can yield."""
+    yields = "plastic" in blocks.cold or bool(blocks.yielding().any())
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
     return [
         name for name, quantity in QUANTITIES.items()
         if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
+        and (yields or not name.startswith("plastic_"))
     ]  # fmt: skip
 
 

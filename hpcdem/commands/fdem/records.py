@@ -20,7 +20,10 @@ UNITS = {
         "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
         "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m",
     },
-    ELEMENT: {"stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa"},
+    ELEMENT: {
+        "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
+        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
+    },
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
         "normal_stress_largest": "Pa", "normal_stress_first": "Pa", "normal_stress_middle": "Pa",
@@ -30,8 +33,8 @@ UNITS = {
     MODEL: {
         "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
-        "contact_energy": "J/m", "viscous_loss": "J/m", "gravity_work": "J/m", "outside_work": "J/m",
-        "disc_work": "J/m", "energy_error": "J/m",
+        "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "gravity_work": "J/m",
+        "outside_work": "J/m", "disc_work": "J/m", "energy_error": "J/m",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -59,6 +62,7 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "joint_loss": _energy("joints_lost"),
     "contact_energy": _energy("contact"),
     "viscous_loss": _energy("viscous_lost"),
+    "plastic_loss": _energy("plastic_lost"),
     "gravity_work": _energy("work_gravity"),
     "outside_work": _energy("work_outside"),
     "disc_work": _energy("work_discs"),

@@ -18,6 +18,7 @@ ENERGY_WORDS = {
     "joints_lost": "lost by fracture and friction in joints",
     "contact": "lost or stored by contacts",
     "viscous_lost": "lost by viscous damping",
+    "plastic_lost": "lost by plastic flow",
     "work_gravity": "work of gravity",
     "work_outside": "work of loads and conditions",
     "work_discs": output.ACROSS,
@@ -46,7 +47,7 @@ def close(project: Project, figure: bool = True) -> None:
         rows = [
             (text, f"{energies[name]:.6g}")
             for name, text in ENERGY_WORDS.items()
-            if name != "work_discs" or energies["work_discs"]
+            if name not in ("work_discs", "plastic_lost") or energies[name]
         ]
         log.table("energy budget", ("energy", "J/m"), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")

@@ -13,12 +13,11 @@ them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
-    ANGLE,
     BOOL,
     COUNT,
     DIMENSIONS,
@@ -49,7 +48,6 @@ FLOW = "fluid in fractures comes later; this version computes mechanics"
 HEAT = "heat comes later; this version computes mechanics"
 PROPPANT = "proppant comes later; this version computes mechanics"
 BOLTS = "rock bolts come later"
-PLASTIC = "plasticity comes later; this version has the elastic model mech-iso-elastic, and joints that break"
 CREEP = "creep comes later; this version has the elastic model mech-iso-elastic"
 
 
@@ -187,7 +185,7 @@ _ELASTIC = declared(
     properties.MECH_ISO_ELASTIC, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
     "fri{ction}", "pen{alty}",
 )  # fmt: skip
-_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP, _FRICTION = _ELASTIC[:7]
+_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _DAMP = _ELASTIC[:6]
 _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
 
 ISO_ELASTIC = Model(
@@ -202,12 +200,13 @@ NULL = Model(
             "s", "at once"),),
 )  # fmt: skip
 MOHR_COULOMB = Model(
-    "mech{anical}-m{ohr}-c{oulomb}", "2", "Elastic and plastic after Mohr and Coulomb, with a tension cut-off.",
-    (_DENSITY, _YOUNG, _POISSON, _SHEAR, _BULK, _FRICTION,
-     Option("coh{esion}", (NOT_NEGATIVE,), "cohesion", "Pa"),
-     Option("ten{sile}", (NOT_NEGATIVE,), "tensile strength", "Pa"),
-     Option("di{lation}", (ANGLE,), "dilation angle", "degrees", "0"), _DAMP),
-    later=PLASTIC,
+    "mech{anical}-m{ohr}-c{oulomb}", "2",
+    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations. For triangles.",
+    declared(
+        properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
+        "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
+    ),
+    one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB,
 )  # fmt: skip
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3", "Creep after Burgers.",
@@ -358,7 +357,10 @@ RECORDED = {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
         "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m",
     },
-    "element": {"stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa"},
+    "element": {
+        "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
+        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m",
+    },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
         "normal-stress-largest": "Pa", "normal-stress-first": "Pa", "normal-stress-middle": "Pa",
@@ -368,8 +370,8 @@ RECORDED = {
     "model": {
         "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
-        "contact-energy": "J/m", "viscous-loss": "J/m", "gravity-work": "J/m", "outside-work": "J/m",
-        "disc-work": "J/m", "energy-error": "J/m",
+        "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "gravity-work": "J/m",
+        "outside-work": "J/m", "disc-work": "J/m", "energy-error": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -393,6 +395,12 @@ def _properties(model: Model) -> tuple[Option, ...]:
     """Those of a model, none of them compulsory, for commands that change some."""
     return tuple(Option(o.notation, o.values, o.doc, o.unit, also=o.also) for o in model.options if o.name != "np")
 
+
+_OF_SOLIDS = (
+    *(replace(o, doc=f"{o.doc}; the internal one of {MOHR_COULOMB.keyword.name}") if o.name == "friction" else o
+      for o in _properties(ISO_ELASTIC)),
+    *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
+)  # fmt: skip
 
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
@@ -592,8 +600,7 @@ _OBJECTS = (
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
-            options=_properties(ISO_ELASTIC),
-            ranged="element", needs_option=True),
+            options=_OF_SOLIDS, ranged="element", needs_option=True),
     Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
             "not given are zero. It is that of a strain, by the moduli of this moment: where these are lowered later, "
             "it goes down with them.",
@@ -604,7 +611,7 @@ _OBJECTS = (
                        more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
                 for c in ("xx", "yy", "xy", "zz")), ranged="element", needs_option=True),
     Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
-            "log says that nothing was changed.",
+            "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
             ("pcdc element reset state",), ranged="element", manual=True),
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",

@@ -7,14 +7,16 @@ from typing import Any
 
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import Pending, TableName
-from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, Command
+from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
-MODELS = {model.keyword.name: model.of for model in (ISO_ELASTIC, CONTACT, COHESIVE) if model.of is not None}
+MODELS = {
+    model.keyword.name: model.of for model in (ISO_ELASTIC, MOHR_COULOMB, CONTACT, COHESIVE) if model.of is not None
+}
 """Models of the language by their names in full."""
 _OF_COMMAND = {
-    "element property": properties.MECH_ISO_ELASTIC,
+    "element property": properties.SOLID,
     "element-face property": properties.CONTACT_MOHR_COULOMB,
     "face-joint property": properties.COHESIVE,
 }
@@ -87,6 +89,9 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     moduli = {name: value for name, value in given.items() if name in properties.MODULI}
     if len(moduli) > 1:
         properties.MECH_ISO_ELASTIC.complete({"density": 1.0, **moduli})
+    if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
+        rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
+        model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if model is properties.COHESIVE:
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
             pair = {name: given.get(name, 0.0) for name in (strength, energy)}

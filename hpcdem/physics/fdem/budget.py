@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.numerics.exact_sum import exact_sum, from_integer
-from hpcdem.physics.fdem.kernels import energy
+from hpcdem.physics.fdem.kernels import energy, plasticity
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 STORED = ("kinetic", "strain", "joints")
-WORK = ("joints", "contact", "viscous", "gravity", "outside")
-"""Columns of energy.WORK by name."""
+WORK = ("joints", "contact", "viscous", "gravity", "outside", "plastic")
+"""Columns of energy.WORK by name, and the work of plastic flow, which elements carry with what they remember of it."""
 
 
 class Budget:
@@ -105,13 +105,14 @@ class Budget:
             "joints_lost": joints_lost,
             "contact": -work["contact"],
             "viscous_lost": -work["viscous"],
+            "plastic_lost": -work["plastic"],
             "work_gravity": work["gravity"],
             "work_outside": work["outside"] - of_discs,
             "work_discs": of_discs,
             "commands": by_commands,
         }
         given = work["gravity"] + work["outside"] + by_commands
-        taken = joints_lost - work["contact"] - work["viscous"]
+        taken = joints_lost - work["contact"] - work["viscous"] - work["plastic"]
         found["closing"] = change + taken - given
         flows = [joints_lost, *(work[name] for name in WORK[1:]), by_commands]
         flows += [sum(map(abs, part.values())) for part in (stored, start)]
@@ -143,6 +144,8 @@ class Budget:
             _, strain = local.stresses()
             in_joints = local.stored_in_joints()
             half = np.zeros((sim.n_own, energy.WORK))
+            if local.plastic:
+                half[:, WORK.index("plastic")] = -local.flowed()[0][:, plasticity.WORK]
             self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}
@@ -178,6 +181,6 @@ class Budget:
         """Inverse of `state`; first: this rank takes the share of all ranks."""
         made = Budget()
         made.discs = int(state.get("discs", "0x0"), 16) if first else 0
-        made.accounts, made.commands = dict(state["accounts"]), dict(state["commands"])
+        made.accounts, made.commands = {**made.accounts, **state["accounts"]}, dict(state["commands"])
         made.start, made.left, made.running = state["start"], state["left"], state["running"]
         return made

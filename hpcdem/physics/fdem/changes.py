@@ -10,8 +10,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
+from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, model
+from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 
@@ -64,8 +65,12 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
 def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str, Value]) -> None:
     """Assign a model (model.blocks.properties) with all its properties to elements; None: to all that are there.
     Elements among these numbers that were taken out come back (see `_bring_back`)."""
+    asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
+    if name == MECH_MOHR_COULOMB.name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
+        raise CommandError(f"element {quads[0]} is a quad: {name} is for triangles")
+    if elements is not None:
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
         if len(back):
@@ -276,9 +281,17 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
 
 
 def reset_state(sim: Blocks, elements: Numbers = None) -> None:
-    """Forget what elements remember of yielding. No law of this version remembers anything, which the log says."""
+    """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on. Stresses
+    stay, and so does the plastic strain that they depend on. Where no element has a model that yields the log says
+    that nothing was changed."""
     at = sim.numbers_of_elements(elements)
-    if sim.log is not None:
+    if "plastic" in sim.cold:
+        sim.before_change()
+        mine = np.isin(sim.number, at)
+        for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
+            sim.cold["plastic"][mine, column] = 0.0
+        sim.changed(stiffness=False)
+    if sim.log is not None and not sim.yielding()[at].any():
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
         sim.log.warn_once(
             f"reset state {names}",

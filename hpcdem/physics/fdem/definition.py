@@ -19,7 +19,7 @@ from hpcdem.physics.fdem import connectivity, properties
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.properties import ELEMENT, FACE, JOINT, MODULI, Model, Rows
+from hpcdem.physics.fdem.properties import ELEMENT, FACE, JOINT, MECH_MOHR_COULOMB, MODULI, Model, Rows
 from hpcdem.physics.fdem.tables import Drawn, Over, Table, Value
 
 Numbers = np.ndarray | Sequence[int] | None
@@ -272,6 +272,11 @@ class ModelDefinition:
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
+
+    def yielding(self) -> np.ndarray:
+        """(ne,) bool: elements that are there and have a model that can yield."""
+        names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
+        return self.alive & np.array([name == MECH_MOHR_COULOMB.name for name in names])[self.element_row]
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""

@@ -12,11 +12,11 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
-from hpcdem.physics.fdem.kernels import elements
+from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
-from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC
+from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 
@@ -44,6 +44,14 @@ QUANTITIES: dict[str, Quantity] = {
     "strain_energy": Quantity("element", "J/m", "elastic energy"),
     "area": Quantity("element", "m2", "area in the mesh"),
     "element_model": Quantity("element", "1", "row of the table of element models"),
+    "plastic_state": Quantity(
+        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8"
+    ),
+    "plastic_shear_strain": Quantity(
+        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator"
+    ),
+    "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain"),
+    "plastic_work": Quantity("element", "J/m", "work of plastic flow"),
     **_pair("position", "node", "m", "position"),
     **_pair("displacement", "node", "m", "displacement"),
     **_pair("velocity", "node", "m/s", "velocity"),
@@ -78,13 +86,17 @@ for _on, _names in (("element", ("position", "displacement", "velocity")), ("joi
                 _on, QUANTITIES[f"{_name}_{_axis}"].unit, f"mean {_name}", False
             )
 
+_STRENGTH = {"cohesion": "element_cohesion", "tensile": "element_tensile", "dilation": "element_dilation"}
 PROPERTIES = {
-    "element": {p.name: p.name for p in MECH_ISO_ELASTIC.properties},
+    "element": {
+        _STRENGTH.get(p.name, p.name): p.name for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB) for p in m.properties
+    },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }
 """Properties of elements and joints, by their names as quantities. In frames if they differ from object to object."""
-for _on, _model in (("element", MECH_ISO_ELASTIC), ("joint", COHESIVE)):
+for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB)), ("joint", (COHESIVE,))):
     for _quantity, _name in PROPERTIES[_on].items():
+        _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(_on, _model.property(_name).unit, _model.property(_name).doc, False)
 
 _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
@@ -200,11 +212,35 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
+    if any(name.startswith("plastic") for name in wanted):
+        columns |= _plastic_columns(sim, some)
     for name in wanted & PROPERTIES["element"].keys():
-        columns[name] = sim.element_rows.column(name)[sim.element_row[number]]
+        columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
     columns["area"] = sim.areas[number]
     columns["element_model"] = sim.element_row[number].astype(float)
     return columns
+
+
+def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
+    """What elements remember of yielding; zero for those that never had a model that yields. They yield now if they
+    did in the last step or do at the present positions."""
+    if "plastic" in sim.cold:
+        memory = sim.local.flowed()[0][some]
+    else:
+        memory = np.zeros((sim.n_own, plasticity.MEMORY))[some]
+    state = np.zeros(len(memory))
+    for column, now, past in (
+        (plasticity.IN_SHEAR, plasticity.SHEAR_NOW, plasticity.SHEAR_PAST),
+        (plasticity.IN_TENSION, plasticity.TENSION_NOW, plasticity.TENSION_PAST),
+    ):
+        last = memory[:, column]
+        state += np.where(last == 0.0, 0, np.where(last >= sim.clock.step, now, past))
+    return {
+        "plastic_state": state,
+        "plastic_shear_strain": memory[:, plasticity.SHEAR].copy(),
+        "plastic_volume_strain": memory[:, plasticity.VOLUME].copy(),
+        "plastic_work": memory[:, plasticity.WORK].copy(),
+    }
 
 
 def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -442,8 +478,8 @@ def energies(sim: Blocks) -> dict[str, float]:
     """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
-    in joints), contact (stored or lost there), viscous_lost, work_gravity, work_outside (loads and conditions),
-    work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
+    in joints), contact (stored or lost there), viscous_lost, plastic_lost, work_gravity, work_outside (loads and
+    conditions), work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
     what is stored + lost - work - commands; relative: that over the largest of all.
     """
     if sim.budget is None:

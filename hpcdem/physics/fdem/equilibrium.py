@@ -21,6 +21,7 @@ from hpcdem.physics.fdem.kernels import stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
 from hpcdem.physics.fdem.linear import MANY, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.local import Evaluation
+from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 
 AIM = 1e-12
@@ -76,10 +77,17 @@ def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: s
     400 000 unknowns on, else direct.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
-    that touch (before or in the answer), joints behind their peak (before or in the answer), no convergence.
+    that touch (before or in the answer), elements that can yield, joints behind their peak (before or in the answer),
+    no convergence.
     """
     if cycles < 1 or not ratio > 0.0 or solver not in SOLVERS:
         raise CommandError(f"cycles and ratio must be positive, solver one of {', '.join(SOLVERS)}")
+    yielding = np.flatnonzero(sim.yielding())
+    if len(yielding):
+        raise CommandError(
+            f"element {yielding[0]} can yield ({len(yielding)} have the model {MECH_MOHR_COULOMB.name}): the static "
+            "solve takes elastic elements; model solve relaxes others to equilibrium"
+        )
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
         sim._renew_lists()

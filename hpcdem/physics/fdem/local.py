@@ -13,11 +13,11 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
-from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits
+from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plasticity
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
-from hpcdem.physics.fdem.properties import Rows
+from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, Rows
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
@@ -60,6 +60,20 @@ def element_table(rows: Rows) -> np.ndarray:
     bulk, shear = models[:, 1].copy(), models[:, 2].copy()
     models[:, build.LAME], models[:, build.MU2] = bulk - 2.0 / 3.0 * shear, 2.0 * shear
     return models
+
+
+def yield_table(rows: Rows) -> np.ndarray:
+    """The table of yield surfaces (rows, 4) of plasticity.py; models that do not yield have infinite strength."""
+    yields = np.array([rows.name(row) == MECH_MOHR_COULOMB.name for row in range(len(rows))])
+    friction, dilation = (np.radians(rows.column(name)) for name in ("friction", "dilation"))
+    cohesion = np.where(yields, rows.column("cohesion"), math.inf)
+    table = np.empty((len(rows), plasticity.YIELD))
+    table[:, plasticity.N_PHI] = np.tan(0.25 * math.pi + 0.5 * friction) ** 2
+    table[:, plasticity.N_PSI] = np.tan(0.25 * math.pi + 0.5 * dilation) ** 2
+    table[:, plasticity.STRENGTH] = 2.0 * cohesion * np.sqrt(table[:, plasticity.N_PHI])
+    apex = np.divide(cohesion, np.tan(friction), out=np.full(len(rows), math.inf), where=friction > 0.0)
+    table[:, plasticity.TENSILE] = np.where(yields, np.minimum(rows.column("tensile"), apex), math.inf)
+    return table
 
 
 @dataclass
@@ -139,6 +153,15 @@ class Local:
         if sim.stress0 is not None:
             self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
             self.quad_s0[:] = sim.initial_stresses(sim.number[self.quad_rows])
+        self.plastic = "plastic" in sim.cold
+        self.yields = bool(sim.yielding().any())
+        if self.plastic:
+            rows = self.triangle_rows[:count]
+            self.initial = self.s0[:count].copy()
+            self.law = np.zeros(count + 3, np.int32)
+            self.law[:count] = sim.element_row[sim.number[rows]]
+            self.yield_table = yield_table(sim.element_rows)
+            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, sim.cold["plastic"], self.s0)
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -399,9 +422,9 @@ class Local:
         small = not o.large_strain
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None, small, self.slot_at, self.slot_law, self.slot_kind, self.slot_state,
-            self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond, pairs.block_begin,
-            pairs.lane, pairs.slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic, small, self.slot_at, self.slot_law, self.slot_kind,
+            self.slot_state, self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond,
+            pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
@@ -428,11 +451,31 @@ class Local:
     ) -> None:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
+        if self.yields:
+            self._flow(sim.cold["plastic"], self.s0)
         self._triangles(
             *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
         )
         if len(self.quad_rows):
             self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
+
+    def _flow(self, memory: np.ndarray, s0: np.ndarray) -> None:
+        """Elements outside their yield surface at the present positions flow: memory (n_own, 9) and s0 (count + 3, 4)
+        [Pa] become those after it."""
+        sim = self.sim
+        kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
+        kernel(
+            sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
+            self.yield_table, not sim.options.large_strain, sim.clock.step, memory, s0,
+        )  # fmt: skip
+
+    def flowed(self) -> tuple[np.ndarray, np.ndarray]:
+        """What elements remember of yielding (n_own, 9) and the stress of triangles without strain (count + 3, 4) [Pa],
+        after the flow of this moment, which the next forces will see: copies."""
+        memory, s0 = self.sim.cold["plastic"].copy(), self.s0.copy()
+        if self.yields:
+            self._flow(memory, s0)
+        return memory, s0
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
@@ -476,6 +519,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
+                *((sim.cold["plastic"], self.s0) if self.yields else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -558,8 +602,9 @@ class Local:
         """Stress (n_own, 4) xx, yy, xy, zz [Pa] and, unless they are not wanted, elastic energies (n_own,) [J/m] of the
         owned elements, or of some of them (at: the how-manieth)."""
         sim = self.sim
+        memory, s0 = self.flowed() if self.plastic else (None, self.s0)
         if at is None:
-            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, self.s0, self.quad_s0
+            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, self.quad_s0
             n, first = sim.n_own, sim.n_left
         else:
             triangle = self.triangle_of_row[at]
@@ -567,10 +612,14 @@ class Local:
             triangle, quad = triangle[three], np.searchsorted(self.quad_rows, at[~three] + sim.n_left)
             places = np.flatnonzero(three).astype(np.int32), np.flatnonzero(~three).astype(np.int32)
             rows = (
-                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], self.s0[triangle], self.quad_s0[quad],
+                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], s0[triangle], self.quad_s0[quad],
             )  # fmt: skip
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
+        if memory is not None and energies:
+            more = np.zeros(sim.n_own)
+            plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, self.initial, memory, more)
+            energy += more if at is None else more[at]
         return stress, energy
 
     def stored_in_joints(self) -> np.ndarray:

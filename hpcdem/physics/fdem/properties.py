@@ -157,26 +157,61 @@ def _friction(doc: str) -> Property:
     return Property("friction", "degrees", doc, 0.0, high=89.0)
 
 
+def _strength(values: dict[str, Any]) -> None:
+    """All four moduli; no more dilation than friction, or flow would give energy."""
+    _elastic(values)
+    dilation, friction = np.asarray(values["dilation"]), np.asarray(values["friction"])
+    if np.any(dilation > friction):
+        wrong = dilation > friction
+        one, other = (float(np.broadcast_to(v, wrong.shape)[wrong].flat[0]) for v in (dilation, friction))
+        raise CommandError(f"dilation must not be above friction ({other:g} degrees), got {one:g}")
+
+
+_SOLID = (
+    Property("density", "kg/m3", "density", low_itself=False),
+    Property("young", "Pa", "Young's modulus E", optional=True, low_itself=False),
+    Property("poisson_ratio", "1", "Poisson's ratio", optional=True, low=-1.0, high=0.4999, low_itself=False),
+    Property("shear", "Pa", "shear modulus, with the bulk modulus in the place of E and Poisson's ratio",
+             optional=True, low_itself=False),
+    Property("bulk", "Pa", "bulk modulus, with the shear modulus in the place of E and Poisson's ratio",
+             optional=True, low_itself=False),
+    Property("damp_factor", "1", "viscous damping, part of the critical 2 L sqrt(rho E); without effect in static "
+             "runs", 0.0),
+)  # fmt: skip
+
 MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
     ELEMENT,
     "isotropic, elastic, large rotations",
     (
-        Property("density", "kg/m3", "density", low_itself=False),
-        Property("young", "Pa", "Young's modulus E", optional=True, low_itself=False),
-        Property("poisson_ratio", "1", "Poisson's ratio", optional=True, low=-1.0, high=0.4999, low_itself=False),
-        Property("shear", "Pa", "shear modulus, with the bulk modulus in the place of E and Poisson's ratio",
-                 optional=True, low_itself=False),
-        Property("bulk", "Pa", "bulk modulus, with the shear modulus in the place of E and Poisson's ratio",
-                 optional=True, low_itself=False),
-        Property("damp_factor", "1", "viscous damping, part of the critical 2 L sqrt(rho E); without effect in static "
-                 "runs", 0.0),
+        *_SOLID,
         _friction("friction angle of its surfaces where they have no contact model"),
         Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
                  "joints, or 10 E", 0.0),
     ),
     _elastic,
 )  # fmt: skip
+
+MECH_MOHR_COULOMB = Model(
+    "mech_mohr_coulomb",
+    ELEMENT,
+    "elastic up to the strength of Mohr and Coulomb or in tension, then plastic; triangles",
+    (
+        *_SOLID,
+        _friction("internal friction angle; also that of its surfaces where they have no contact model"),
+        Property("cohesion", "Pa", "cohesion"),
+        Property("tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts"),
+        Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0),
+    ),
+    _strength,
+)  # fmt: skip
+
+SOLID = Model(
+    "of elements",
+    ELEMENT,
+    "all that an element may have, whatever its model",
+    tuple({p.name: p for m in (MECH_MOHR_COULOMB, MECH_ISO_ELASTIC) for p in m.properties}.values()),
+)
 
 CONTACT_MOHR_COULOMB = Model(
     "contact_mohr_coulomb",
@@ -226,7 +261,7 @@ def _cohesive(values: dict[str, Any]) -> None:
             raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {where:g} Pa, got 0")
 
 
-MODELS = {model.name: model for model in (MECH_ISO_ELASTIC, CONTACT_MOHR_COULOMB, COHESIVE)}
+MODELS = {model.name: model for model in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, CONTACT_MOHR_COULOMB, COHESIVE)}
 
 
 def model(name: str, on: str) -> Model:

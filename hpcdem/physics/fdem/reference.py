@@ -1,9 +1,10 @@
-"""What elements.py, joints.py and nodes.py compute, written plainly for one element, joint or node, in small matrices.
-To be read beside them; tests hold the two against each other."""
+"""What elements.py, plasticity.py, joints.py and nodes.py compute, written plainly for one element, joint or node, in
+small matrices. To be read beside them; tests hold the two against each other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +76,65 @@ def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) ->
             rate = d.rate + 0.5 * (swell - np.trace(d.rate)) * ONE
             force[k] += 0.5 * forces_of_strain(d, strain, rate, solid)
     return force
+
+
+class MohrCoulomb(NamedTuple):
+    """Bulk and shear modulus [Pa], friction and dilation angle [radians], cohesion and tensile strength [Pa]."""
+
+    bulk: float
+    shear: float
+    friction: float
+    dilation: float
+    cohesion: float
+    tensile: float
+
+
+def yield_functions(s: np.ndarray, rock: MohrCoulomb) -> np.ndarray:
+    """f (9,) [Pa] of the principal stresses s (3,), in any order: of the six ordered pairs i, j of them in shear,
+    N s_j - s_i - 2 c sqrt(N), and of each in tension."""
+    return _normals(rock.friction) @ s - _strengths(rock)
+
+
+def _normals(angle: float) -> np.ndarray:
+    n = np.tan(np.pi / 4.0 + 0.5 * angle) ** 2
+    pairs = [n * np.eye(3)[j] - np.eye(3)[i] for i in range(3) for j in range(3) if i != j]
+    return np.array([*pairs, *np.eye(3)])
+
+
+def _strengths(rock: MohrCoulomb) -> np.ndarray:
+    shear = 2.0 * rock.cohesion * np.tan(np.pi / 4.0 + 0.5 * rock.friction)
+    apex = rock.cohesion / np.tan(rock.friction) if rock.friction > 0.0 else np.inf
+    return np.array([shear] * 6 + [min(rock.tensile, apex)] * 3)
+
+
+def returned_stress(trial: np.ndarray, rock: MohrCoulomb) -> np.ndarray:
+    """Stress (3, 3) [Pa] at the end of a step with the elastic trial stress (3, 3): Koiter's rule with all nine planes.
+
+    Every choice of at most three of them is tried: the stress lies on these, the plastic strain is a sum of their
+    flow directions, and the answer is the one with multipliers >= 0 that lies outside none of the planes.
+    """
+    s, turn = np.linalg.eigh(trial)
+    stiffness = (rock.bulk - 2.0 / 3.0 * rock.shear) * np.ones((3, 3)) + 2.0 * rock.shear * np.eye(3)
+    normals, ways, strengths = _normals(rock.friction), _normals(rock.dilation), _strengths(rock)
+    ways[6:] = normals[6:]
+    size = float(np.abs(s).max()) + rock.cohesion
+    best, least = s, np.inf
+    for many in range(4):
+        for active in map(list, combinations(range(9), many)):
+            a, d = normals[active], stiffness @ ways[active].T
+            if many and np.linalg.cond(a @ d) > 1e9:
+                continue
+            multipliers = np.linalg.solve(a @ d, a @ s - strengths[active]) if many else np.zeros(0)
+            end = s - d @ multipliers if many else s
+            wrong = max(
+                float((normals @ end - strengths).max()) / size,
+                -float(multipliers.min()) * rock.shear / size if many else 0.0,
+            )
+            if wrong < least - 1e-11:
+                best, least = end, wrong
+        if least < 1e-11:
+            break
+    return (turn * best) @ turn.T
 
 
 def joint_forces(

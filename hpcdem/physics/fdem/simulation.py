@@ -31,7 +31,7 @@ from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem import build, connectivity, overlaps
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import elements
+from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.local import Evaluation, Local
@@ -399,6 +399,8 @@ class Blocks(State):
         """From open to closed. frozen: keep the rebuild_state as it is (restart)."""
         self._check_ready()
         mesh = self.the_mesh()
+        if "plastic" not in self.cold and self.yielding().any():
+            self.cold["plastic"] = np.zeros((len(self.number), plasticity.MEMORY))
         with self.timers("neighbour"):
             if self._topology_stale:
                 self.renew_topology()

@@ -62,7 +62,8 @@ class State(ModelDefinition, Model):
     v: np.ndarray
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
-    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work"."""
+    """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
+    "plastic" (what is remembered of yielding, see plasticity.py)."""
     histories: Histories
     surface_loads: SurfaceLoads
     n_left: int

@@ -26,6 +26,7 @@ def warm_up(threads: int = 1) -> None:
         again[again >= 0] = numbers
         mesh = Mesh.of(np.array(points)[used], again)
         _rest(mesh, threads)
+        _flow(mesh, threads)
         sim = Blocks(SerialComm(), threads)
         sim.take_mesh(mesh)
         sim.option(overlap="keep")
@@ -57,6 +58,20 @@ def warm_up(threads: int = 1) -> None:
         sim.time_step(mass_scaling=1e-3)
         sim.option(dynamic=True)
         sim.step()
+
+
+def _flow(mesh: Mesh, threads: int) -> None:
+    """Triangles of which one yields."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    at = np.flatnonzero(mesh.cells[:, 3] < 0)
+    changes.element_model(sim, at, "mech_mohr_coulomb", {**ROCK, "dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim.initial_stress(None, yy=1e3)
+    sim.option(collision=False)
+    diagnostics.account_energy(sim)
+    convergence.advance(sim, 2)
+    diagnostics.energies(sim)
 
 
 def _rest(mesh: Mesh, threads: int) -> None:

@@ -3,6 +3,8 @@
 | workload | what |
 |---|---|
 | intact-20k, intact-200k | a joint before its peak on every inner edge, contact armed, in vibration |
+| plastic-20k | intact-20k of a rock that can yield and does not: beside intact-20k the price of looking |
+| flowing-20k | the same so weak that two thirds of it flow in a step |
 | yielded-20k | the same with joints behind their peak |
 | quads-20k | quads as one body, contact armed, in vibration |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
@@ -24,7 +26,7 @@ from bench.runs import say
 from bench.tables import Lines, Spread
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 
-RATES = {"intact": 15e6, "yielded": 3e6, "quads": 5e6, "pairs": 3e6, "shattered": 1e6}
+RATES = {"intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 5e6, "pairs": 3e6, "shattered": 1e6}
 """Element-steps per second from which the number of steps follows."""
 
 
@@ -47,6 +49,8 @@ WORKLOADS = {
     for w in (
         Workload("intact-20k", "intact", 100),
         Workload("intact-200k", "intact", 316),
+        Workload("plastic-20k", "plastic", 100),
+        Workload("flowing-20k", "flowing", 100),
         Workload("yielded-20k", "yielded", 100),
         Workload("quads-20k", "quads", 141),
         Workload("pairs-20k", "pairs", 141),
@@ -184,6 +188,19 @@ def intact(sim: Any, side: int) -> None:
     sim.v[:, :6] = 0.02 * np.sin(300.0 * x + 1.0)
 
 
+def plastic(sim: Any, side: int, strength: float = 1e9) -> None:
+    """The same of a rock that yields beyond this cohesion and tensile strength [Pa]."""
+    intact(sim, side)
+    law = {**ROCK, "dilation": 10.0, "cohesion": strength, "tensile": strength}
+    changes.element_model(sim, None, "mech_mohr_coulomb", law)
+    sim.close_model()
+
+
+def flowing(sim: Any, side: int) -> None:
+    """So weak that it flows."""
+    plastic(sim, side, 1e3)
+
+
 def yielded(sim: Any, side: int) -> None:
     """The same with joints so weak, and tough, that they soften throughout."""
     intact(sim, side)
@@ -236,4 +253,7 @@ def _swell(sim: Any, factor: float) -> None:
     assert math.isfinite(float(sim.x.sum()))
 
 
-MAKERS = {"intact": intact, "yielded": yielded, "quads": quads, "pairs": pairs, "shattered": shattered}
+MAKERS = {
+    "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads, "pairs": pairs,
+    "shattered": shattered,
+}  # fmt: skip

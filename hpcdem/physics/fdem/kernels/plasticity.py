@@ -1,0 +1,297 @@
+"""Plastic flow after Mohr and Coulomb with a tension cut-off: where stresses outside the yield surface return to.
+
+Principal stresses s1 <= s2 <= s3 (tension positive; in plane strain the one out of the plane is among them),
+N_a = (1 + sin a) / (1 - sin a), friction angle phi, dilation angle psi, cohesion c, tensile strength T <= c / tan(phi):
+
+    shear     f_s = -s1 + N_phi s3 - 2 c sqrt(N_phi) <= 0,   potential g_s = -s1 + N_psi s3
+    tension   f_t = s3 - T <= 0,                             potential g_t = s3
+
+The plastic strain of a step is that of Koiter: a sum of l dg/ds, l >= 0, over the surfaces that are active at its end;
+the stress is the trial stress less D times it, D with a = K + 4 G / 3 on the diagonal and b = K - 2 G / 3 beside it. By
+symmetry f_s also holds for the pairs (s2, s3), (s1, s2), and f_t for s2, s1. So the end lies in one of
+
+- the plane f_s: l = f_s / p, p = a - b N_psi - b N_phi + a N_phi N_psi;
+- its edge s1 = s2: pairs (s1, s3) and (s2, s3) active, [p q; q p] l = f, q = p - (a - b);
+- its edge s2 = s3: pairs (s1, s3) and (s1, s2), q = p - N_phi N_psi (a - b);
+- the plane s3 = T, its edge s2 = s3 = T, its corner s1 = s2 = s3 = T;
+- the line of both planes, s3 = T, s1 = N_phi T - 2 c sqrt(N_phi), and its two ends s2 = s1 and s2 = s3.
+
+They are tried in this order. Where two planes meet the matrix of their multipliers has positive principal minors (both
+planes: a^2 - b^2), so that there is one answer (Cottle, Pang & Stone 1992, theorem 3.3.7). The plastic work is not
+negative as long as psi <= phi. Formulas of the planes: Itasca, FLAC; of edges and corners: Clausen, Damkilde & Andersen
+2007 (Computers & Structures 85, 1795).
+
+Strains are split in the frame that turns with the element: sigma = sigma_0 + D (U - 1 - e_p), where e_p is the plastic
+strain. This is incremental (e_p depends on the way), objective for rotations of any size (the rate is that of Green and
+Naghdi), and as long as nothing yields the very formula of an elastic element. -D e_p is added to the initial stress,
+so the loop over triangles is the elastic one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
+from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels.elements import BLOCK, LAMBDA, TWO_MU
+
+SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
+"""Bits of the state of an element."""
+
+# Columns of the table of element models (rows, 4): N_phi, N_psi, 2 c sqrt(N_phi) [Pa], tensile strength [Pa]; infinite
+# strength: this model does not yield.
+N_PHI, N_PSI, STRENGTH, TENSILE = range(4)
+YIELD = 4
+# Columns of what an element remembers (n, 9): plastic strain 11, 22, 12, 33 in the frame that turns with it; shear and
+# volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0: never);
+# plastic work [J/m].
+E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
+MEMORY = 9
+
+(
+    X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, L_PSI, L_STRENGTH, L_TENSILE, OUTSIDE,
+    P11, P22, P12, P33, T11, T22, T12, T33, P_LAM, P_MU2, P_PER_AREA, P_SHEAR, P_VOLUME, P_WORK,
+) = (lane(k) for k in range(35))  # fmt: skip
+LANES = 35
+_1, _2, _3, _FOUR, _TWELVE = U(1), U(2), U(3), U(4), U(12)
+
+
+@njit(cache=True, error_model="numpy")
+def principal_return(s1, s2, s3, n, m, k, t, a, b):
+    """Where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW.
+
+    n, m: N_phi, N_psi; k = 2 c sqrt(N_phi); t: tensile strength, at most k / (n - 1); a = K + 4 G / 3, b = K - 2 G / 3
+    [Pa].
+    """
+    shear, tension = n * s3 - s1 - k, s3 - t
+    if not (shear > 0.0 or tension > 0.0):
+        return s1, s2, s3, 0
+    p = a - b * m - b * n + a * n * m
+    along, aside, back = a - b * m, b * (1.0 - m), a * m - b
+    if shear > 0.0:
+        one = shear / p
+        r1, r2, r3 = s1 + one * along, s2 + one * aside, s3 - one * back
+        if r1 > r2:
+            other, q = n * s3 - s2 - k, p - (a - b)
+            r3 = s3 - (shear + other) / (p + q) * back
+            r1 = r2 = n * r3 - k
+        elif r2 > r3:
+            other, q = n * s2 - s1 - k, p - n * m * (a - b)
+            r1 = s1 + (shear + other) / (p + q) * along
+            r2 = r3 = (r1 + k) / n
+        if r3 <= t:
+            return r1, r2, r3, SHEAR_NOW
+    low = n * t - k
+    if tension > 0.0:
+        r1, r2 = s1 - b * (tension / a), s2 - b * (tension / a)
+        if r2 > t:
+            r1, r2 = s1 - b * ((tension + (s2 - t)) / (a + b)), t
+        if r1 > t:
+            r1 = t
+        if r1 >= low:
+            return r1, r2, t, TENSION_NOW
+    det = a * a - b * b
+    one, two = (a * shear - (n * a - b) * tension) / det, (p * tension - back * shear) / det
+    return low, min(max(s2 + one * aside - two * b, low), t), t, SHEAR_NOW | TENSION_NOW
+
+
+@njit(cache=True, error_model="numpy")
+def plastic_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
+    """Plastic strain (11, 22, 12, 33) that brings a trial stress [Pa] back, and SHEAR_NOW | TENSION_NOW; zero, and 0,
+    for a stress that is not outside. lame, two_mu: moduli [Pa]; others see `principal_return`."""
+    mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+    radius = math.sqrt(half * half + s12 * s12)
+    high, low = mean + radius, mean - radius
+    a, b = lame + two_mu, lame
+    if s33 > high:
+        r_low, r_high, r33, bits = principal_return(low, high, s33, n, m, k, t, a, b)
+    elif s33 < low:
+        r33, r_low, r_high, bits = principal_return(s33, low, high, n, m, k, t, a, b)
+    else:
+        r_low, r33, r_high, bits = principal_return(low, s33, high, n, m, k, t, a, b)
+    if bits == 0:
+        return 0.0, 0.0, 0.0, 0.0, 0
+    d_high, d_low, d33 = high - r_high, low - r_low, s33 - r33
+    common = lame / (3.0 * lame + two_mu) * (d_high + d_low + d33)
+    per = 1.0 / two_mu
+    e_mean = (0.5 * (d_high + d_low) - common) * per
+    along = 0.5 * (d_high - d_low) * per / radius if radius > 0.0 else 0.0  # else both are equal
+    return e_mean + along * half, e_mean - along * half, along * s12, (d33 - common) * per, bits
+
+
+@njit(cache=True, error_model="numpy")
+def relieve(i, j, c, base, memory, s0):
+    """Into row i of s0 the stress [Pa] of a triangle without strain: its initial stress less D e_p; j: its row of
+    memory."""
+    e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
+    two_mu = c[i, TWO_MU]
+    pressure = c[i, LAMBDA] * (e11 + e22 + e33)
+    s0[i, 0] = base[i, 0] - (pressure + two_mu * e11)
+    s0[i, 1] = base[i, 1] - (pressure + two_mu * e22)
+    s0[i, 2] = base[i, 2] - two_mu * e12
+    s0[i, 3] = base[i, 3] - (pressure + two_mu * e33)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather(n, first, rows, wide, x, c, s0, law, table, lanes):
+    """Corners, moduli, stress without strain and yield surfaces of the triangles first : first + n into lanes."""
+    wx = U(12 if wide else 8)
+    for e in range(U(0), U(n), _FOUR):
+        i = U(first) + e
+        at = U(rows[i]) * wx, U(rows[i + _1]) * wx, U(rows[i + _2]) * wx, U(rows[i + _3]) * wx
+        four_columns(lanes, X1 + e, x, at)
+        two_columns(lanes, X3 + e, x, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
+        q0 = i * _TWELVE
+        q1, q2, q3 = q0 + _TWELVE, q0 + U(24), q0 + U(36)
+        four_columns(lanes, CA + e, c, (q0, q1, q2, q3))
+        two_columns(lanes, LAM + e, c, (q0 + _FOUR, q1 + _FOUR, q2 + _FOUR, q3 + _FOUR))
+        q0 = i * _FOUR
+        four_columns(lanes, S11 + e, s0, (q0, q0 + _FOUR, q0 + U(8), q0 + _TWELVE))
+        four_columns(
+            lanes, L_PHI + e, table,
+            (U(law[i]) * _FOUR, U(law[i + _1]) * _FOUR, U(law[i + _2]) * _FOUR, U(law[i + _3]) * _FOUR),
+        )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _try(n, small, lanes):
+    """Trial stresses, in the place of those without strain, and by how much they are outside."""
+    for e in range(U(n)):
+        x1, y1 = lanes[X1 + e], lanes[Y1 + e]
+        ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
+        a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
+        f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
+        cs, sn = laws.rotation(f11, f12, f21, f22)
+        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
+        e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+        p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
+        s11, s22 = lanes[S11 + e] + (p + m * e11), lanes[S22 + e] + (p + m * e22)
+        s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + p
+        mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+        radius = math.sqrt(half * half + s12 * s12)
+        high, low = mean + radius, mean - radius
+        high, low = (s33 if s33 > high else high), (s33 if s33 < low else low)
+        shear, tension = lanes[L_PHI + e] * high - low - lanes[L_STRENGTH + e], high - lanes[L_TENSILE + e]
+        lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e] = s11, s22, s12, s33
+        lanes[OUTSIDE + e] = shear if shear > tension else tension
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _return(n, lanes, who, bits):
+    """Plastic strains of those that are outside, one after the other from the first place; who, bits (BLOCK,) i8: which
+    they are and how they yield. Returns their number."""
+    m = 0
+    for k in range(n):
+        e, at = U(k), U(m)
+        if lanes[OUTSIDE + e] > 0.0:
+            s11, s22, s12, s33 = lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e]
+            lame, two_mu = lanes[LAM + e], lanes[MU2 + e]
+            e11, e22, e12, e33, how = plastic_strain(
+                s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_PSI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e],
+                lame, two_mu,
+            )  # fmt: skip
+            lanes[P11 + at], lanes[P22 + at], lanes[P12 + at], lanes[P33 + at] = e11, e22, e12, e33
+            lanes[T11 + at], lanes[T22 + at], lanes[T12 + at], lanes[T33 + at] = s11, s22, s12, s33
+            lanes[P_LAM + at], lanes[P_MU2 + at] = lame, two_mu
+            lanes[P_PER_AREA + at] = 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
+            who[m], bits[m] = k, how
+            m += 1
+    return m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measure(m, lanes):
+    """Shear, volume and work of the m plastic strains."""
+    for e in range(U(m)):
+        e11, e22, e12, e33 = lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e]
+        volume, two_mu = e11 + e22 + e33, lanes[P_MU2 + e]
+        third, pressure = volume / 3.0, lanes[P_LAM + e] * volume
+        d11, d22, d33 = e11 - third, e22 - third, e33 - third
+        work = (lanes[T11 + e] - (pressure + two_mu * e11)) * e11 + (lanes[T22 + e] - (pressure + two_mu * e22)) * e22
+        work += 2.0 * (lanes[T12 + e] - two_mu * e12) * e12 + (lanes[T33 + e] - (pressure + two_mu * e33)) * e33
+        lanes[P_SHEAR + e] = math.sqrt(0.5 * (d11 * d11 + d22 * d22 + d33 * d33 + 2.0 * e12 * e12))
+        lanes[P_VOLUME + e] = volume
+        lanes[P_WORK + e] = work / lanes[P_PER_AREA + e]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0):
+    """Add what has flowed to memory and s0."""
+    for k in range(m):
+        e, i = U(k), first + who[k]
+        j = rows[i] - first_row
+        memory[j, E11] += lanes[P11 + e]
+        memory[j, E22] += lanes[P22 + e]
+        memory[j, E12] += lanes[P12 + e]
+        memory[j, E33] += lanes[P33 + e]
+        memory[j, SHEAR] += lanes[P_SHEAR + e]
+        memory[j, VOLUME] += lanes[P_VOLUME + e]
+        if bits[k] & SHEAR_NOW:
+            memory[j, IN_SHEAR] = step + 1.0
+        if bits[k] & TENSION_NOW:
+            memory[j, IN_TENSION] = step + 1.0
+        memory[j, WORK] += lanes[P_WORK + e]
+        relieve(i, j, c, base, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
+    lanes = np.zeros(LANES * CAPACITY)
+    who, bits = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
+    flat_table = table.reshape(table.size)
+    blocks = -(-count // BLOCK)
+    for b in range(blocks * t // threads, blocks * (t + 1) // threads):
+        first = b * BLOCK
+        n = min(BLOCK, count - first)
+        _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
+        _try(n, small, lanes)
+        m = _return(n, lanes, who, bits)
+        if m > 0:
+            _measure(m, lanes)
+            _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flows(threads, *args):
+    """Let the triangles that are outside their yield surface at the present positions flow.
+
+    count: triangles; rows (count + 3,) i4: their rows of x, of which the first owned one is `first_row`; wide: x is
+    (n, 12); c (count + 3, 12), see `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; law (count + 3,): row of
+    the table (rows, 4) of models, see `YIELD`; small: small strains; step: number of this step; memory (n_own, 9), see
+    `MEMORY`; s0 (count + 3, 4) [Pa]: stress without strain.
+    """
+    for t in range(threads):
+        _flow(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
+    """The same on several threads."""
+    for t in prange(threads):
+        _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def relieve_all(rows, first, c, base, memory, s0):
+    """`relieve` for triangles: s0 (count, 4) [Pa]; arguments as for `flows`."""
+    for i in range(len(rows)):
+        relieve(i, rows[i] - first, c, base, memory, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def locked_in(rows, first, c, base, memory, out):
+    """Add to out (n_own,) what the elastic energy [J/m] differs by from that of an element with the initial stress s0:
+    with e = U - 1 it is A [(e - e_p) : D (e - e_p) / 2 + base : (e - e_p)] = A [e : D e / 2 + s0 : e] +
+    A [e_p : D e_p / 2 - base : e_p], s0 = base - D e_p."""
+    for i in range(len(rows)):
+        j = rows[i] - first
+        e11, e22, e12, e33 = memory[j, E11], memory[j, E22], memory[j, E12], memory[j, E33]
+        trace = e11 + e22 + e33
+        squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
+        own = base[i, 0] * e11 + base[i, 1] * e22 + 2.0 * base[i, 2] * e12 + base[i, 3] * e33
+        area = 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
+        out[j] += area * (0.5 * (c[i, LAMBDA] * trace * trace + c[i, TWO_MU] * squares) - own)

@@ -1,0 +1,314 @@
+"""Elements that yield after Mohr and Coulomb: closed forms of one way of loading, what they remember, refusals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, SHEAR_PAST, TENSION_NOW
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import ROCK, joined, jointed, model, near, rectangle, shaken
+
+MOHR_COULOMB = "mech_mohr_coulomb"
+SOIL = {
+    "density": 2000.0, "bulk": 3.9e9, "shear": 2.8e9, "friction": 30.0, "dilation": 10.0, "cohesion": 3.45e6,
+    "tensile": 1e6,
+}  # fmt: skip
+N, M = (math.tan(math.pi / 4.0 + 0.5 * math.radians(SOIL[name])) ** 2 for name in ("friction", "dilation"))
+K = 2.0 * SOIL["cohesion"] * math.sqrt(N)
+A, B = SOIL["bulk"] + 4.0 / 3.0 * SOIL["shear"], SOIL["bulk"] - 2.0 / 3.0 * SOIL["shear"]
+STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress_zz")
+
+
+def soil(mesh=None, **other: float) -> Blocks:
+    """A square metre at rest."""
+    sim = Blocks()
+    sim.take_mesh(shaken(rectangle(3, 3, 1.0, 1.0), 0.2) if mesh is None else mesh)
+    changes.element_model(sim, None, MOHR_COULOMB, {**SOIL, **other})
+    sim.option(dynamic=False, collision=False)
+    return sim
+
+
+def deform(sim: Blocks, gradient: np.ndarray) -> None:
+    """All nodes go to their places in the mesh times this deformation gradient (2, 2), and elements flow there once."""
+    x = sim.mesh.points @ np.asarray(gradient).T
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    sim.open_model()
+    cells = sim.mesh.cells[sim.number, :3]
+    sim.x[:, :6] = x[cells].reshape(-1, 6)
+    changes.repeat(sim, sim.x)
+    sim.step()
+
+
+def stresses(sim: Blocks) -> np.ndarray:
+    return np.column_stack([diagnostics.values(sim, name) for name in STRESSES])
+
+
+def compressed(sim: Blocks, strain: float, parts: int = 20, sign: float = -1.0) -> None:
+    """Uniaxial strain along y, in equal parts."""
+    for k in range(1, parts + 1):
+        deform(sim, np.diag([1.0, 1.0 + sign * strain * k / parts]))
+
+
+@pytest.mark.parametrize("dilation", [0.0, 10.0, 30.0])
+@pytest.mark.parametrize("parts", [1, 20])
+def test_uniaxial_strain(dilation, parts):
+    """Compressed along y between stiff walls both lateral stresses are equal (an edge of the surface), so that with the
+    plastic strain l (-1, m / 2, m / 2) of the axial strain -e: s_y = -a e + l (a - b m), s_x = -b e + l (b - (a + b) m
+    / 2), and s_y = N s_x - k gives l."""
+    m = math.tan(math.pi / 4.0 + 0.5 * math.radians(dilation)) ** 2
+    sim = soil(dilation=dilation)
+    e = 0.01
+    compressed(sim, e, parts)
+    lag = (A * e - N * B * e - K) / (A - B * m - N * (B - 0.5 * (A + B) * m))
+    sy, sx = -A * e + lag * (A - B * m), -B * e + lag * (B - 0.5 * (A + B) * m)
+    assert lag > 0.0 and sy == pytest.approx(N * sx - K, rel=1e-12)
+    assert stresses(sim) == pytest.approx(np.tile([sx, sy, 0.0, sx], (18, 1)), rel=1e-9, abs=1.0)
+    assert diagnostics.values(sim, "plastic_volume_strain") == pytest.approx(
+        np.full(18, lag * (m - 1.0)), rel=1e-9, abs=1e-15
+    )
+    assert diagnostics.values(sim, "plastic_shear_strain") == pytest.approx(
+        np.full(18, lag * (1.0 + 0.5 * m) / math.sqrt(3.0)), rel=1e-9
+    )
+    assert (diagnostics.values(sim, "plastic_state") == SHEAR_NOW).all()
+
+
+def test_uniaxial_extension():
+    """Drawn along y: s_y stays at the tensile strength, the others follow the elastic strain."""
+    sim = soil()
+    compressed(sim, 2e-3, sign=1.0)
+    inside = SOIL["tensile"] / A
+    found = stresses(sim)
+    assert found[:, 1] == pytest.approx(np.full(18, SOIL["tensile"]), rel=1e-12)
+    assert found[:, [0, 3]] == pytest.approx(np.full((18, 2), B * inside), rel=1e-9)
+    assert (diagnostics.values(sim, "plastic_state") == TENSION_NOW).all()
+    assert diagnostics.values(sim, "plastic_volume_strain") == pytest.approx(np.full(18, 2e-3 - inside), rel=1e-9)
+
+
+@pytest.mark.parametrize("pressure", [0.0, 2e6])
+def test_strength_of_a_pressed_plate(pressure):
+    """Between two plates without friction, sides under pressure: 2 c sqrt(N) + N p, whatever the mesh (shaken)."""
+    sim = soil()
+    sim.option(large_strain=False)
+    x, y = sim.mesh.points.T
+    sides = np.concatenate([near(sim.mesh, 0, 0.0), near(sim.mesh, 0, 1.0)])
+    if pressure:
+        sim.stress_condition(sides, normal=-pressure)
+        sim.initial_stress(None, xx=-pressure, yy=-pressure, zz=-pressure)
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
+    sim.velocity_condition(np.flatnonzero((y < 1e-9) & (x < 1e-9)), vx=0.0, vy=0.0)
+    sim.velocity_condition(np.flatnonzero(y > 1.0 - 1e-9), vy=-2e-6)
+    convergence.advance(sim, 3000)
+    assert -diagnostics.total(sim, "reaction_y", np.flatnonzero(y > 1.0 - 1e-9)) == pytest.approx(
+        K + N * pressure, rel=2.5e-3
+    )
+    assert (diagnostics.values(sim, "plastic_state") == SHEAR_NOW).all()
+
+
+def test_before_it_yields_it_is_the_elastic_element():
+    """The same bits, in motion, with joints beside it."""
+    ends = []
+    for strong in (False, True):
+        sim = model(shaken(rectangle(6, 4, 0.6, 0.4), 0.2))
+        if strong:
+            law = {**ROCK, "friction": 30.0, "dilation": 5.0, "cohesion": 1e12, "tensile": 1e12}
+            changes.element_model(sim, None, MOHR_COULOMB, law)
+        jointed(sim)
+        sim.option(collision=False)
+        sim.initial_stress(None, yy=-1e6)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] > 0.3), 2.0, 1.0)
+        convergence.advance(sim, 300)
+        ends.append(
+            np.concatenate(
+                [diagnostics.values(sim, name) for name in ("position_x", "velocity_y", *STRESSES, "damage")]
+            )
+        )
+    assert np.array_equal(*ends, equal_nan=True)
+
+
+def test_a_turn_changes_nothing():
+    """A body that has yielded is turned by 90 degrees and 30 more: stresses turn with it, nothing flows."""
+    sim = soil()
+    sheared = np.array([[1.002, 0.008], [0.0, 0.996]])
+    for k in range(1, 11):
+        deform(sim, np.eye(2) + (sheared - np.eye(2)) * k / 10)
+    before, strain = stresses(sim), diagnostics.values(sim, "plastic_shear_strain")
+    assert (strain > 1e-4).all()
+    for degrees in (90.0, 120.0):
+        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        turn = np.array([[c, -s], [s, c]])
+        deform(sim, turn @ sheared)
+        for old, new in zip(before, stresses(sim)):
+            planar = turn @ np.array([[old[0], old[2]], [old[2], old[1]]]) @ turn.T
+            assert [new[0], new[1], new[2], new[3]] == pytest.approx(
+                [planar[0, 0], planar[1, 1], planar[0, 1], old[3]], abs=1e-3
+            )
+        assert diagnostics.values(sim, "plastic_shear_strain") == pytest.approx(strain, abs=1e-12)
+
+
+def test_what_is_given_back():
+    """Unloaded it is elastic, keeps the strain of its flow, and remembers that it has yielded."""
+    sim = soil()
+    compressed(sim, 0.01)
+    before, strain = stresses(sim), diagnostics.values(sim, "plastic_shear_strain")
+    deform(sim, np.diag([1.0, 0.9901]))
+    assert stresses(sim) - before == pytest.approx(
+        np.tile([B * 1e-4, A * 1e-4, 0.0, B * 1e-4], (18, 1)), rel=1e-6, abs=1
+    )
+    assert diagnostics.values(sim, "plastic_shear_strain") == pytest.approx(strain, rel=1e-12)
+    assert (diagnostics.values(sim, "plastic_state") == SHEAR_PAST).all()
+
+
+def test_reset_state():
+    """Bits and counted strains are forgotten where it is said; stresses and what follows stay as they are."""
+    sims = soil(), soil()
+    for sim in sims:
+        compressed(sim, 0.01)
+    changes.reset_state(sims[0], [0, 1, 2])
+    for name in STRESSES:
+        assert np.array_equal(diagnostics.values(sims[0], name), diagnostics.values(sims[1], name))
+    for name in ("plastic_shear_strain", "plastic_volume_strain"):
+        assert (np.abs(diagnostics.values(sims[0], name))[:3] < 1e-12).all()
+        assert np.array_equal(diagnostics.values(sims[0], name)[3:], diagnostics.values(sims[1], name)[3:])
+    for sim in sims:
+        deform(sim, np.diag([1.0, 0.9901]))
+    assert diagnostics.values(sims[0], "plastic_state").tolist() == [0.0] * 3 + [SHEAR_PAST] * 15
+    assert np.array_equal(stresses(sims[0]), stresses(sims[1]))
+
+
+@pytest.mark.parametrize("name", ["bulk", "shear", "friction", "dilation", "cohesion", "tensile"])
+def test_every_property_counts(name):
+    """Of an element that goes to the line where both surfaces meet."""
+    ends = []
+    for part in (1.0, 0.9):
+        sim = soil(**{name: part * SOIL[name]})
+        deform(sim, np.diag([1.003, 0.999]))
+        changes.reset_velocity(sim)
+        deform(sim, np.diag([1.003, 0.99]))
+        ends.append(stresses(sim))
+    assert not np.array_equal(*ends)
+
+
+def test_viscosity_and_density_count():
+    ends = []
+    for other in ({}, {"damp_factor": 0.5}, {"density": 2500.0}):
+        sim = soil(**other)
+        sim.option(dynamic=True)
+        sim.time_step(1e-6)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] > 0.5), -5.0, 0.0)
+        convergence.advance(sim, 50)
+        ends.append(diagnostics.values(sim, "position_x"))
+    assert not np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])
+
+
+def test_friction_of_its_surfaces_is_its_own():
+    """A block slides down a slope that is as steep as its friction or not."""
+    paths = []
+    for friction in (20.0, 50.0):
+        lower, upper = rectangle(8, 1, 0.8, 0.1), rectangle(2, 1, 0.2, 0.1, x0=0.05, y0=0.1 + 1e-7)
+        sim = Blocks()
+        sim.take_mesh(joined(lower, upper))
+        rock = {**SOIL, "friction": friction, "dilation": 0.0, "cohesion": 1e9, "tensile": 1e9, "damp_factor": 0.1}
+        changes.element_model(sim, None, MOHR_COULOMB, rock)
+        sim.velocity_condition(np.arange(len(lower.points)), vx=0.0, vy=0.0)
+        sim.gravity(*(9.81 * np.array([math.sin(math.radians(35.0)), -math.cos(math.radians(35.0))])))
+        sim.time_step(mass_scaling=2e-5)
+        convergence.advance(sim, 1500)
+        paths.append(diagnostics.values(sim, "displacement_x").max())
+    assert paths[0] > 5.0 * paths[1]
+
+
+def test_another_model_keeps_the_stress():
+    """An elastic model in its place: stresses stay, and follow the strain elastically from there; back again they are
+    on the surface at once."""
+    sim = soil()
+    compressed(sim, 0.01)
+    before = stresses(sim)
+    elastic = {name: SOIL[name] for name in ("density", "bulk", "shear")}
+    changes.element_model(sim, None, "mech_iso_elastic", elastic)
+    assert stresses(sim) == pytest.approx(before, rel=1e-12, abs=1e-3)
+    deform(sim, np.diag([1.0, 0.985]))
+    assert stresses(sim)[:, 1] == pytest.approx(before[:, 1] - 0.005 * A, rel=1e-9)
+    changes.element_model(sim, None, MOHR_COULOMB, SOIL)
+    found = stresses(sim)
+    assert found[:, 1] == pytest.approx(N * found[:, 0] - K, rel=1e-9)
+
+
+def test_weaker_rock_flows_at_once():
+    """A property that is lowered acts from the next forces on."""
+    sim = soil()
+    compressed(sim, 0.01)
+    sim.element_property(None, {"cohesion": 1e6})
+    found = stresses(sim)
+    assert found[:, 1] == pytest.approx(N * found[:, 0] - 2e6 * math.sqrt(N), rel=1e-9)
+
+
+def test_new_material_has_not_yielded():
+    """An element that comes back is without plastic strain."""
+    sim = soil()
+    compressed(sim, 0.01)
+    changes.null(sim, [0])
+    changes.element_model(sim, [0], MOHR_COULOMB, SOIL)
+    assert (
+        diagnostics.values(sim, "plastic_shear_strain")[0] == 0.0 < diagnostics.values(sim, "plastic_shear_strain")[1]
+    )
+    assert diagnostics.values(sim, "plastic_work")[0] == 0.0 < diagnostics.values(sim, "plastic_work")[1]
+
+
+def test_the_energy_budget_closes():
+    """A bar is thrown against a wall and yields: work of flow and what is stored add up to what it had."""
+    sim = Blocks()
+    sim.take_mesh(shaken(rectangle(12, 4, 0.6, 0.2), 0.2))
+    changes.element_model(sim, None, MOHR_COULOMB, {**SOIL, "cohesion": 1e6, "tensile": 5e5, "damp_factor": 0.02})
+    sim.option(collision=False)
+    sim.initial_stress(None, xx=-1e5, yy=-2e5, zz=-1e5)
+    x = sim.mesh.points[:, 0]
+    changes.set_velocity(sim, None, -2.0, 0.0)
+    sim.velocity_condition(np.flatnonzero(x < 1e-9), vx=0.0)
+    convergence.advance(sim, 20)
+    diagnostics.account_energy(sim)
+    for k in range(10):
+        convergence.advance(sim, 100)
+        if k == 4:
+            sim.element_property([5], {"young": 5e9})
+        found = diagnostics.energies(sim)
+        assert found["relative"] < 0.01, found
+    assert found["plastic_lost"] > 0.2 * 0.5 * SOIL["density"] * 0.12 * 4.0
+    assert found["plastic_lost"] <= diagnostics.total(sim, "plastic_work")
+
+
+def test_looking_changes_nothing():
+    ends = []
+    for look in (False, True):
+        sim = soil()
+        sim.option(dynamic=True)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 1] > 0.5), 0.0, -20.0)
+        for _ in range(60):
+            convergence.advance(sim, 1)
+            if look:
+                diagnostics.values(sim, "stress_max")
+                diagnostics.unbalanced_ratio(sim)
+                diagnostics.values(sim, "plastic_state")
+        ends.append(np.concatenate([diagnostics.values(sim, "position_y"), diagnostics.values(sim, "plastic_work")]))
+    assert np.array_equal(*ends) and ends[0][-18:].max() > 0.0
+
+
+def test_refusals():
+    sim = model(rectangle(2, 2, 1.0, 1.0, kind="mixed"))
+    quad = int(np.flatnonzero(sim.mesh.cells[:, 3] >= 0)[0])
+    with pytest.raises(CommandError, match=f"element {quad} is a quad: mech_mohr_coulomb is for triangles"):
+        changes.element_model(sim, None, MOHR_COULOMB, SOIL)
+    triangle = int(np.flatnonzero(sim.mesh.cells[:, 3] < 0)[0])
+    changes.element_model(sim, [triangle], MOHR_COULOMB, SOIL)
+    with pytest.raises(CommandError, match=f"element {triangle} can yield"):
+        equilibrium.solve_elastic(sim)
+    with pytest.raises(CommandError, match="dilation must not be above friction"):
+        sim.element_property([triangle], {"dilation": 40.0})
+    with pytest.raises(CommandError, match="needs cohesion"):
+        changes.element_model(sim, [triangle], MOHR_COULOMB, {k: v for k, v in SOIL.items() if k != "cohesion"})
+    with pytest.raises(CommandError, match="has no property cohesion"):
+        sim.element_property(None, {"cohesion": 1e6})
