@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
+import gc
 import inspect
 import os
 import pickle
@@ -28,8 +29,8 @@ from typing import Any
 
 LAUNCHER = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "MPI_", "MV2_", "PALS_", "HYDRA_", "HYDI_", "H5PY_ALWAYS_USE_MPI")
 """How variables begin that make a process take part in the MPI job of its parent."""
-RECORDING_SECONDS = 60
-"""A warm-up that has not come to its end by then waits for what a kernel should have done."""
+PATIENCE = 60.0
+"""Seconds: a warm-up of plain functions that is not over by then waits for what a kernel should have done."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,12 @@ class Part:
 @dataclass(frozen=True)
 class Job:
     """cores: to run on; turn: descriptor of a file that all processes share, with the number
-    of kernels taken; who holds its lock may change that, or write into the folders."""
+    of kernels taken; who holds its lock may change that, or write into the folders; patience: see PATIENCE."""
 
     parts: list[Part]
     cores: Collection[int]
     turn: int
+    patience: float
 
 
 def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], meanwhile: Callable[[], None]) -> str:
@@ -65,7 +67,7 @@ def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], 
     environment = {name: value for name, value in os.environ.items() if not name.startswith(LAUNCHER)}
     with tempfile.TemporaryFile() as turn, tempfile.TemporaryFile() as errors, contextlib.ExitStack() as processes:
         os.pwrite(turn.fileno(), bytes(8), 0)
-        job = pickle.dumps(Job(parts, cores, turn.fileno()))
+        job = pickle.dumps(Job(parts, cores, turn.fileno(), PATIENCE))
         started = []
         for _ in range(count):
             process = subprocess.Popen(
@@ -97,8 +99,11 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
+    gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles: a tenth of its time
     _write_in_turn(job)
+    faulthandler.dump_traceback_later(job.patience, exit=True)
     kernels = _recorded(job.parts)
+    faulthandler.cancel_dump_traceback_later()
     while (number := _take(job.turn)) < len(kernels):
         kernel, types = kernels[number]
         with contextlib.suppress(Exception):  # wrong types in the list; an error of a kernel comes again in the parent
@@ -149,14 +154,12 @@ def _recorded(parts: list[Part]) -> list[tuple[Any, tuple[Any, ...]]]:
     import numba
 
     found: dict[tuple[Any, tuple[Any, ...]], None] = {}
-    faulthandler.dump_traceback_later(RECORDING_SECONDS, exit=True)
     for part in parts:
         numba.config.CACHE_DIR = str(part.folder)  # type: ignore[attr-defined]
         with _calls_recorded() as calls, warnings.catch_warnings(action="ignore"), contextlib.suppress(Exception):
             part.warm()
         if part.wanted:
             found |= calls
-    faulthandler.cancel_dump_traceback_later()
     return sorted(found, key=lambda call: -_length(call[0].py_func, set()))
 
 

@@ -35,12 +35,14 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-KERNELS = {"shared": 37, "": 125, "blocks": 165, "coupled": 17}
+KERNELS = {"shared": 34, "": 125, "blocks": 165, "coupled": 17}
 """About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
 PROCESSES = 8
 """At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
+MEMORY = 700e6
+"""Of one of them, at most [bytes]."""
 FEW = 40
 """So many kernels are compiled in less time than it takes to start processes for them."""
 
@@ -76,11 +78,12 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
     else:
         turn = 2
 
+    parts = {folder: warm_ups[kind] for folder, kind in folders.items()}
+    cores = frozenset().union(*(rank[3] for rank in ranks if rank[0] == host))
     damaged, problem = False, ""
     for now in range(3):
         if now == turn:
-            parts = {folder: warm_ups[kind] for folder, kind in folders.items()}
-            problem = _compile_beside(parts, frozenset().union(*(rank[3] for rank in ranks if rank[0] == host)), progress)
+            problem = _compile_beside(parts, cores, progress)
             with progress.told():
                 damaged = not all([load_kernels(*part) for part in parts.items()])
             _loaded.update(parts)
@@ -88,9 +91,8 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
 
     if comm.any(not writable):
         log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
-    for problem in filter(None, comm.allgather(problem)):
+    if problem := next(filter(None, comm.allgather(problem)), ""):
         log.warn(f"processes that compiled kernels failed, so one went on alone ({problem})")
-        break
     if comm.any(damaged):
         log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it again")
     if comm.rank == 0:
@@ -142,8 +144,9 @@ class _Progress:
 def _compile_beside(parts: Mapping[Path, Callable[[], None]], cores: frozenset[int], progress: _Progress) -> str:
     """Fill the folders that are missing with several processes, if that is worth while; what went wrong, if anything."""
     missing = {folder for folder in parts if not folder.is_dir()}
-    quota = cgroups.cpu_quota(Path("/"))
-    count = min(len(cores), PROCESSES, len(cores) if quota is None else round(quota))
+    quota, memory = cgroups.cpu_quota(Path("/")), cgroups.memory(Path("/"))
+    limits = (quota, memory and memory / MEMORY)
+    count = int(min(len(cores), PROCESSES, *(round(limit) for limit in limits if limit is not None)))
     if count < 2 or sum(progress.kernels.get(folder, 0) for folder in missing) <= FEW:
         return ""
     all_parts = [
@@ -152,8 +155,8 @@ def _compile_beside(parts: Mapping[Path, Callable[[], None]], cores: frozenset[i
     ]
     try:
         return compile_in_processes(all_parts, count, cores, progress.tell)
-    except (OSError, pickle.PicklingError, AttributeError) as error:  # too many processes, no temporary folder
-        return str(error)
+    except (OSError, pickle.PicklingError, AttributeError) as error:  # no more processes; a warm-up of a closure
+        return f"{type(error).__name__}: {error}"
 
 
 _loaded: dict[Path, Callable[[], None]] = {}
