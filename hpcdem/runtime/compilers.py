@@ -193,14 +193,16 @@ def _calls_recorded() -> Iterator[dict[tuple[Any, tuple[Any, ...]], None]]:
         finally:
             depth -= 1
 
-    intrinsic = _Intrinsic.__call__
-    CPUDispatcher.__call__ = call  # type: ignore[attr-defined]
-    _Intrinsic.__call__ = lambda self, *args: 0  # type: ignore[method-assign]
+    dispatcher: Any = CPUDispatcher
+    intrinsic: Any = _Intrinsic
+    usual = intrinsic.__call__
+    dispatcher.__call__ = call
+    intrinsic.__call__ = lambda self, *args: 0
     try:
         yield calls
     finally:
-        del CPUDispatcher.__call__  # type: ignore[attr-defined]
-        _Intrinsic.__call__ = intrinsic  # type: ignore[method-assign]
+        del dispatcher.__call__  # that of its base
+        intrinsic.__call__ = usual
 
 
 def _length(function: FunctionType, seen: set[FunctionType]) -> int:

@@ -142,7 +142,7 @@ class _Progress:
 
 
 def _compile_beside(parts: Mapping[Path, Callable[[], None]], cores: frozenset[int], progress: _Progress) -> str:
-    """Fill the folders that are missing with several processes, if that is worth while; what went wrong, if anything."""
+    """Fill the missing folders with several processes, if that is worth while; what went wrong, if anything."""
     missing = {folder for folder in parts if not folder.is_dir()}
     quota, memory = cgroups.cpu_quota(Path("/")), cgroups.memory(Path("/"))
     limits = (quota, memory and memory / MEMORY)
