@@ -100,12 +100,15 @@ def main() -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
     gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles: a tenth of its time
-    _write_in_turn(job)
+    filled: set[Path] = set()
+    _write_in_turn(job, filled)
     faulthandler.dump_traceback_later(job.patience, exit=True)
     kernels = _recorded(job.parts)
     faulthandler.cancel_dump_traceback_later()
     while (number := _take(job.turn)) < len(kernels):
-        kernel, types = kernels[number]
+        kernel, types, folder = kernels[number]
+        filled.clear()
+        filled.add(folder)
         with contextlib.suppress(Exception):  # wrong types in the list; an error of a kernel comes again in the parent
             kernel.compile(types)
 
@@ -134,33 +137,37 @@ def _take(turn: int) -> int:
     return number
 
 
-def _write_in_turn(job: Job) -> None:
-    """numba looks for a free name for its file and enters it into an index: two at a time would take the same."""
+def _write_in_turn(job: Job, filled: Collection[Path]) -> None:
+    """numba looks for a free name for its file and enters it into an index: two at a time would take the same.
+
+    filled: the folder of the kernel that is compiled. Of those of other folders, which are compiled within it, nothing
+    is kept: what a folder holds does not depend on what is compiled at the same time.
+    """
     from numba.core.caching import FunctionCache
 
     save = FunctionCache.save_overload
-    wanted = {part.folder for part in job.parts if part.wanted}
 
     def save_in_turn(cache: Any, signature: Any, kernel: Any) -> None:
-        if not wanted.isdisjoint(Path(cache.cache_path).parents):
+        if not set(Path(cache.cache_path).parents).isdisjoint(filled):
             with _locked(job.turn):
                 save(cache, signature, kernel)
 
     FunctionCache.save_overload = save_in_turn  # type: ignore[method-assign]
 
 
-def _recorded(parts: list[Part]) -> list[tuple[Any, tuple[Any, ...]]]:
-    """The kernels that the wanted parts call, with types of arguments; the same in each process."""
+def _recorded(parts: list[Part]) -> list[tuple[Any, tuple[Any, ...], Path]]:
+    """The kernels that the wanted parts call, with types of arguments and folder; the same list in each process."""
     import numba
 
-    found: dict[tuple[Any, tuple[Any, ...]], None] = {}
+    found: dict[tuple[Any, tuple[Any, ...]], Path] = {}
     for part in parts:
         numba.config.CACHE_DIR = str(part.folder)  # type: ignore[attr-defined]
         with _calls_recorded() as calls, warnings.catch_warnings(action="ignore"), contextlib.suppress(Exception):
             part.warm()
         if part.wanted:
-            found |= calls
-    return sorted(found, key=lambda call: -_length(call[0].py_func, set()))
+            found = dict.fromkeys(calls, part.folder) | found
+    kernels = [(kernel, types, folder) for (kernel, types), folder in found.items()]
+    return sorted(kernels, key=lambda call: -_length(call[0].py_func, set()))
 
 
 @contextlib.contextmanager
