@@ -159,15 +159,19 @@ def _recorded(parts: list[Part]) -> list[tuple[Any, tuple[Any, ...], Path]]:
     """The kernels that the wanted parts call, with types of arguments and folder; the same list in each process."""
     import numba
 
-    found: dict[tuple[Any, tuple[Any, ...]], Path] = {}
+    kernels: list[tuple[Any, tuple[Any, ...], Path]] = []
+    known: set[tuple[Any, tuple[Any, ...]]] = set()
     for part in parts:
         numba.config.CACHE_DIR = str(part.folder)  # type: ignore[attr-defined]
         with _calls_recorded() as calls, warnings.catch_warnings(action="ignore"), contextlib.suppress(Exception):
             part.warm()
-        if part.wanted:
-            found = dict.fromkeys(calls, part.folder) | found
-    kernels = [(kernel, types, folder) for (kernel, types), folder in found.items()]
-    return sorted(kernels, key=lambda call: -_length(call[0].py_func, set()))
+        if part.wanted:  # each folder before the next: what is in memory already is not stored again
+            new = sorted(
+                (call for call in calls if call not in known), key=lambda call: -_length(call[0].py_func, set())
+            )
+            kernels += [(kernel, types, part.folder) for kernel, types in new]
+        known |= calls.keys()
+    return kernels
 
 
 @contextlib.contextmanager
