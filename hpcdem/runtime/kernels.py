@@ -12,6 +12,7 @@ import contextlib
 import hashlib
 import math
 import os
+import pickle
 import re
 import shutil
 import socket
@@ -22,6 +23,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hpcdem.runtime import cgroups, launch
+from hpcdem.runtime.compilers import Part, compile_in_processes
 from hpcdem.runtime.launch import patient_barrier, version
 
 if TYPE_CHECKING:
@@ -32,73 +35,41 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-KERNELS = {"shared": 100, "": 120, "blocks": 160, "coupled": 25}
-"""About how many kernels of each kind are compiled."""
+KERNELS = {"shared": 31, "": 125, "blocks": 165, "coupled": 17}
+"""About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
+PROCESSES = 8
+"""At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
+MEMORY = 700e6
+"""Of one of them, at most [bytes]."""
+FEW = 40
+"""So many kernels are compiled in less time than it takes to start processes for them."""
 
 
 def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[[], None]]) -> Path:
     """Collective: load or compile kernels, those of one kind after those of another; returns the last cache folder of
-    this rank. warm_ups: by kind, what calls all of its kernels once; each kind has a folder of its own. Rank 0 says
-    how far it is.
+    this rank. warm_ups: by kind, what calls all of its kernels once, a function that can be pickled; each kind has a
+    folder of its own. Rank 0 says how far it is.
 
     Must run before any module with kernels is imported: numba settles the folder of a kernel when it meets it. When
     a folder has still to be filled, one rank of each machine type goes first, then one of each host, then the rest,
-    so that nothing is compiled twice on a shared file system and each local disk gets its copy.
+    so that nothing is compiled twice on a shared file system and each local disk gets its copy. Who fills a folder does
+    so with processes on the cores of all ranks of its host, which wait.
     """
     folder, writable = cache_folder()
-    folders = [folder.with_name(f"{folder.name}-{kind}") if kind else folder for kind in warm_ups]
-    missing = sum(KERNELS.get(kind, 0) for kind, folder in zip(warm_ups, folders) if not folder.is_dir())
-    if comm.rank == 0 and missing:
+    folders = {folder.with_name(f"{folder.name}-{kind}") if kind else folder: kind for kind in warm_ups}
+    progress = _Progress(log, {folder: KERNELS.get(kind, 0) for folder, kind in folders.items()})
+    if comm.rank == 0 and progress.total:
         threaded = os.environ.get("NUMBA_NUM_THREADS", "1") != "1"
         log.info(
-            f"compiling about {missing} kernels{' for several threads' if threaded else ''} (first run of this version "
-            f"on this machine{'; runs with one thread, -j 1, have their own' if threaded else ''})"
+            f"compiling about {progress.total} kernels{' for several threads' if threaded else ''} (first run of this "
+            f"version on this machine{'; runs with one thread, -j 1, have their own' if threaded else ''})"
         )
-    with _progress(log, missing):
-        damaged = [_prepare(comm, *one) for one in zip(folders, warm_ups.values())]
-
-    if comm.any(not writable):
-        log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
-    if comm.any(any(damaged)):
-        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it again")
-    if comm.rank == 0:
-        for folder in folders:
-            tidy(folder)
-    return folders[-1]
-
-
-@contextlib.contextmanager
-def _progress(log: Log, missing: int) -> Iterator[None]:
-    """Says from time to time how many of so many kernels are compiled, and how long the others may take."""
-    from numba.core import event
-
-    began = told = time.monotonic()
-    done = 0
-
-    class Listener(event.Listener):
-        def on_start(self, _: event.Event) -> None:
-            """Nothing: kernels that are called by others are compiled within these."""
-
-        def on_end(self, _: event.Event) -> None:
-            nonlocal done, told
-            done += 1
-            now = time.monotonic()
-            if now - told >= QUIET_SECONDS and done < missing:
-                told = now
-                left = (now - began) / done * (missing - done)
-                log.info(f"{done} of about {missing} kernels are compiled, some {math.ceil(left)} s left")
-
-    with event.install_listener("numba:compile", Listener()) if missing else contextlib.nullcontext():
-        yield
-
-
-def _prepare(comm: SerialComm, folder: Path, warm: Callable[[], None]) -> bool:
-    """The same for one folder; whether it had to be given up."""
-    ranks = comm.allgather((socket.gethostname(), folder.name, folder.is_dir()))
-    host, key, _ = ranks[comm.rank]
-    if all(ready for *_, ready in ranks):
+    ready = all(folder.is_dir() for folder in folders)
+    ranks = comm.allgather((socket.gethostname(), folder.name, ready, launch.mask()))
+    host, key, *_ = ranks[comm.rank]
+    if all(ready for _, _, ready, _ in ranks):
         turn = 0
     elif next(r for r, rank in enumerate(ranks) if rank[1] == key) == comm.rank:
         turn = 0
@@ -107,20 +78,101 @@ def _prepare(comm: SerialComm, folder: Path, warm: Callable[[], None]) -> bool:
     else:
         turn = 2
 
-    damaged = False
+    parts = {folder: warm_ups[kind] for folder, kind in folders.items()}
+    cores = frozenset().union(*(rank[3] for rank in ranks if rank[0] == host))
+    damaged, problem = False, ""
     for now in range(3):
         if now == turn:
-            damaged = not load_kernels(folder, warm)
+            problem = _compile_beside(parts, cores, progress)
+            with progress.told():
+                damaged = not all([load_kernels(*part) for part in parts.items()])
+            _loaded.update(parts)
         patient_barrier(comm)
-    return damaged
+
+    if comm.any(not writable):
+        log.warn(f"the kernel cache under {cache_base()} cannot be written; using {folder}. NUMBA_CACHE_DIR moves it")
+    if problem := next(filter(None, comm.allgather(problem)), ""):
+        log.warn(f"processes that compiled kernels failed, so one went on alone ({problem})")
+    if comm.any(damaged):
+        log.warn("the kernel cache was damaged: kernels were compiled for this run only, the next run fills it again")
+    if comm.rank == 0:
+        for one in folders:
+            tidy(one)
+    return list(folders)[-1]
+
+
+class _Progress:
+    """Says from time to time how many of so many kernels are compiled, and how long the others may take.
+
+    total: of all kinds that are missing now.
+    """
+
+    def __init__(self, log: Log, kernels: Mapping[Path, int]):
+        self.log = log
+        self.kernels = {folder: count for folder, count in kernels.items() if not folder.is_dir()}
+        self.total = sum(self.kernels.values())
+        self.began = self.last = time.monotonic()
+
+    def tell(self) -> None:
+        """Unless it has just done so."""
+        now = time.monotonic()
+        if now - self.last < QUIET_SECONDS:
+            return
+        self.last = now
+        places = (folder if folder.is_dir() else private(folder) for folder in self.kernels)
+        done = sum(len(list(place.rglob("*.nbc"))) for place in places)
+        if 0 < done < self.total:
+            left = (now - self.began) / done * (self.total - done)
+            self.log.info(f"{done} of about {self.total} kernels are compiled, some {math.ceil(left)} s left")
+
+    @contextlib.contextmanager
+    def told(self) -> Iterator[None]:
+        """While this process compiles."""
+        from numba.core import event
+
+        class Listener(event.Listener):
+            def on_start(listener, _: event.Event) -> None:
+                """Nothing: kernels that are called by others are compiled within these."""
+
+            def on_end(listener, _: event.Event) -> None:
+                self.tell()
+
+        with event.install_listener("numba:compile", Listener()) if self.total else contextlib.nullcontext():
+            yield
+
+
+def _compile_beside(parts: Mapping[Path, Callable[[], None]], cores: frozenset[int], progress: _Progress) -> str:
+    """Fill the missing folders with several processes, if that is worth while; what went wrong, if anything."""
+    missing = {folder for folder in parts if not folder.is_dir()}
+    quota, memory = cgroups.cpu_quota(Path("/")), cgroups.memory(Path("/"))
+    limits = (quota, memory and memory / MEMORY)
+    count = int(min(len(cores), PROCESSES, *(round(limit) for limit in limits if limit is not None)))
+    if count < 2 or sum(progress.kernels.get(folder, 0) for folder in missing) <= FEW:
+        return ""
+    all_parts = [
+        Part(private(folder) if folder in missing else folder, warm, folder in missing)
+        for folder, warm in (_loaded | dict(parts)).items()
+    ]
+    try:
+        return compile_in_processes(all_parts, count, cores, progress.tell)
+    except (OSError, pickle.PicklingError, AttributeError) as error:  # no more processes; a warm-up of a closure
+        return f"{type(error).__name__}: {error}"
+
+
+_loaded: dict[Path, Callable[[], None]] = {}
+"""The folders that this process has settled, with their warm-ups."""
+
+
+def private(folder: Path) -> Path:
+    """Where this process fills a folder."""
+    return folder.with_name(f"{folder.name}{BUILDING}{socket.gethostname()}-{os.getpid()}")
 
 
 def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     """Run `warm` with the folder if it is there, else fill it; False if the cache had to be given up."""
     import numba
 
-    private = f"{folder.name}{BUILDING}{socket.gethostname()}-{os.getpid()}"
-    building = None if folder.is_dir() else folder.with_name(private)
+    building = None if folder.is_dir() else private(folder)
     numba.config.CACHE_DIR = str(building or folder)  # type: ignore[attr-defined]
     (_only_read.add if building is None else _only_read.discard)(building or folder)
     try:

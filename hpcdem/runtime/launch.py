@@ -103,7 +103,7 @@ def physical_cores(root: str = "/") -> int:
     """The physical cores that this process may use: of its mask, two threads of a core being one, and no more than a
     control group allows it time for. root: where proc and sys are."""
     found = set()
-    for cpu in os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1):
+    for cpu in mask():
         siblings = cgroups.read(Path(root, f"sys/devices/system/cpu/cpu{cpu}/topology/thread_siblings_list"))
         found.add(siblings.strip() or str(cpu))
     quota = cgroups.cpu_quota(Path(root))
@@ -141,9 +141,12 @@ def openmp_runtime_found() -> bool:
 
 def cores() -> int:
     """The number of cores this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(mask())
+
+
+def mask() -> frozenset[int]:
+    """The cores this process may run on."""
+    return frozenset(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
 
 
 # -- MPI -----------------------------------------------------------------------------------------------------
@@ -287,8 +290,7 @@ class Place:
 
 def place(cores_before: int, threads: int) -> Place:
     """The place of this rank."""
-    mask = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
-    return Place(socket.gethostname(), cores_before, frozenset(mask), threads)
+    return Place(socket.gethostname(), cores_before, mask(), threads)
 
 
 def start_report(places: list[Place], library: str | None) -> str:

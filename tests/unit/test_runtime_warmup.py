@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import io
 import os
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from hpcdem.halo.comm import SerialComm
+from hpcdem.runtime import compilers
 from hpcdem.runtime import kernels as kernels_
 from hpcdem.runtime.progress import Log
 
@@ -34,6 +36,8 @@ def base(tmp_path, monkeypatch) -> Path:
     folder = tmp_path / "cache"
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(kernels_.launch, "mask", lambda: frozenset({0}))  # closures stay in this process
+    monkeypatch.setattr(kernels_, "_loaded", {})
     return folder
 
 
@@ -82,26 +86,56 @@ def test_the_folder_is_filled_once_and_then_read(base, kernels):
 def test_who_waits_is_told_how_long(base, kernels, monkeypatch):
     monkeypatch.setattr(kernels_, "QUIET_SECONDS", 0.0)
     monkeypatch.setitem(kernels_.KERNELS, "", 4)
-    _, said = prepare(kernels)
-    first, second = said.splitlines()
+    out, fresh = io.StringIO(), kernels()
+
+    def warm() -> None:
+        fresh()
+        sys.modules["hpcdem.kernels_of_a_test"].twice(1.5)
+
+    kernels_.prepare_kernels(SerialComm(), Log(stream=out), {"": warm})
+    first, second = out.getvalue().splitlines()
     assert first == "compiling about 4 kernels (first run of this version on this machine)"
     assert re.fullmatch(r"1 of about 4 kernels are compiled, some \d+ s left", second)
     assert prepare(kernels)[1] == ""
 
 
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.slow) for kind in kernels_.KERNELS])
-def test_the_number_of_kernels_is_about_right(tmp_path, kind):
-    program = (
-        "from numba.core import event\nfrom hpcdem.session import warm_up\n"
-        f"if {kind!r} != 'shared': warm_up('shared', 1)\n"
-        f"if {kind!r} == 'coupled': warm_up('', 1), warm_up('blocks', 1)\n"
-        "with event.install_recorder('numba:compile') as seen:\n"
-        f"    warm_up({kind!r}, 1)\n"
-        "print(sum(one.is_end for _, one in seen.buffer))"
-    )
-    env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_NUM_THREADS="1")
-    done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, check=True)
-    assert int(done.stdout) == pytest.approx(kernels_.KERNELS[kind], rel=0.15, abs=5)
+ALONE = """
+import sys
+from hpcdem.runtime import launch
+launch.prepare_environment(1)
+from functools import partial
+from numba.core import event
+from hpcdem.halo.comm import SerialComm
+from hpcdem.runtime import kernels
+from hpcdem.runtime.progress import Log
+from hpcdem.session import warm_up
+launch.mask = lambda: frozenset({0, 1})
+for kind in sys.argv[1:]:
+    kernels.KERNELS[kind] = 1000  # in several processes, however few there are
+    with event.install_recorder("numba:compile") as seen:
+        folder = kernels.prepare_kernels(SerialComm(), Log(), {kind: partial(warm_up, kind, 1)})
+print(kernels.late, len(list(folder.rglob("*.nbc"))), sum(one.is_end for _, one in seen.buffer))
+"""
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        ("shared",),
+        pytest.param(("shared", ""), marks=pytest.mark.slow),
+        pytest.param(("shared", "blocks"), marks=pytest.mark.slow),
+        pytest.param(("shared", "", "blocks", "coupled"), marks=pytest.mark.slow),
+    ],
+)
+def test_processes_know_what_to_compile(tmp_path, kinds):
+    """The process that loads the kernels has next to nothing to compile; the folder has as many as is said before."""
+    env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path))
+    command = [sys.executable, "-c", ALONE, *kinds]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+    late, count, compiled = done.stdout.splitlines()[-1].rsplit(maxsplit=2)
+    assert late == "[]" and "warning" not in done.stdout
+    assert int(count) == pytest.approx(kernels_.KERNELS[kinds[-1]], rel=0.15, abs=5)
+    assert int(compiled) <= 6
 
 
 def test_nobody_sees_a_folder_that_is_not_complete(base, kernels):
@@ -200,18 +234,173 @@ def test_folders_that_nobody_uses_are_removed(base):
     assert sorted(p.name for p in base.iterdir()) == ["0-numba1-mine", "0-numba1-used", "other"]
 
 
+MODULE = """
+import numba
+from numba.extending import intrinsic
+
+@intrinsic
+def one(typingctx):
+    return numba.types.float64(), lambda context, builder, signature, args: context.get_constant(numba.float64, 1.0)
+
+@numba.njit(cache=True)
+def inner(x):
+    return 2 * x
+
+@numba.njit(cache=True)
+def twice(x, y=1):
+    return inner(x) * y
+
+@numba.njit(cache=True)
+def of_an_intrinsic(x):
+    return x / one()  # by zero, where functions are plain
+"""
+WARM = """
+import os, sys, time
+from pathlib import Path
+HERE = Path(__file__).parent
+
+def warm():
+    import kernels_of_processes as k
+    assert k.twice(21) == 42
+    k.twice(1.5, y=k.of_an_intrinsic(4))
+
+def curious():
+    warm()
+    names = [name for name in os.environ if name.startswith(("OMPI_", "PMI_"))]
+    HERE.joinpath(f"seen-{os.getpid()}").write_text(repr((names, "mpi4py" in sys.modules, os.sched_getaffinity(0))))
+
+def fails():
+    if os.environ["PARENT"] != str(os.getpid()):
+        raise SystemExit("no such thing")
+    warm()
+
+def hangs():
+    if os.environ["PARENT"] != str(os.getpid()):
+        HERE.joinpath(f"seen-{os.getpid()}").touch()
+        time.sleep(600)
+    warm()
+"""
+
+
+@pytest.fixture
+def processes(base, tmp_path, monkeypatch):
+    """`processes("warm")`: two processes compile what this warm-up calls."""
+    (tmp_path / "kernels_of_processes.py").write_text(MODULE)
+    (tmp_path / "warm_ups_of_processes.py").write_text(WARM)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PARENT", str(os.getpid()))
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "3")
+    monkeypatch.setenv("PMI_RANK", "1")
+    monkeypatch.setattr(kernels_, "late", [])
+    some = sorted(os.sched_getaffinity(0))[0]
+    monkeypatch.setattr(kernels_.launch, "mask", lambda: frozenset({some, 100000}))
+    monkeypatch.setattr(kernels_.cgroups, "cpu_quota", lambda root: None)
+
+    def run(name: str) -> str:
+        out = io.StringIO()
+        warm = getattr(importlib.import_module("warm_ups_of_processes"), name)
+        kernels_.prepare_kernels(SerialComm(), Log(stream=out), {"": warm})
+        return out.getvalue()
+
+    yield run
+    for name in ("kernels_of_processes", "warm_ups_of_processes"):
+        sys.modules.pop(name, None)
+
+
+def hits() -> dict[str, tuple[int, int]]:
+    """Of each kernel: read from the folder, compiled here."""
+    module = sys.modules["kernels_of_processes"]
+    stats = {name: getattr(module, name).stats for name in ("twice", "of_an_intrinsic")}
+    return {name: (sum(s.cache_hits.values()), sum(s.cache_misses.values())) for name, s in stats.items()}
+
+
+def test_several_processes_fill_a_folder(processes, base, tmp_path):
+    said = processes("curious")
+    assert said.splitlines() == ["compiling about 125 kernels (first run of this version on this machine)"]
+    # The second call of `twice` depends on what only the compiler can do: it was left to this process.
+    assert hits() == {"twice": (1, 1), "of_an_intrinsic": (1, 0)}
+    (folder,) = base.iterdir()
+    assert len(list(folder.rglob("*.nbc"))) == 5 and not list(folder.rglob("*.tmp*"))
+    seen = [path.read_text() for path in tmp_path.glob("seen-*") if path.name != f"seen-{os.getpid()}"]
+    assert len(seen) == 2
+    for text in seen:
+        names, mpi, cores = eval(text)
+        assert names == [] and not mpi and cores == {min(os.sched_getaffinity(0))}
+
+
+def test_who_waits_for_processes_is_told_how_long(processes, monkeypatch):
+    monkeypatch.setattr(kernels_, "QUIET_SECONDS", 0.0)
+    assert re.search(r"^[1-5] of about 125 kernels are compiled, some \d+ s left$", processes("warm"), re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "alone"),
+    [("cpu_quota", 1.2, True), ("cpu_quota", 2.0, False), ("memory", 9 * 10**8, True), ("memory", 2 * 10**9, False)],
+)
+def test_as_many_processes_as_the_control_group_allows(processes, monkeypatch, limit, value, alone):
+    monkeypatch.setattr(kernels_.cgroups, limit, lambda root: value)
+    processes("warm")
+    assert hits()["of_an_intrinsic"] == ((0, 1) if alone else (1, 0))
+
+
+def test_few_kernels_are_not_worth_processes(processes, monkeypatch):
+    monkeypatch.setitem(kernels_.KERNELS, "", kernels_.FEW)
+    processes("warm")
+    assert hits()["of_an_intrinsic"] == (0, 1)
+
+
+def test_processes_that_fail_are_told_and_this_one_compiles(processes, base):
+    said = processes("fails")
+    assert said.count("warning: processes that compiled kernels failed") == 1
+    assert "(exit codes 1, 1; no such thing)" in said
+    assert hits() == {"twice": (0, 2), "of_an_intrinsic": (0, 1)}
+    (folder,) = base.iterdir()
+    assert len(list(folder.rglob("*.nbc"))) == 5 and kernels_.BUILDING not in folder.name
+
+
+def test_a_warm_up_that_hangs_without_its_kernels_is_given_up(processes, monkeypatch):
+    monkeypatch.setattr(compilers, "PATIENCE", 3.0)
+    began = time.monotonic()
+    assert "failed, so one went on alone (exit codes 1, 1;" in processes("hangs")
+    assert hits()["of_an_intrinsic"] == (0, 1) and time.monotonic() - began < 60
+
+
+def test_processes_end_with_the_one_that_started_them(processes, tmp_path):
+    program = (
+        "import os\nos.environ['PARENT'] = str(os.getpid())\n"
+        "import warm_ups_of_processes as w\nfrom pathlib import Path\nfrom hpcdem.runtime.compilers import *\n"
+        f"part = Part(Path({str(tmp_path / 'folder')!r}), w.hangs, True)\n"
+        "compile_in_processes([part], 2, os.sched_getaffinity(0), lambda: None)"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", program])
+    try:
+        while len(pids := [path.name.removeprefix("seen-") for path in tmp_path.glob("seen-*")]) < 2:
+            assert parent.poll() is None
+            time.sleep(0.05)
+    finally:
+        parent.kill()
+        parent.wait()
+    until = time.monotonic() + 20
+    while any(Path("/proc", pid).exists() and " Z " not in Path("/proc", pid, "stat").read_text() for pid in pids):
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
 @pytest.mark.mpi
-def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
+@pytest.mark.parametrize("cores", ["alone", "on the cores of all"])
+def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path, cores):
+    """Bound to a core each, they compile in processes on all of these."""
     (tmp_path / "kernels_of_a_test.py").write_text(KERNELS)
+    (tmp_path / "warm_up_of_a_test.py").write_text("def warm():\n    import kernels_of_a_test as k\n    k.twice(21)\n")
     program = tmp_path / "program.py"
     program.write_text(
         "import sys\n"
         "from hpcdem.runtime import kernels, launch, shutdown\n"
         "from hpcdem.runtime.progress import Log\n"
+        "from warm_up_of_a_test import warm\n"
         "comm = launch.start_mpi()\n"
-        "def warm():\n"
-        "    import kernels_of_a_test as k\n"
-        "    k.twice(21)\n"
+        f"launch.mask = lambda: frozenset({{{'0' if cores == 'alone' else 'comm.rank'}}})\n"
         "def work():\n"
         "    kernels.prepare_kernels(comm, Log(comm.rank), {'': warm})\n"
         "    import kernels_of_a_test as k\n"
@@ -219,8 +408,8 @@ def test_one_rank_of_a_host_compiles_and_the_others_read(launch, tmp_path):
         "    sys.stdout.write(f'rank {comm.rank} hits {hits}\\n')\n"
         "shutdown.leave(shutdown.run_together(comm, work))\n"
     )
-    env = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    for hits in ((0, 1, 1), (1, 1, 1)):
+    env = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)}
+    for hits in ((0 if cores == "alone" else 1, 1, 1), (1, 1, 1)):
         done = launch.python(3, program, timeout=120, env=env)
         assert done.returncode == 0, done.stderr
         lines = sorted(line for line in done.stdout.splitlines() if line.startswith("rank"))
