@@ -78,7 +78,7 @@ class Session:
         """Collective: an empty model of blocks; the first one waits for the kernels. quiet: without a log."""
         self.prepare("blocks")
         from hpcdem.commands.fdem import Project
-        from hpcdem.physics.fdem.model import Blocks
+        from hpcdem.physics.fdem.simulation import Blocks
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         run_folder.claim(outdir, self.comm, self.job)

@@ -16,8 +16,9 @@ from matplotlib.tri import Triangulation
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from hpcdem.physics.fdem import changes, diagnostics, equilibrium  # noqa: E402
 from hpcdem.physics.fdem.mesh import Mesh  # noqa: E402
-from hpcdem.physics.fdem.model import Blocks  # noqa: E402
+from hpcdem.physics.fdem.simulation import Blocks  # noqa: E402
 from tests.cases.kirsch import exact  # noqa: E402
 
 EDGES = 96
@@ -55,7 +56,7 @@ def plate(kind: str, edges: int = EDGES, uniform: bool = False, rise: float = 0.
     mesh = disk(kind, edges)
     sim = Blocks()
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     found = mesh.edges()
     middle = mesh.points[found.points].mean(axis=1)
     rim = np.flatnonzero(~found.inner & (np.hypot(*middle.T) > 0.5 * exact.R))
@@ -84,7 +85,7 @@ def polar(sim: Blocks) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...], 
     """r [m], t [rad] of the centroids, and s_r, s_t, s_rt [Pa] of the model and exact, there."""
     x, y = sim.the_mesh().centroids().T
     r, t = np.hypot(x, y), np.arctan2(y, x)
-    stress = (sim.values(name) for name in ("stress_xx", "stress_yy", "stress_xy"))
+    stress = (diagnostics.values(sim, name) for name in ("stress_xx", "stress_yy", "stress_xy"))
     return r, t, exact.turned(*stress, t), exact.polar(r, t)
 
 
@@ -103,7 +104,7 @@ def draw(path: Path) -> Blocks:
     """The figure: tangential and radial stress around the hole, and both along two lines with the exact curves."""
     sim = plate("quad")
     sim.option(dynamic=False)
-    sim.solve_elastic()
+    equilibrium.solve_elastic(sim)
     r, t, found, _ = polar(sim)
     mesh = sim.the_mesh()
     # Corners share the mean of their elements, quads are cut in two: contours without steps.

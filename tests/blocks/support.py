@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hpcdem.physics.fdem import changes as changes_
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25}
 
@@ -65,7 +66,7 @@ def model(mesh: Mesh, **options) -> Blocks:
     """A model of rock on one rank."""
     sim = Blocks(**options)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes_.element_model(sim, None, "mech_iso_elastic", ROCK)
     return sim
 
 

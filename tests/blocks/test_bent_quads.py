@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh import structured
 from tests.blocks.support import ROCK, model
@@ -50,7 +51,7 @@ def force_of(points: np.ndarray, nu: float, moved: np.ndarray) -> np.ndarray:
     sim.option(large_strain=False, collision=False, dynamic=False)
     sim.open_model()
     sim.x[:, :8] += moved
-    sim._repeat(sim.x)
+    changes.repeat(sim, sim.x)
     return sim.evaluate().force[0]
 
 
@@ -97,8 +98,14 @@ def bent_bar(n: int, kind: str, diagonal: str = "both", nu: float = 0.25, aspect
     sim.velocity_condition(left[:1], vy=0.0)
     for point in right:
         sim.velocity_condition([point], vx=k * length * float(mesh.points[point, 1]))
-    sim.solve_elastic()
-    return float(sim.values("reaction_x", right) @ mesh.points[right, 1] * 12.0 * (1.0 - nu**2) / (ROCK["young"] * k))
+    equilibrium.solve_elastic(sim)
+    return float(
+        diagnostics.values(sim, "reaction_x", right)
+        @ mesh.points[right, 1]
+        * 12.0
+        * (1.0 - nu**2)
+        / (ROCK["young"] * k)
+    )
 
 
 @pytest.mark.parametrize(("nu", "aspect"), [(0.25, 1.0), (0.4, 1.0), (0.25, 2.0)])

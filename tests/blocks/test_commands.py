@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.model import QUANTITIES, Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem.diagnostics import QUANTITIES
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import ROCK, joined, jointed, model, rectangle, shaken
 from tests.pcdc.fake import Noted
 
@@ -18,7 +20,7 @@ def pulled(steps: int = 0) -> Blocks:
     y = sim.mesh.points[:, 1]
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
     sim.velocity_condition(np.flatnonzero(y > 0.6 - 1e-9), vx=0.0, vy=1.0)
-    sim.advance(steps)
+    convergence.advance(sim, steps)
     return sim
 
 
@@ -32,35 +34,40 @@ def test_a_reset_forgets_damage_and_leaves_broken_joints_broken():
     sim.joint_property(left, {"gf1": 1.0, "gf2": 10.0})
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
     sim.velocity_condition(np.flatnonzero(y > 0.6 - 1e-9), vx=0.0, vy=1.0)
-    while not (sim.joint_counts()[1] and sim.joint_counts()[2]):
-        sim.advance(1)
-    sim.crack(sim.numbers_of_joints(None)[:1])
-    _, yielded, broken = sim.joint_counts()
-    damage, events = sim.values("damage"), sim.events()["joint"]
+    while not (diagnostics.joint_counts(sim)[1] and diagnostics.joint_counts(sim)[2]):
+        convergence.advance(sim, 1)
+    changes.crack(sim, sim.numbers_of_joints(None)[:1])
+    _, yielded, broken = diagnostics.joint_counts(sim)
+    damage, events = diagnostics.values(sim, "damage"), diagnostics.events(sim)["joint"]
     assert ((damage > 0.0) & (damage < 1.0)).any() and len(events) == broken
-    sim.reset_joint_state()
-    after = sim.values("damage")
-    assert sim.joint_counts()[1:] == (0, broken) and np.array_equal(sim.events()["joint"], events)
-    assert np.array_equal(after == 1.0, sim.values("state") == 3.0) and not ((after > 0.0) & (after < 1.0)).any()
+    changes.reset_joint_state(sim)
+    after = diagnostics.values(sim, "damage")
+    assert diagnostics.joint_counts(sim)[1:] == (0, broken) and np.array_equal(diagnostics.events(sim)["joint"], events)
+    assert (
+        np.array_equal(after == 1.0, diagnostics.values(sim, "state") == 3.0)
+        and not ((after > 0.0) & (after < 1.0)).any()
+    )
     free = ~sim.closed_faces()[events]
     assert free.all() and not sim.closed_faces()[sim.numbers_of_joints(None)[0]]
-    sim.advance(40)
-    assert sim.joint_counts()[1] > 0 and sim.joint_counts()[2] >= broken
+    convergence.advance(sim, 40)
+    assert diagnostics.joint_counts(sim)[1] > 0 and diagnostics.joint_counts(sim)[2] >= broken
 
 
 def test_velocities_and_displacements_are_reset_where_they_are_asked_for():
     sim = pulled(100)
     some = np.arange(6)
-    before = sim.values("velocity_y")
+    before = diagnostics.values(sim, "velocity_y")
     assert np.abs(before).max() > 0.0
-    sim.reset_velocity(some)
-    after = sim.values("velocity_y")
+    changes.reset_velocity(sim, some)
+    after = diagnostics.values(sim, "velocity_y")
     assert (after[some] == 0.0).all() and np.array_equal(after[6:], before[6:])
-    place, stress = sim.values("position_y"), sim.values("stress_yy")
-    sim.reset_displacement(some)
-    assert (sim.values("displacement_y", some) == 0.0).all()
-    assert np.abs(sim.values("displacement_y")).max() > 0.0
-    assert np.array_equal(sim.values("position_y"), place) and np.array_equal(sim.values("stress_yy"), stress)
+    place, stress = diagnostics.values(sim, "position_y"), diagnostics.values(sim, "stress_yy")
+    changes.reset_displacement(sim, some)
+    assert (diagnostics.values(sim, "displacement_y", some) == 0.0).all()
+    assert np.abs(diagnostics.values(sim, "displacement_y")).max() > 0.0
+    assert np.array_equal(diagnostics.values(sim, "position_y"), place) and np.array_equal(
+        diagnostics.values(sim, "stress_yy"), stress
+    )
 
 
 def test_tractions_can_be_taken_back():
@@ -72,13 +79,15 @@ def test_tractions_can_be_taken_back():
     outer = ~edges.inner
     sim.stress_condition(edges.faces[outer, 0], normal=-1e6)
     sim.option(dynamic=False)
-    sim.solve(ratio=1e-8, cycles=5000)
-    assert sim.values("stress_xx") == pytest.approx(-1e6, rel=1e-6)
+    convergence.solve(sim, ratio=1e-8, cycles=5000)
+    assert diagnostics.values(sim, "stress_xx") == pytest.approx(-1e6, rel=1e-6)
     left = edges.faces[outer & (ends[:, :, 0] < 1e-9).all(axis=1), 0]
     sim.remove_stress_conditions(left)
     sim.option(dynamic=True)
-    sim.advance(200)
-    speed = (sim.values("element_velocity_x") * ROCK["density"] * sim.values("area")).sum() / (ROCK["density"] * 0.04)
+    convergence.advance(sim, 200)
+    speed = (
+        diagnostics.values(sim, "element_velocity_x") * ROCK["density"] * diagnostics.values(sim, "area")
+    ).sum() / (ROCK["density"] * 0.04)
     assert speed == pytest.approx(-1e6 * 0.2 / (ROCK["density"] * 0.04) * sim.clock.time, rel=0.02)
 
 
@@ -86,18 +95,20 @@ def test_quantities_have_the_values_they_say():
     """Every name answers, on the right kind; totals are sums of values; principal stresses follow from components."""
     sim = pulled(250)
     for name, quantity in QUANTITIES.items():
-        values = sim.values(name)
+        values = diagnostics.values(sim, name)
         size = {"element": len(sim.mesh.cells), "node": len(sim.mesh.points)}.get(quantity.on)
         assert size is None or len(values) == size, name
-        rows = sim.owned_values(quantity.on, [name])
+        rows = diagnostics.owned_values(sim, quantity.on, [name])
         assert len(rows["number"]) == len(rows[name]), name
         if not name.startswith(("reaction", "unbalanced")):
-            assert sim.total(name) == pytest.approx(math.fsum(values[~np.isnan(values)]), rel=1e-12, abs=1e-300), name
-    xx, yy, xy = (sim.values(f"stress_{c}") for c in ("xx", "yy", "xy"))
+            assert diagnostics.total(sim, name) == pytest.approx(
+                math.fsum(values[~np.isnan(values)]), rel=1e-12, abs=1e-300
+            ), name
+    xx, yy, xy = (diagnostics.values(sim, f"stress_{c}") for c in ("xx", "yy", "xy"))
     both = np.array([np.linalg.eigvalsh([[a, c], [c, b]]) for a, b, c in zip(xx, yy, xy)])
-    assert sim.values("stress_min") == pytest.approx(both[:, 0], abs=1e-6 * np.abs(both).max())
-    assert sim.values("stress_max") == pytest.approx(both[:, 1], abs=1e-6 * np.abs(both).max())
-    corners = sim.owned_values("corner", ["position_x", "displacement_y", "velocity_y"])
+    assert diagnostics.values(sim, "stress_min") == pytest.approx(both[:, 0], abs=1e-6 * np.abs(both).max())
+    assert diagnostics.values(sim, "stress_max") == pytest.approx(both[:, 1], abs=1e-6 * np.abs(both).max())
+    corners = diagnostics.owned_values(sim, "corner", ["position_x", "displacement_y", "velocity_y"])
     order = np.argsort(corners["number"])
     assert np.array_equal(corners["number"][order], np.arange(4 * len(sim.mesh.cells)))
 
@@ -110,8 +121,8 @@ def test_contacts_say_who_presses_whom():
     sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] < 1e-9), vx=0.0, vy=0.0)
     sim.gravity(0.0, -10.0)
     sim.option(dynamic=False)
-    assert sim.solve(ratio=1e-6, cycles=20000).reason == "ratio"
-    found = sim.contacts()
+    assert convergence.solve(sim, ratio=1e-6, cycles=20000).reason == "ratio"
+    found = diagnostics.contacts(sim)
     n = len(lower.cells)
     assert (found["element_1"] < n).all() and (found["element_2"] >= n).all()
     assert found["force_y"].sum() == pytest.approx(-ROCK["density"] * 10.0 * 0.02, rel=1e-4)
@@ -130,13 +141,13 @@ def test_what_is_taken_out_in_motion_lets_go_slowly():
         sim.velocity_condition(np.flatnonzero((y < 1e-9) | (y > 0.9 - 1e-9)), vy=0.0)
         sim.initial_stress(None, xx=-1e7, yy=-5e6)
         sim.option(collision=False, dynamic=False)
-        sim.solve(ratio=1e-6, cycles=20000)
+        convergence.solve(sim, ratio=1e-6, cycles=20000)
         sim.option(dynamic=True)
-        sim.null(np.flatnonzero(np.hypot(*(mesh.centroids() - 0.45).T) < 0.2), relax=relax)
+        changes.null(sim, np.flatnonzero(np.hypot(*(mesh.centroids() - 0.45).T) < 0.2), relax=relax)
         fastest = 0.0
         while sim.clock.time < 2.5e-3:
-            sim.advance(40)
-            fastest = max(fastest, float(np.nanmax(np.abs(sim.values("velocity_x")))))
+            convergence.advance(sim, 40)
+            fastest = max(fastest, float(np.nanmax(np.abs(diagnostics.values(sim, "velocity_x")))))
         swings.append(fastest)
     assert swings[0] > 0.05 and swings[1] < 0.2 * swings[0]
 
@@ -149,21 +160,21 @@ def test_small_and_large_strain_differ_by_the_rotation():
         sim.option(large_strain=large, collision=False, dynamic=False)
         sim.open_model()
         matrix = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-        sim.x[:, :6] = (sim.homes().reshape(-1, 4, 2)[:, :3] @ matrix.T).reshape(-1, 6)
-        sim._repeat(sim.x)
+        sim.x[:, :6] = (diagnostics.homes(sim).reshape(-1, 4, 2)[:, :3] @ matrix.T).reshape(-1, 6)
+        changes.repeat(sim, sim.x)
         strain = math.cos(turn) - 1.0
         lame = mu = 20e9
         expected = 0.0 if large else 2.0 * lame * strain + 2.0 * mu * strain
-        assert sim.values("stress_xx") == pytest.approx(expected, abs=1.0)
-        assert sim.values("stress_xy") == pytest.approx(0.0, abs=1.0)
+        assert diagnostics.values(sim, "stress_xx") == pytest.approx(expected, abs=1.0)
+        assert diagnostics.values(sim, "stress_xy") == pytest.approx(0.0, abs=1.0)
 
 
 def test_resetting_elements_changes_nothing_in_an_elastic_model_and_says_so():
     log = Noted()
     sim = pulled(50)
     sim.log = log
-    before = sim.values("stress_yy")
-    sim.reset_state()
-    assert np.array_equal(sim.values("stress_yy"), before)
-    assert sim.critical_time_step() == pytest.approx(sim.clock.dt)
+    before = diagnostics.values(sim, "stress_yy")
+    changes.reset_state(sim)
+    assert np.array_equal(diagnostics.values(sim, "stress_yy"), before)
+    assert diagnostics.critical_time_step(sim) == pytest.approx(sim.clock.dt)
     assert "no element has a law with a state of its own (mech_iso_elastic)" in log.lines[-1]

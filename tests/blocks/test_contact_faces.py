@@ -8,8 +8,9 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import contact
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, joined, near, rectangle, shaken
 
 SOFT = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 1.0}
@@ -26,7 +27,7 @@ def pressed(
     mesh = joined(block, plate)
     sim = Blocks()
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", SOFT)
+    changes.element_model(sim, None, "mech_iso_elastic", SOFT)
     sim.face_model(None, "contact_mohr_coulomb", MODEL)
     n = len(block.points)
     at_zero = near(mesh, 1, 0.0)
@@ -43,7 +44,7 @@ def pressed(
         sim.velocity_condition(np.arange(n), vx=vx, vy=vy)
         for _ in range(steps):
             sim.step()
-            found = sim.contacts()
+            found = diagnostics.contacts(sim)
             out.append((found["force_x"].sum(), found["force_y"].sum()))
     return np.array(out)
 
@@ -78,7 +79,7 @@ def on_slope(kind: str, top: float | None = None, joint: bool = False, of_faces:
     mesh = joined(block, plate)
     sim = Blocks()
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", {**SOFT, "friction": 0.0 if of_faces else 40.0})
+    changes.element_model(sim, None, "mech_iso_elastic", {**SOFT, "friction": 0.0 if of_faces else 40.0})
     if of_faces:
         sim.face_model(None, "contact_mohr_coulomb", {"friction": 40.0, "penalty_normal": 1e10})
     if top is not None:
@@ -91,8 +92,8 @@ def on_slope(kind: str, top: float | None = None, joint: bool = False, of_faces:
     n = len(block.points)
     sim.velocity_condition(np.arange(n, len(mesh.points)), vx=0.0, vy=0.0)
     sim.gravity(9.81 * math.sin(math.radians(20.0)), -9.81 * math.cos(math.radians(20.0)))
-    sim.solve(time=0.1)
-    return float(sim.values("displacement_x", np.arange(n)).mean())
+    convergence.solve(sim, time=0.1)
+    return float(diagnostics.values(sim, "displacement_x", np.arange(n)).mean())
 
 
 @pytest.mark.parametrize("kind", ["cross", "quad"])
@@ -110,7 +111,7 @@ def test_faces_of_a_broken_joint_have_its_friction():
     mesh = rectangle(4, 2, 0.4, 0.2)
     sim = Blocks()
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", {**SOFT, "friction": 40.0})
+    changes.element_model(sim, None, "mech_iso_elastic", {**SOFT, "friction": 40.0})
     middle = near(mesh, 1, 0.1, inner=True)
     edges = mesh.edges()
     inner = edges.faces[edges.inner][:, 0]
@@ -118,14 +119,14 @@ def test_faces_of_a_broken_joint_have_its_friction():
     sim.joint_model(inner, "classic_intrinsic_cohesive_interface", {**strong, "friction": 0.0})
     lower = np.intersect1d(middle, inner)
     sim.joint_model(lower, "classic_intrinsic_cohesive_interface", {**strong, "friction": 20.0})
-    sim.crack(lower)
+    changes.crack(sim, lower)
     y = mesh.points[:, 1]
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
     sim.velocity_condition(np.flatnonzero(y > 0.2 - 1e-9), vx=0.0, vy=-0.05)
-    sim.solve(time=2e-3)
+    convergence.solve(sim, time=2e-3)
     sim.velocity_condition(np.flatnonzero(y > 0.2 - 1e-9), vx=0.2, vy=0.0)
-    sim.solve(time=4e-3)
-    c = sim.contacts()
+    convergence.solve(sim, time=4e-3)
+    c = diagnostics.contacts(sim)
     upper = mesh.centroids()[:, 1] > 0.1
     sign = np.where(upper[c["element_1"]], 1.0, -1.0)
     ratio = abs((sign * c["force_x"]).sum() / (sign * c["force_y"]).sum())
@@ -156,10 +157,10 @@ def test_a_mirrored_model_has_mirrored_forces(kind):
             faces = outside.faces[~outside.inner][:, 0][place]
         sim = Blocks()
         sim.take_mesh(mesh)
-        sim.element_model(None, "mech_iso_elastic", SOFT)
+        changes.element_model(sim, None, "mech_iso_elastic", SOFT)
         for k, face in enumerate(faces.tolist()):
             sim.face_model([face], "contact_mohr_coulomb", {"penalty_normal": 1e10 * (1 + k % 5)})
-        seen = sim.values("unbalanced_x"), sim.values("unbalanced_y")
+        seen = diagnostics.values(sim, "unbalanced_x"), diagnostics.values(sim, "unbalanced_y")
         return np.column_stack(seen) * ([-1.0, 1.0] if mirror else [1.0, 1.0])
 
     right, left = forces(False), forces(True)
@@ -173,7 +174,7 @@ def overlapping(depth: float, shift: float) -> Blocks:
     plate = shaken(rectangle(10, 4, 1.0, 0.4, y0=-0.4), 0.2, seed=8)
     sim = Blocks()
     sim.take_mesh(joined(block, plate))
-    sim.element_model(None, "mech_iso_elastic", SOFT)
+    changes.element_model(sim, None, "mech_iso_elastic", SOFT)
     sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10})
     return sim
 
@@ -201,7 +202,7 @@ def test_every_element_that_is_overlapped_takes_part(depth):
         np.zeros((0, 3)), np.zeros((0, 12)), np.zeros(0, np.int64), np.zeros(1, np.int64),
         np.zeros((0, contact.CHOICE)), touching, out, 0.0,
     )  # fmt: skip
-    found = sim.contacts()
+    found = diagnostics.contacts(sim)
     assert found["force_y"].sum() == pytest.approx(out[touching > 0, 1:6:2].sum(), rel=1e-12)
     bare = bits == 0
     assert (bare[found["element_1"]] | bare[found["element_2"]]).any()

@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import detect
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import joined, jointed, model, rectangle
 
 
@@ -35,7 +36,7 @@ def test_faces_of_a_crack_are_paired_up_to_its_tips(kind, with_joints):
         jointed(sim)
     faces = upright(sim, 0.3, 0.09, 0.51)
     assert len(faces) == 4
-    sim.crack(faces)
+    changes.crack(sim, faces)
     found = partners(sim)
     for face in faces.tolist():
         e, f = face // 4, int(sim.partner[face]) // 4
@@ -52,7 +53,7 @@ def test_nobody_touches_who_hangs_on_him(kind):
         return [(a, b) for a, b in partners(sim) if set(cells[a]) & set(cells[b]) - {-1}]
 
     assert not meet()
-    sim.crack(upright(sim, 0.2, -1.0, 1.0))
+    changes.crack(sim, upright(sim, 0.2, -1.0, 1.0))
     left = sim.mesh.centroids()[:, 0] < 0.2
     assert meet() and all(left[a] != left[b] for a, b in meet())
 
@@ -65,20 +66,20 @@ def test_a_sheared_crack_does_not_store_energy_out_of_nothing():
     edges = sim.mesh.edges()
     ends = sim.mesh.points[edges.points[edges.inner]]
     flat = (np.abs(ends[:, :, 1] - 0.4) < 1e-9).all(axis=1) & (np.abs(ends[:, :, 0].mean(axis=1) - 0.4) < 0.2)
-    sim.crack(edges.faces[edges.inner][flat, 0])
+    changes.crack(sim, edges.faces[edges.inner][flat, 0])
     y = sim.mesh.points[:, 1]
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
     top = edges.faces[~edges.inner][(sim.mesh.points[edges.points[~edges.inner]][:, :, 1] > 0.8 - 1e-9).all(axis=1), 0]
     sim.stress_condition(top, normal=-10e6)
     sim.option(dynamic=False)
-    assert sim.solve(ratio=1e-6, cycles=20000).reason == "ratio"
-    touching = sim.contacts()
+    assert convergence.solve(sim, ratio=1e-6, cycles=20000).reason == "ratio"
+    touching = diagnostics.contacts(sim)
     assert len(touching["x"]) >= 4
-    x = sim.values("element_position_x")
+    x = diagnostics.values(sim, "element_position_x")
     assert touching["x"].min() < 0.4 - 0.1 and touching["x"].max() > 0.4 + 0.1  # both outermost faces, too
     # Above the crack the stress is nearly that without it.
-    above = (np.abs(x - 0.4) < 0.15) & (np.abs(sim.values("element_position_y") - 0.45) < 0.05)
-    assert sim.values("stress_yy")[above].mean() == pytest.approx(-10e6, rel=0.1)
+    above = (np.abs(x - 0.4) < 0.15) & (np.abs(diagnostics.values(sim, "element_position_y") - 0.45) < 0.05)
+    assert diagnostics.values(sim, "stress_yy")[above].mean() == pytest.approx(-10e6, rel=0.1)
 
 
 def test_the_search_finds_what_trying_all_pairs_finds():
@@ -121,15 +122,15 @@ def test_rubble_without_friction_and_damping_keeps_its_energy():
     rng = np.random.default_rng(3)
     for k in range(25):
         vx, vy = (3.0 * rng.normal(size=2)).tolist()
-        sim.set_velocity(np.arange(4 * k, 4 * k + 4), vx, vy)
+        changes.set_velocity(sim, np.arange(4 * k, 4 * k + 4), vx, vy)
     sim.time_step(safety=0.4)
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     sim.step()
-    start = sim.energies()["kinetic"]
+    start = diagnostics.energies(sim)["kinetic"]
     least, most = np.inf, 0.0
     for _ in range(60):
-        sim.advance(100)
-        found = sim.energies()
+        convergence.advance(sim, 100)
+        found = diagnostics.energies(sim)
         least, most = min(least, found["contact"]), max(most, found["strain"])
         assert found["relative"] < 1e-3
         assert found["kinetic"] + found["strain"] < 1.02 * start

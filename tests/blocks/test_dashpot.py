@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import joined, model, rectangle
 
 RHO, P = 2700.0, 2e7
@@ -38,15 +39,15 @@ def test_a_block_on_a_spring_swings_with_the_ratio_that_was_asked_for():
     dt = sim.clock.dt
     y = []
     while sim.clock.time < 4.0 * 2.0 * math.pi / omega:
-        sim.advance(20)
-        y.append(sim.values("displacement_y", np.arange(4)).mean())
+        convergence.advance(sim, 20)
+        y.append(diagnostics.values(sim, "displacement_y", np.arange(4)).mean())
     about = np.array(y) + mass * 3000.0 / k
     turns = [abs(about[i]) for i in range(1, len(y) - 1) if (y[i] - y[i - 1]) * (y[i + 1] - y[i]) <= 0.0][:4]
     assert len(turns) >= 3 and dt > 0.0
     decrement = math.log(turns[0] / turns[2]) / 2.0  # per half a turn
     assert decrement / math.hypot(math.pi, decrement) == pytest.approx(expected, rel=0.08)
     without = block_on_plate(0.0)
-    without.advance(2000)
+    convergence.advance(without, 2000)
     assert without.clock.dt > dt  # a dashpot needs smaller steps
 
 
@@ -57,25 +58,25 @@ def test_what_it_takes_is_in_the_account(tmp_path):
     for ratio in (0.0, 0.5):
         sim = block_on_plate(ratio)
         sim.gravity(0.0, 0.0)
-        sim.set_velocity(np.arange(4), vy=-0.2)
-        sim.account_energy()
+        changes.set_velocity(sim, np.arange(4), vy=-0.2)
+        diagnostics.account_energy(sim)
         sim.step()
-        start = sim.energies()["kinetic"] + sim.energies()["contact"]
+        start = diagnostics.energies(sim)["kinetic"] + diagnostics.energies(sim)["contact"]
         for part in range(60):
-            sim.advance(25)
+            convergence.advance(sim, 25)
             if part == 7:
-                sim.save(tmp_path / "mid.sav")
+                saved_state.save(sim, tmp_path / "mid.sav")
                 middle = sim.clock.step
-            if not len(sim.contacts()["x"]) and sim.clock.step > 200:
+            if not len(diagnostics.contacts(sim)["x"]) and sim.clock.step > 200:
                 break
-        found = sim.energies()
+        found = diagnostics.energies(sim)
         assert found["relative"] < 1e-6
-        speeds.append(sim.values("velocity_y", np.arange(4)).mean())
+        speeds.append(diagnostics.values(sim, "velocity_y", np.arange(4)).mean())
         assert found["contact"] == pytest.approx(start - found["kinetic"] - found["strain"], abs=1e-3 * start)
         again = Blocks()
-        again.restore(tmp_path / "mid.sav")
-        again.advance(sim.clock.step - middle)
-        assert np.array_equal(again.values("velocity_y"), sim.values("velocity_y"))
+        saved_state.restore(again, tmp_path / "mid.sav")
+        convergence.advance(again, sim.clock.step - middle)
+        assert np.array_equal(diagnostics.values(again, "velocity_y"), diagnostics.values(sim, "velocity_y"))
     assert speeds[0] == pytest.approx(0.2, rel=0.01)
     assert 0.02 < speeds[1] < 0.16
 
@@ -85,8 +86,8 @@ def test_it_has_no_part_in_static_runs():
     for ratio in (0.0, 0.5):
         sim = block_on_plate(ratio)
         sim.option(dynamic=False)
-        sim.advance(300)
-        ends.append(sim.values("position_y"))
+        convergence.advance(sim, 300)
+        ends.append(diagnostics.values(sim, "position_y"))
     assert np.array_equal(*ends)
 
 
@@ -102,6 +103,6 @@ def test_a_sliding_block_on_soft_contacts_stops_trembling():
         n, slope = len(block.points), math.radians(31.0)
         sim.velocity_condition(np.arange(n, len(sim.mesh.points)), vx=0.0, vy=0.0)
         sim.gravity(9.81 * math.sin(slope), -9.81 * math.cos(slope))
-        sim.solve(time=0.3)
-        late[ratio] = np.abs(sim.values("velocity_y", np.arange(n))).max()
+        convergence.solve(sim, time=0.3)
+        late[ratio] = np.abs(diagnostics.values(sim, "velocity_y", np.arange(n))).max()
     assert late[0.0] > 3e-4 and late[1.0] < 0.05 * late[0.0]

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import worker
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
 
@@ -27,7 +28,7 @@ def watched(sim: Blocks, until: float, act: Callable[[Blocks], None] = lambda si
         for _ in range(200):
             act(sim)
             sim.step()
-        found = sim.energies()
+        found = diagnostics.energies(sim)
         assert found["relative"] < 0.01, found
         given = found["work_gravity"] + found["work_outside"] + found["commands"]
         size = max(abs(given), found["kinetic"], found["joints_lost"])
@@ -46,12 +47,12 @@ def test_a_plate_pulled_apart():
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
     sim.table("grip", [(0.0, 0.0), (5e-5, 0.05)])
     sim.velocity_condition(np.flatnonzero(y > 0.08 - 1e-9), vy="grip")
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     found = watched(sim, 8e-4)
-    events = sim.events()
+    events = diagnostics.events(sim)
     assert len(events["joint"]) >= 4 and (events["mode"] < 1.3).mean() > 0.7
     # Broken joints have lost G_f1 per length, damaged ones the part of it that lies under f up to their damage.
-    damage, length = sim.values("damage"), sim.values("length")
+    damage, length = diagnostics.values(sim, "damage"), diagnostics.values(sim, "length")
     part = np.array([quad(softening, 0.0, d)[0] for d in damage]) / SOFTENING_AREA
     assert 0.97 * 5.0 * events["length"].sum() < found["joints_lost"] < 1.05 * 5.0 * (part * length).sum()
 
@@ -70,10 +71,10 @@ def test_a_block_that_falls_apart(shape, friction, penalty):
         sim.face_model(None, "contact_mohr_coulomb", {"friction": friction, "penalty_normal": penalty * E})
     sim.joint_property(None, {"friction": friction})
     sim.gravity(0.0, 0.0)
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     start = 0.5 * ROCK["density"] * 0.96 * (0.5**2 + 2.0**2)
     found = watched(sim, 1.6e-3)
-    assert sim.joint_counts()[2] > 30
+    assert diagnostics.joint_counts(sim)[2] > 30
     total = found["kinetic"] + found["strain"] + found["joints"]
     assert total < start
     assert total + found["viscous_lost"] + found["joints_lost"] + found["contact"] == pytest.approx(start, rel=1e-3)
@@ -88,11 +89,11 @@ def test_a_specimen_crushed():
     for speed, name, nodes in ((1.0, "up", y < 1e-9), (-1.0, "down", y > 0.06 - 1e-9)):
         sim.table(name, [(0.0, 0.0), (2e-5, speed)])
         sim.velocity_condition(np.flatnonzero(nodes), vy=name)
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     found = watched(sim, 4e-4)
-    _, yielded, broken = sim.joint_counts()
+    _, yielded, broken = diagnostics.joint_counts(sim)
     assert broken > 15 and yielded > 15
-    assert (sim.events()["mode"] > 1.5).any()
+    assert (diagnostics.events(sim)["mode"] > 1.5).any()
     assert found["work_outside"] > 20.0 and found["joints_lost"] > 0.0
 
 
@@ -105,9 +106,9 @@ def test_a_beam_bent():
     sim.velocity_condition(np.flatnonzero((y < 1e-9) & ((np.abs(x - 0.02) < 1e-9) | (np.abs(x - 0.22) < 1e-9))), vy=0.0)
     sim.table("load", [(0.0, 0.0), (1e-4, -0.1)])
     sim.velocity_condition(np.flatnonzero((y > 0.06 - 1e-9) & (np.abs(x - 0.12) < 1e-9)), vx=0.0, vy="load")
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     watched(sim, 6e-4)
-    events = sim.events()
+    events = diagnostics.events(sim)
     assert len(events["joint"]) >= 4 and (events["mode"] < 1.5).mean() > 0.6
     assert np.abs(events["x"] - 0.12).min() < 0.03
 
@@ -121,7 +122,7 @@ def test_a_hole_blasted():
         worker.open_up(sim)
         sim.step()
     found = watched(sim, 2e-3, worker.open_up)
-    assert sim.joint_counts()[2] > 20 and found["commands"] != 0.0
+    assert diagnostics.joint_counts(sim)[2] > 20 and found["commands"] != 0.0
     assert found["work_outside"] > 1000.0
 
 
@@ -134,8 +135,16 @@ def test_the_account_does_not_change_the_run():
         while sim.clock.step < 1300:
             worker.open_up(sim)
             if not keep and sim.clock.step == 750:
-                sim.account_energy(False)
+                diagnostics.account_energy(sim, False)
             sim.step()
-        ends.append(np.concatenate([sim.values("position_x"), sim.values("velocity_y"), sim.values("damage")]))
+        ends.append(
+            np.concatenate(
+                [
+                    diagnostics.values(sim, "position_x"),
+                    diagnostics.values(sim, "velocity_y"),
+                    diagnostics.values(sim, "damage"),
+                ]
+            )
+        )
     assert np.array_equal(ends[0], ends[1], equal_nan=True)
     assert math.isfinite(float(np.nansum(ends[0])))

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import rectangle
 
 DENSITY, LENGTH, DT = 2300.0, 0.4, 1e-6
@@ -38,7 +39,7 @@ def pulled(kind: str, speed: float, angle: float, turned: float = 0.0) -> Blocks
     normal of the joint."""
     sim = Blocks()
     sim.take_mesh(pair(kind, turned))
-    sim.element_model(None, "mech_iso_elastic", {"density": DENSITY, "young": 50e9, "poisson_ratio": 0.2})
+    changes.element_model(sim, None, "mech_iso_elastic", {"density": DENSITY, "young": 50e9, "poisson_ratio": 0.2})
     law = {"tensile_strength": T, "cohesion": C, "friction": 20.0, "gf1": GF1, "gf2": GF2, "penalty_normal": PENALTY}
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", law)
     sim.time_step(value=DT)
@@ -78,8 +79,8 @@ def test_one_joint(kind, angle, turned):
     step, mode = expected(speed, angle)
     sim = pulled(kind, speed, angle, turned)
     run(sim, speed, angle, turned, step + 2)
-    (found,) = zip(*(values.tolist() for values in sim.events().values()))
-    seen = dict(zip(sim.events(), found))
+    (found,) = zip(*(values.tolist() for values in diagnostics.events(sim).values()))
+    seen = dict(zip(diagnostics.events(sim), found))
     assert abs(seen["step"] - step) <= 1  # rounding of 0.3863073 and of the positions
     assert seen["time"] == pytest.approx(seen["step"] * DT, rel=1e-12)
     assert seen["mode"] == pytest.approx(mode, abs=0.01)
@@ -92,20 +93,20 @@ def test_one_joint(kind, angle, turned):
     assert seen["peak_kinetic"] == pytest.approx(seen["kinetic"], rel=0.01)
     for name in ("mode", "break_time", "break_energy"):
         known = {"mode": seen["mode"], "break_time": seen["time"], "break_energy": seen["kinetic"]}[name]
-        assert sim.values(name, [seen["joint"]])[0] == known
+        assert diagnostics.values(sim, name, [seen["joint"]])[0] == known
 
 
 def torn(collision: bool = True) -> Blocks:
     """A strip that is pulled apart at speed: many joints break."""
     sim = Blocks()
     sim.take_mesh(rectangle(8, 3, 0.8, 0.3))
-    sim.element_model(None, "mech_iso_elastic", {"density": DENSITY, "young": 20e9, "poisson_ratio": 0.2})
+    changes.element_model(sim, None, "mech_iso_elastic", {"density": DENSITY, "young": 20e9, "poisson_ratio": 0.2})
     law = {"tensile_strength": 1e6, "cohesion": 2e6, "friction": 20.0, "gf1": 1.0, "gf2": 3.0, "penalty_normal": 1e11}
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", law)
     sim.option(collision=collision)
     x = sim.the_mesh().points[:, 0]
-    sim.set_velocity(np.flatnonzero(x < 0.4), -0.5, 0.1)
-    sim.set_velocity(np.flatnonzero(x > 0.4), 0.5, -0.1)
+    changes.set_velocity(sim, np.flatnonzero(x < 0.4), -0.5, 0.1)
+    changes.set_velocity(sim, np.flatnonzero(x > 0.4), 0.5, -0.1)
     return sim
 
 
@@ -122,15 +123,15 @@ def test_events_do_not_depend_on_who_looks_when(tmp_path):
         quiet.step()
         looked.step()
         clock[quiet.clock.step] = quiet.clock.time
-        now = looked.crack_rows()
+        now = diagnostics.crack_rows(looked)
         assert now[: len(told)] == told  # what was told once stays as it was
         told = now
         if looked.waiting_events() and len(told) > 5 and not (tmp_path / "a.sav").exists():
-            looked.save(tmp_path / "a.sav")
+            saved_state.save(looked, tmp_path / "a.sav")
             looked = Blocks()
-            looked.restore(tmp_path / "a.sav")
+            saved_state.restore(looked, tmp_path / "a.sav")
     assert (tmp_path / "a.sav").exists() and len(told) > 10
-    assert quiet.crack_rows() == told
+    assert diagnostics.crack_rows(quiet) == told
     for row in told:
         assert row.time == pytest.approx(clock[row.step], rel=1e-12)
         assert 0 < row.peak_step <= row.step and row.peak_kinetic >= 0.0
@@ -140,14 +141,17 @@ def test_events_do_not_depend_on_who_looks_when(tmp_path):
 def test_what_broken_joints_say_is_not_forgotten():
     """reset_joint_state is for joints that hold; those say nothing of breaking."""
     sim = torn()
-    sim.advance(400)
-    rows = sim.crack_rows()
+    convergence.advance(sim, 400)
+    rows = diagnostics.crack_rows(sim)
     joints = np.unique([row.joint for row in rows])
     names = "break_time", "break_energy", "mode"
-    before = [sim.values(name, joints) for name in names]
-    sim.reset_joint_state()
-    assert all((sim.values(name, joints) == known).all() for name, known in zip(names, before))
-    assert sim.crack_rows() == rows
+    before = [diagnostics.values(sim, name, joints) for name in names]
+    changes.reset_joint_state(sim)
+    assert all((diagnostics.values(sim, name, joints) == known).all() for name, known in zip(names, before))
+    assert diagnostics.crack_rows(sim) == rows
     whole = np.setdiff1d(sim.numbers_of_joints(None), joints)
-    assert np.isnan(sim.values("break_time", whole)).all() and np.isnan(sim.values("break_energy", whole)).all()
-    assert (sim.values("mode", whole) == 0.0).all()
+    assert (
+        np.isnan(diagnostics.values(sim, "break_time", whole)).all()
+        and np.isnan(diagnostics.values(sim, "break_energy", whole)).all()
+    )
+    assert (diagnostics.values(sim, "mode", whole) == 0.0).all()

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
 from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, MECH_ISO_ELASTIC
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle
 
 
@@ -31,7 +32,7 @@ from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle
 def test_wrong_element_properties_are_refused(values, said):
     sim = model(rectangle(1, 1, 1.0, 1.0))
     with pytest.raises(CommandError, match=said):
-        sim.element_model(None, "mech_iso_elastic", values)
+        changes.element_model(sim, None, "mech_iso_elastic", values)
     assert sim.element_rows.values(int(sim.element_row[0]))["young"] == ROCK["young"]
 
 
@@ -68,11 +69,11 @@ def test_numbers_that_are_not_there_are_refused():
         (lambda: sim.velocity_condition([-1], vx=0.0), "no node -1"),
         (lambda: sim.stress_condition([3], xx=1.0), "no face 3"),
         (lambda: sim.joint_model([0.5], "classic_intrinsic_cohesive_interface", JOINT), "must be integers"),
-        (lambda: sim.crack([10**6]), "no joint"),
-        (lambda: sim.values("stress_xx", [99]), "no element 99"),
-        (lambda: sim.values("colour"), "no quantity colour"),
+        (lambda: changes.crack(sim, [10**6]), "no joint"),
+        (lambda: diagnostics.values(sim, "stress_xx", [99]), "no element 99"),
+        (lambda: diagnostics.values(sim, "colour"), "no quantity colour"),
         (lambda: sim.face_property(None, {"friction": 1.0}), "has a model whose properties could be changed"),
-        (lambda: sim.element_model(None, "granite", {}), "no model granite for an element"),
+        (lambda: changes.element_model(sim, None, "granite", {}), "no model granite for an element"),
     ):
         with pytest.raises(CommandError, match=said):
             call()
@@ -93,19 +94,19 @@ def test_wrong_conditions_and_options_are_refused():
         (lambda: sim.time_step(value=-1.0), "must not be negative"),
         (lambda: sim.time_step(safety=2.0), "safety"),
         (lambda: sim.gravity(0.0, float("inf")), "must be finite"),
-        (lambda: sim.null(None), "all elements"),
-        (lambda: sim.null([0], relax=-1.0), "relax"),
-        (lambda: sim.solve(ratio=-1.0), "ratio must be positive"),
-        (lambda: sim.advance(-1), "negative"),
-        (lambda: sim.energies(), "no energy budget"),
+        (lambda: changes.null(sim, None), "all elements"),
+        (lambda: changes.null(sim, [0], relax=-1.0), "relax"),
+        (lambda: convergence.solve(sim, ratio=-1.0), "ratio must be positive"),
+        (lambda: convergence.advance(sim, -1), "negative"),
+        (lambda: diagnostics.energies(sim), "no energy budget"),
     ):
         with pytest.raises(CommandError, match=said):
             call()
     sim.option(dynamic=False)
     with pytest.raises(CommandError, match="time does not pass"):
-        sim.solve(time=1.0)
+        convergence.solve(sim, time=1.0)
     with pytest.raises(CommandError, match="dynamic mode"):
-        sim.account_energy()
+        diagnostics.account_energy(sim)
 
 
 def test_a_table_in_use_stays():
@@ -122,11 +123,15 @@ def test_a_table_in_use_stays():
 
 def test_nothing_runs_without_mesh_or_models():
     sim = Blocks()
-    for call in (sim.step, lambda: sim.element_model(None, "mech_iso_elastic", ROCK), lambda: sim.values("stress_xx")):
+    for call in (
+        sim.step,
+        lambda: changes.element_model(sim, None, "mech_iso_elastic", ROCK),
+        lambda: diagnostics.values(sim, "stress_xx"),
+    ):
         with pytest.raises(CommandError, match="no mesh"):
             call()
     sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
-    sim.element_model([0, 1], "mech_iso_elastic", ROCK)
+    changes.element_model(sim, [0, 1], "mech_iso_elastic", ROCK)
     with pytest.raises(CommandError, match="element 2 has no model"):
         sim.step()
 
@@ -146,7 +151,7 @@ def test_a_run_that_blows_up_names_its_elements():
     sim.close_model()
     sim.v[:] = rng.normal(size=sim.v.shape)
     with pytest.raises(PhysicsError, match=r"(?s)time step 0.001 s is probably too large.*element \d+ at"):
-        sim.advance(1000)
+        convergence.advance(sim, 1000)
 
 
 class Heard:
@@ -176,15 +181,15 @@ def test_joints_too_brittle_for_their_mesh_are_told():
 
 def test_a_damaged_or_foreign_file_is_refused(tmp_path):
     sim = model(rectangle(2, 2, 1.0, 1.0))
-    sim.save(tmp_path / "a.sav")
+    saved_state.save(sim, tmp_path / "a.sav")
     data = bytearray((tmp_path / "a.sav").read_bytes())
     for name, content in (("cut.sav", bytes(data[: len(data) // 2])), ("text.sav", b"hello")):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(CommandError):
-            sim.restore(tmp_path / name)
+            saved_state.restore(sim, tmp_path / name)
         assert len(sim.mesh.cells) == 8
     with pytest.raises(CommandError, match="no such file"):
-        sim.restore(tmp_path / "missing.sav")
+        saved_state.restore(sim, tmp_path / "missing.sav")
 
 
 def test_a_mesh_is_stored_by_rows_whatever_was_given():

@@ -6,7 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
 
 COMPONENTS = ("xx", "yy", "xy", "zz")
@@ -22,7 +23,7 @@ def held(kind: str) -> Blocks:
 
 def stresses(sim: Blocks) -> np.ndarray:
     """(4, ne)"""
-    return np.array([sim.values(f"stress_{c}") for c in COMPONENTS])
+    return np.array([diagnostics.values(sim, f"stress_{c}") for c in COMPONENTS])
 
 
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
@@ -33,7 +34,7 @@ def test_it_goes_down_with_the_modulus(kind):
     before = stresses(sim)
     sim.element_property(None, {"young": 0.3 * ROCK["young"]})
     assert stresses(sim) == pytest.approx(0.3 * before, rel=1e-12)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 0.02 * ROCK["young"], "density": 2000.0})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 0.02 * ROCK["young"], "density": 2000.0})
     assert stresses(sim) == pytest.approx(0.02 * before, rel=1e-12)
     sim.element_property(None, {"young": ROCK["young"], "density": 2650.0, "friction": 12.0})
     assert np.array_equal(stresses(sim), before)
@@ -48,7 +49,7 @@ def test_mean_follows_the_bulk_modulus_and_deviator_the_shear_modulus():
     k, g = 1.5 / 0.6, 2.5 / 2.8
     for c in COMPONENTS:
         normal = 0.0 if c == "xy" else mean
-        assert sim.values(f"stress_{c}") == pytest.approx(k * normal + g * (STRESS[c] - normal), abs=1e-3)
+        assert diagnostics.values(sim, f"stress_{c}") == pytest.approx(k * normal + g * (STRESS[c] - normal), abs=1e-3)
 
 
 def test_of_elements_without_a_model_it_belongs_to_the_first_one():
@@ -56,10 +57,10 @@ def test_of_elements_without_a_model_it_belongs_to_the_first_one():
     sim.take_mesh(rectangle(2, 2, 0.2, 0.2))
     sim.velocity_condition(None, vx=0.0, vy=0.0)
     sim.initial_stress(None, yy=-1e6)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 3e9})
-    assert sim.values("stress_yy") == pytest.approx(-1e6, rel=1e-12)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 3e9})
+    assert diagnostics.values(sim, "stress_yy") == pytest.approx(-1e6, rel=1e-12)
     sim.element_property(None, {"young": 1e9})
-    assert sim.values("stress_yy") == pytest.approx(-1e6 / 3.0, rel=1e-12)
+    assert diagnostics.values(sim, "stress_yy") == pytest.approx(-1e6 / 3.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("way", ["relaxation", "at once", "motion", "joints"])
@@ -81,18 +82,20 @@ def test_a_softened_layer_between_rigid_ends(way, kind):
     if way == "joints":
         jointed(sim, penalty_normal=1e3 * ROCK["young"], tensile_strength=1e12, cohesion=1e12, gf1=1e9, gf2=1e9)
     if way in ("motion", "joints"):
-        sim.solve(time=2e-3)
+        convergence.solve(sim, time=2e-3)
     sim.element_property(a, {"young": f * ROCK["young"]})
     if way == "relaxation":
-        assert sim.solve(ratio=1e-9, cycles=20000).reason == "ratio"
+        assert convergence.solve(sim, ratio=1e-9, cycles=20000).reason == "ratio"
     elif way == "at once":
-        sim.solve_elastic()
+        equilibrium.solve_elastic(sim)
     else:
-        sim.account_energy()
-        sim.solve(time=8e-3)
-        assert sim.energies()["relative"] < 1e-3
+        diagnostics.account_energy(sim)
+        convergence.solve(sim, time=8e-3)
+        assert diagnostics.energies(sim)["relative"] < 1e-3
     expected = s0 * f * (1.0 + r) / (f + r)
-    assert sim.values("stress_xx") == pytest.approx(expected, rel=1e-6 if way in ("relaxation", "at once") else 5e-3)
+    assert diagnostics.values(sim, "stress_xx") == pytest.approx(
+        expected, rel=1e-6 if way in ("relaxation", "at once") else 5e-3
+    )
 
 
 def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
@@ -102,9 +105,9 @@ def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
     before = stresses(sim)
     sim.element_property(np.arange(5), {"young": 0.5 * ROCK["young"]})
     lowered = stresses(sim)
-    sim.save(tmp_path / "now.sav")
+    saved_state.save(sim, tmp_path / "now.sav")
     again = Blocks()
-    again.restore(tmp_path / "now.sav")
+    saved_state.restore(again, tmp_path / "now.sav")
     assert np.array_equal(stresses(again), lowered)
     again.element_property(None, {"young": ROCK["young"]})
     assert np.array_equal(stresses(again), before)
@@ -112,18 +115,16 @@ def test_it_is_saved_with_the_moduli_it_belongs_to(tmp_path):
 
 def test_a_file_without_the_column_is_read(tmp_path, monkeypatch):
     """The table of initial stresses as versions before wrote it: the stress stays, and follows what comes."""
-    from hpcdem.physics.fdem import saved_state
-
     usual = saved_state._whole
     monkeypatch.setattr(saved_state, "_whole", lambda columns, root: usual(
         {name: values for name, values in columns.items() if name != "row"}, root))  # fmt: skip
     sim = held("cross")
     sim.initial_stress(None, **STRESS)
-    sim.save(tmp_path / "old.sav")
+    saved_state.save(sim, tmp_path / "old.sav")
     with h5py.File(tmp_path / "old.sav") as file:
         assert sorted(file["stress0"]) == ["s0", "s1", "s2", "s3"]
     again = Blocks()
-    again.restore(tmp_path / "old.sav")
+    saved_state.restore(again, tmp_path / "old.sav")
     assert np.array_equal(stresses(again), stresses(sim))
     again.element_property(None, {"young": 0.25 * ROCK["young"]})
     assert stresses(again) == pytest.approx(0.25 * stresses(sim), rel=1e-12)

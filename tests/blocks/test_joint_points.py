@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
@@ -33,13 +34,13 @@ def two_squares(opening: float, slip: float, turn: float) -> Blocks:
     sim = jointed(model(rectangle(1, 2, H, 2 * H, x0=-0.5 * H, kind="quad")), penalty_overlay=OVERLAY)
     sim.close_model()
     sim.open_model()
-    at = sim.homes().reshape(-1, 4, 2)
+    at = diagnostics.homes(sim).reshape(-1, 4, 2)
     upper = at[:, :, 1].mean(axis=1) > H
     centre = np.array([0.0, H])
     around = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     at[upper] = (at[upper] - centre) @ around.T + centre + [slip, opening]
     sim.x[:, :8] = at.reshape(-1, 8)
-    sim._repeat(sim.x)
+    changes.repeat(sim, sim.x)
     return sim
 
 
@@ -50,14 +51,14 @@ def test_a_bent_joint(mean, turn):
     sim = two_squares(mean * O_P, 0.0, turn * O_P / H)
     r = mean + turn * AT[::-1]  # the first corner of the face is on the right, where x is largest
     expected = np.where(r > 0.0, T * (2.0 * r - r * r), OVERLAY * r * O_P / H)
-    found = np.array([sim.values(name)[0] for name in POINTS])
+    found = np.array([diagnostics.values(sim, name)[0] for name in POINTS])
     assert found == pytest.approx(expected, rel=2e-4, abs=T * 1e-5)
-    assert sim.values("normal_stress")[0] == pytest.approx(float(WEIGHTS @ found), rel=1e-9, abs=1e-3)
-    assert sim.values("normal_stress_largest")[0] == found.max()
+    assert diagnostics.values(sim, "normal_stress")[0] == pytest.approx(float(WEIGHTS @ found), rel=1e-9, abs=1e-3)
+    assert diagnostics.values(sim, "normal_stress_largest")[0] == found.max()
     if mean == 0.5:
         # r = 0.5 (1 +- sqrt(0.6)/2) = 0.6936, 0.3064: 0.9061 T, 0.7500 T, 0.5189 T; mean 0.7292 T
         assert found / T == pytest.approx([0.9061, 0.75, 0.5189], abs=3e-4)
-        assert sim.values("normal_stress")[0] / T == pytest.approx(0.7292, abs=3e-4)
+        assert diagnostics.values(sim, "normal_stress")[0] / T == pytest.approx(0.7292, abs=3e-4)
 
 
 def test_a_bent_joint_past_its_peak():
@@ -69,9 +70,9 @@ def test_a_bent_joint_past_its_peak():
     expected = [T * laws.softening(0.5 * O_P / o_t), 0.96 * T, 0.19 * T]
     before = sim.local.slot_history.copy() if sim.closed else None
     for _ in range(2):
-        assert [sim.values(name)[0] for name in POINTS] == pytest.approx(expected, rel=2e-4)
-    assert sim.values("normal_stress_largest")[0] == sim.values("normal_stress_first")[0]
-    assert sim.values("damage")[0] == 0.0 and sim.values("state")[0] == 1
+        assert [diagnostics.values(sim, name)[0] for name in POINTS] == pytest.approx(expected, rel=2e-4)
+    assert diagnostics.values(sim, "normal_stress_largest")[0] == diagnostics.values(sim, "normal_stress_first")[0]
+    assert diagnostics.values(sim, "damage")[0] == 0.0 and diagnostics.values(sim, "state")[0] == 1
     assert before is None or np.array_equal(before, sim.local.slot_history)
 
 
@@ -84,20 +85,20 @@ def test_a_sheared_joint(part):
     sim = two_squares(0.0, part * s_p, 0.0)
     tau = c * (2.0 * abs(part) - part * part)
     for name in ("shear_stress", "shear_stress_first", "shear_stress_middle", "shear_stress_last"):
-        assert sim.values(name)[0] == pytest.approx(-math.copysign(tau, part), rel=2e-4)
-    assert sim.values("shear_stress_largest")[0] == pytest.approx(tau, rel=2e-4)
-    assert abs(sim.values("normal_stress_largest")[0]) < 1e-3 * T
+        assert diagnostics.values(sim, name)[0] == pytest.approx(-math.copysign(tau, part), rel=2e-4)
+    assert diagnostics.values(sim, "shear_stress_largest")[0] == pytest.approx(tau, rel=2e-4)
+    assert abs(diagnostics.values(sim, "normal_stress_largest")[0]) < 1e-3 * T
 
 
 def test_where_there_is_no_joint():
     """An edge without a joint has no stress; a quantity of joints is none of elements or nodes."""
     sim = model(rectangle(2, 1, 0.2, 0.1, kind="quad"))
     for name in (*POINTS, "normal_stress_largest", "shear_stress_largest"):
-        assert np.isnan(sim.values(name)).all()
+        assert np.isnan(diagnostics.values(sim, name)).all()
     with pytest.raises(CommandError, match="there is no quantity normal_stress_greatest"):
-        sim.values("normal_stress_greatest")
+        diagnostics.values(sim, "normal_stress_greatest")
     with pytest.raises(CommandError, match="normal_stress_largest belongs to a joint, not to a element"):
-        sim.owned_values("element", ["normal_stress_largest"])
+        diagnostics.owned_values(sim, "element", ["normal_stress_largest"])
 
 
 # ---- a uniform stress ----------------------------------------------------------------------------------------------
@@ -113,10 +114,10 @@ def pulled(mesh: Mesh, penalty: float) -> tuple[np.ndarray, np.ndarray]:
     for side in (y.min(), y.max()):
         sim.stress_condition(outside[np.abs(y - side) < 1e-9], yy=1e6)
     sim.option(dynamic=False, collision=False)
-    assert sim.solve(ratio=1e-6, cycles=20_000).reason == "ratio"
+    assert convergence.solve(sim, ratio=1e-6, cycles=20_000).reason == "ratio"
     inner = edges.points[edges.inner]
     way = mesh.points[inner[:, 1]] - mesh.points[inner[:, 0]]
-    found = np.column_stack([sim.values(name) for name in POINTS]) / 1e6
+    found = np.column_stack([diagnostics.values(sim, name) for name in POINTS]) / 1e6
     return found - (way[:, 0] ** 2 / (way**2).sum(axis=1))[:, None], mesh.points[inner, 1].mean(axis=1)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import overlaps
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, overlaps, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import joined, jointed, model, near, rectangle
 
 
@@ -30,10 +30,10 @@ def deepest(sim: Blocks) -> np.ndarray:
 def test_an_overlap_is_refused_and_the_model_stays(kind, dynamic):
     sim = two(1.6e-3, kind)
     sim.option(dynamic=dynamic)
-    before = sim.values("position_y")
+    before = diagnostics.values(sim, "position_y")
     with pytest.raises(CommandError, match=r"pairs of elements overlap .*elements \d+ and \d+ by 0\.0016 m at \("):
         sim.step()
-    assert sim.clock.step == 0 and np.array_equal(sim.values("position_y"), before)
+    assert sim.clock.step == 0 and np.array_equal(diagnostics.values(sim, "position_y"), before)
     found = deepest(sim)
     assert found[0, 0] == pytest.approx(1.6e-3, rel=1e-6)
     assert (np.abs(found[:, 2]) <= 1.7e-3).all() and found[:, 1].min() > 0.2 and found[:, 1].max() < 0.62
@@ -45,8 +45,8 @@ def test_kept_it_starts_as_it_is():
     """On request: the energy that was said to come of it comes."""
     sim = two(1.6e-3)
     sim.option(overlap="keep")
-    sim.advance(100)
-    assert sim.total("kinetic_energy") > 1e3
+    convergence.advance(sim, 100)
+    assert diagnostics.total(sim, "kinetic_energy") > 1e3
 
 
 def test_relaxed_a_static_stage_moves_them_apart():
@@ -56,11 +56,11 @@ def test_relaxed_a_static_stage_moves_them_apart():
     with pytest.raises(CommandError, match="model option dynamic off"):
         sim.step()
     sim.option(dynamic=False)
-    sim.solve(ratio=1e-6, cycles=5000)
+    convergence.solve(sim, ratio=1e-6, cycles=5000)
     assert not len(deepest(sim))
     sim.option(dynamic=True)
-    sim.advance(200)
-    assert sim.total("kinetic_energy") < 1e-2
+    convergence.advance(sim, 200)
+    assert diagnostics.total(sim, "kinetic_energy") < 1e-2
     with pytest.raises(CommandError, match="overlap is one of refuse, relax, keep"):
         sim.option(overlap="maybe")
 
@@ -73,8 +73,8 @@ def test_bodies_that_touch_or_are_rounded_go(depth):
 
 def test_faces_of_joints_and_cracks_that_touch_go():
     sim = jointed(model(rectangle(4, 4, 0.4, 0.4)))
-    sim.crack(near(sim.mesh, 0, 0.2, inner=True)[::2])
-    sim.null([0])
+    changes.crack(sim, near(sim.mesh, 0, 0.2, inner=True)[::2])
+    changes.null(sim, [0])
     sim.step()
 
 
@@ -94,16 +94,16 @@ def test_a_run_that_is_under_way_is_not_asked(tmp_path):
     sim.gravity(0.0, -9.81e4)
     sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] < -0.19), vx=0.0, vy=0.0)
     while not len(deepest(sim)):
-        sim.advance(50)
-    sim.save(tmp_path / "a.sav")
+        convergence.advance(sim, 50)
+    saved_state.save(sim, tmp_path / "a.sav")
     again = Blocks()
-    again.restore(tmp_path / "a.sav")
-    again.null([0])
+    saved_state.restore(again, tmp_path / "a.sav")
+    changes.null(again, [0])
     again.step()
     other = two(1.6e-3)
     other.option(collision=False)
     other.step()
-    assert math.isfinite(float(other.values("position_x").sum()))
+    assert math.isfinite(float(diagnostics.values(other, "position_x").sum()))
 
 
 SCRIPT = """\

@@ -10,10 +10,11 @@ import pytest
 from hpcdem.commands.fdem import assignments, histories, meshes, settings
 from hpcdem.commands.fdem import steps as steps_
 from hpcdem.commands.fdem.project import Project
-from hpcdem.physics.fdem.diagnostics import Looking
+from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem.diagnostics import QUANTITIES
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, OnLayer
 from hpcdem.physics.fdem.local import Local
-from hpcdem.physics.fdem.model import QUANTITIES, Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import jointed, model, rectangle
 
 
@@ -23,18 +24,18 @@ def broken() -> Blocks:
     sim = jointed(model(rectangle(6, 3, 0.6, 0.3, kind="mixed")))
     x = sim.the_mesh().points[:, 0]
     sim.velocity_condition(np.flatnonzero(x == 0.0), vx=0.0, vy=0.0)
-    sim.set_velocity(np.flatnonzero(x > 0.25), 6.0, 0.5)
-    sim.advance(120)
-    sim.null([2])
-    sim.reset_displacement(np.flatnonzero(x < 0.3))
-    sim.advance(30)
-    assert sim.joint_counts()[2] > 3
+    changes.set_velocity(sim, np.flatnonzero(x > 0.25), 6.0, 0.5)
+    convergence.advance(sim, 120)
+    changes.null(sim, [2])
+    changes.reset_displacement(sim, np.flatnonzero(x < 0.3))
+    convergence.advance(sim, 30)
+    assert diagnostics.joint_counts(sim)[2] > 3
     return sim
 
 
 def whole(sim: Blocks, name: str) -> dict[int, float]:
     """A quantity of all objects that are there, by the columns that frames are made of."""
-    columns = sim.owned_values(QUANTITIES[name].on, [name])
+    columns = diagnostics.owned_values(sim, QUANTITIES[name].on, [name])
     return dict(zip(columns["number"].tolist(), columns[name].tolist()))
 
 
@@ -42,7 +43,7 @@ def whole(sim: Blocks, name: str) -> dict[int, float]:
 def test_a_few_are_what_they_are_among_all(broken, name):
     known = whole(broken, name)
     numbers = np.array([*known])[np.random.default_rng(3).permutation(len(known))[:7]]
-    probe = broken.probe(name, numbers)
+    probe = diagnostics.probe(broken, name, numbers)
     seen = probe.values()
     assert seen.tobytes() == np.array([known[n] for n in probe.numbers.tolist()]).tobytes()
     there = seen[~np.isnan(seen)]
@@ -51,12 +52,12 @@ def test_a_few_are_what_they_are_among_all(broken, name):
         assert probe.reduced("sum") == pytest.approx(there.sum(), rel=1e-12, abs=1e-300)
         assert probe.reduced("mean") == pytest.approx(there.mean(), rel=1e-12, abs=1e-300)
     one = probe.numbers[:1]
-    assert np.float64(broken.probe(name, one).reduced("")).tobytes() == seen[:1].tobytes()
+    assert np.float64(diagnostics.probe(broken, name, one).reduced("")).tobytes() == seen[:1].tobytes()
 
 
 def test_what_is_not_there_is_no_number(broken):
-    assert np.isnan(broken.probe("stress_xx", [2]).reduced(""))
-    assert np.isnan(broken.probe("stress_xx", [2]).reduced("mean"))
+    assert np.isnan(diagnostics.probe(broken, "stress_xx", [2]).reduced(""))
+    assert np.isnan(diagnostics.probe(broken, "stress_xx", [2]).reduced("mean"))
 
 
 def supported(folder: Path, dynamic: bool = True) -> Project:
@@ -99,7 +100,7 @@ def test_forces_of_supports_come_with_the_next_step(dynamic, tmp_path, monkeypat
 
     monkeypatch.setattr(Local, "evaluation", counted)
     steps_.step(one, steps)
-    assert one.blocks.joint_counts()[2 if dynamic else 1] >= (3 if dynamic else 0)
+    assert diagnostics.joint_counts(one.blocks)[2 if dynamic else 1] >= (3 if dynamic else 0)
     for name, history in one.histories.items():
         assert history.rows == other.histories[name].rows, name
         assert [row[0] for row in history.rows] == list(range(history.every, steps + 1, history.every))
@@ -119,12 +120,12 @@ def test_a_history_of_one_node_looks_at_one_row(tmp_path, monkeypatch):
     histories.create(project, "element", ELEMENT, "stress_xx", ident=11)
     histories.create(project, "joint", JOINT, "opening", nearest=(0.2, 0.1))
     asked = []
-    columns_of = Looking.columns_of
+    columns_of = diagnostics.columns_of
 
-    def counted(self, on, names, at=None):
+    def counted(sim, on, names, at=None):
         asked.append(None if at is None else len(at))
-        return columns_of(self, on, names, at)
+        return columns_of(sim, on, names, at)
 
-    monkeypatch.setattr(Looking, "columns_of", counted)
+    monkeypatch.setattr(diagnostics, "columns_of", counted)
     steps_.step(project, 10)
     assert asked == [1] * 30

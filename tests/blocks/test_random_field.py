@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics import rng
 from hpcdem.numerics.random_field import GAUSSIAN, LOGNORMAL, NORMAL, WEIBULL, RandomField
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Drawn, Over
 from tests.blocks.support import JOINT, ROCK, model, rectangle
 
@@ -172,7 +174,8 @@ def test_every_property_of_everything_takes_fields_tables_and_numbers(on, name, 
             getattr(sim, f"{on}_property")(None, {one: rule})
         else:
             base = {k: v for k, v in given.items() if k != one}
-            getattr(sim, f"{on}_model")(None, name, {**base, one: rule})
+            assign = partial(changes.element_model, sim) if on == "element" else getattr(sim, f"{on}_model")
+            assign(None, name, {**base, one: rule})
         assert np.array_equal(rows.column(one)[column[numbers]], values)
         if on == "joint":
             assert np.array_equal(column[sim.partner[numbers]], column[numbers])
@@ -192,11 +195,11 @@ def test_stiffness_over_a_coordinate():
     sim.velocity_condition(None, vx=0.0)
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
     sim.velocity_condition(np.flatnonzero(y > 4 - 1e-9), vy=-1e-4)
-    sim.solve_elastic()
+    equilibrium.solve_elastic(sim)
     centres = 0.25 + 0.5 * np.arange(8)
     young = np.interp(centres, [0, 4], [10e9, 40e9])
-    assert sim.values("stress_yy") == pytest.approx(-1e-4 / (0.5 / young).sum(), rel=1e-4)
-    assert np.unique(sim.values("young")).tolist() == young.tolist()
+    assert diagnostics.values(sim, "stress_yy") == pytest.approx(-1e-4 / (0.5 / young).sum(), rel=1e-4)
+    assert np.unique(diagnostics.values(sim, "young")).tolist() == young.tolist()
 
 
 def test_the_weakest_joint_breaks_first():
@@ -207,15 +210,15 @@ def test_the_weakest_joint_breaks_first():
     sim.joint_model(upright, COHESIVE, {**JOINT, "gf1": 5.0, "gf2": 1e4, "cohesion": 1e9})
     sim.random_field("strength", RandomField.of(WEIBULL, 2e6, 6.0, 21))
     sim.joint_property(upright, {"tensile_strength": Drawn("strength")})
-    strength = sim.values("tensile_strength", upright)
+    strength = diagnostics.values(sim, "tensile_strength", upright)
     assert len(np.unique(strength)) == len(upright) == 11
     sim.option(dynamic=False)
     x = sim.mesh.points[:, 0]
     sim.velocity_condition(np.flatnonzero(x < 1e-9), vx=0.0)
     sim.velocity_condition(np.flatnonzero(x > 12 - 1e-9), vx=2e-7)
-    while not sim.joint_counts()[2]:
-        sim.advance(200)
-    assert sim.events()["joint"].tolist() == [int(upright[np.argmin(strength)])]
+    while not diagnostics.joint_counts(sim)[2]:
+        convergence.advance(sim, 200)
+    assert diagnostics.events(sim)["joint"].tolist() == [int(upright[np.argmin(strength)])]
 
 
 def _ends(sim: Blocks, joint: int) -> np.ndarray:
@@ -231,7 +234,7 @@ def _ends(sim: Blocks, joint: int) -> np.ndarray:
      (lambda s: s.element_property(None, {"young": np.ones(3)}), "young: 48 numbers are needed, one for each element"),
      (lambda s: s.element_property([7, 9], {"density": np.array([1.0, -2.0])}), "element 9: density must be > 0"),
      (lambda s: s.joint_property(None, {"tensile_strength": Over("low", 0)}), r"face-joint \d+: tensile_strength must"),
-     (lambda s: s.element_model(None, ELASTIC, {"density": Drawn("f")}), "element 0: an elastic model needs two"),
+     (lambda s: changes.element_model(s, None, ELASTIC, {"density": Drawn("f")}), "element 0: an elastic model needs"),
      (lambda s: s.remove_field("g"), "there is no field 'g'")],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_and_changes_nothing(call, message):
@@ -248,16 +251,19 @@ def test_fields_come_back_from_a_file(tmp_path):
     sim = rock()
     sim.random_field("g", RandomField.of(NORMAL, 20e9, 3e9, 4, 0.7, GAUSSIAN, least=5e9))
     sim.element_property(None, {"young": Drawn("g")})
-    sim.null([5, 6])
-    sim.save(tmp_path / "a.sav")
+    changes.null(sim, [5, 6])
+    saved_state.save(sim, tmp_path / "a.sav")
     again = Blocks()
-    again.restore(tmp_path / "a.sav")
+    saved_state.restore(again, tmp_path / "a.sav")
     for one in (sim, again):
-        one.element_model([5, 6], ELASTIC, {**ROCK, "young": Drawn("g")})
+        changes.element_model(one, [5, 6], ELASTIC, {**ROCK, "young": Drawn("g")})
         one.joint_property(None, {"cohesion": Drawn("f")})
-        one.advance(30)
+        convergence.advance(one, 30)
     assert again.fields == sim.fields and again.varied == sim.varied
     for name in ("young", "cohesion", "position_x", "stress_yy"):
-        assert np.array_equal(again.values(name), sim.values(name), equal_nan=True), name
+        assert np.array_equal(diagnostics.values(again, name), diagnostics.values(sim, name), equal_nan=True), name
     where = sim.mesh.centroids()[[5, 6]]
-    assert sim.values("young", [5, 6]).tolist() == sim.fields["g"].values("element", np.array([5, 6]), where).tolist()
+    assert (
+        diagnostics.values(sim, "young", [5, 6]).tolist()
+        == sim.fields["g"].values("element", np.array([5, 6]), where).tolist()
+    )

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem import reference
+from hpcdem.physics.fdem import changes, reference
 from hpcdem.physics.fdem.kernels import elements, joints, laws
 from hpcdem.physics.fdem.local import ALPHA, Evaluation
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, jointed, model, rectangle, shaken
 
 MU2 = ROCK["young"] / (1.0 + ROCK["poisson_ratio"])
@@ -51,9 +51,9 @@ def disturb(sim: Blocks, tied: bool, seed: int) -> None:
         apart = width * rng.normal(size=2) * rng.choice([0.0, 1.0, 30.0, 2000.0]) if tied else 0.0
         sim.x[r, :n] = ((at[nodes] + own + apart) @ turn.T).reshape(-1)
         sim.v[r, :n] = (speed[nodes] + (rng.normal(size=(len(nodes), 2)) if tied else 0.0)).reshape(-1)
-    sim._repeat(sim.x)
+    changes.repeat(sim, sim.x)
     if sim.wide:
-        sim._repeat(sim.v)
+        changes.repeat(sim, sim.v)
 
 
 def of_elements(sim: Blocks) -> np.ndarray:

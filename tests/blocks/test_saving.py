@@ -8,16 +8,17 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, Rows
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks import worker
 from tests.blocks.support import jointed, model, rectangle
 
 
 def state(sim: Blocks) -> dict[str, np.ndarray]:
     names = ("position_x", "position_y", "velocity_x", "stress_xx", "damage", "state", "reaction_x", "displacement_y")
-    out = {name: sim.values(name) for name in names}
-    out["contacts"] = np.column_stack([sim.contacts()[name] for name in ("x", "y")])
+    out = {name: diagnostics.values(sim, name) for name in names}
+    out["contacts"] = np.column_stack([diagnostics.contacts(sim)[name] for name in ("x", "y")])
     out["clock"] = np.array([sim.clock.step, sim.clock.time, sim.clock.dt])
     return out
 
@@ -38,9 +39,9 @@ def test_a_run_with_all_kinds_of_stages_goes_on(at, tmp_path):
         sim.step()
     if at in (300, 750):
         worker.open_up(sim)  # commands given, model open
-    sim.save(tmp_path / "a.sav", {"m_n": 3})
+    saved_state.save(sim, tmp_path / "a.sav", {"m_n": 3})
     again = Blocks(threads=1)
-    assert again.restore(tmp_path / "a.sav") == {"m_n": 3}
+    assert saved_state.restore(again, tmp_path / "a.sav") == {"m_n": 3}
     if at not in (300, 750):
         same(state(sim), state(again))
     for _ in range(60):
@@ -57,17 +58,17 @@ def test_looking_and_saving_change_nothing(tmp_path):
     for look in (False, True):
         sim = Blocks()
         worker.impact(sim)
-        sim.advance(900)
+        convergence.advance(sim, 900)
         for k in range(150):
-            sim.advance(1)
+            convergence.advance(sim, 1)
             if look:
-                sim.values("stress_max")
-                sim.unbalanced_ratio()
-                sim.energies()
-                sim.contacts()
-                sim.events()
+                diagnostics.values(sim, "stress_max")
+                diagnostics.unbalanced_ratio(sim)
+                diagnostics.energies(sim)
+                diagnostics.contacts(sim)
+                diagnostics.events(sim)
                 if k % 10 == 0:
-                    sim.save(tmp_path / "b.sav")
+                    saved_state.save(sim, tmp_path / "b.sav")
         ends.append(state(sim))
     assert np.nanmax(ends[0]["damage"]) == 1.0
     same(*ends)
@@ -76,9 +77,9 @@ def test_looking_and_saving_change_nothing(tmp_path):
 def test_variables_alone_can_be_saved(tmp_path):
     """A model without a mesh keeps what the script wants to keep."""
     sim = Blocks()
-    sim.save(tmp_path / "v.sav", {"m_a": [1.5, "x"], "nested": {"k": None}})
+    saved_state.save(sim, tmp_path / "v.sav", {"m_a": [1.5, "x"], "nested": {"k": None}})
     other = jointed(model(rectangle(2, 2, 1.0, 1.0)))
-    assert other.restore(tmp_path / "v.sav") == {"m_a": [1.5, "x"], "nested": {"k": None}}
+    assert saved_state.restore(other, tmp_path / "v.sav") == {"m_a": [1.5, "x"], "nested": {"k": None}}
     assert other.mesh is None
     with pytest.raises(CommandError, match="no mesh"):
         other.step()
@@ -86,14 +87,14 @@ def test_variables_alone_can_be_saved(tmp_path):
 
 def test_what_cannot_be_restored_leaves_the_model_alone(tmp_path):
     sim = jointed(model(rectangle(2, 2, 1.0, 1.0)))
-    sim.advance(5)
+    convergence.advance(sim, 5)
     before = state(sim)
     (tmp_path / "c.sav").write_bytes(b"not a checkpoint")
     for path in (tmp_path / "c.sav", tmp_path / "missing.sav", tmp_path):
         with pytest.raises(CommandError):
-            sim.restore(Path(path))
+            saved_state.restore(sim, Path(path))
         same(before, state(sim))
-    sim.advance(5)
+    convergence.advance(sim, 5)
 
 
 def test_tables_of_earlier_versions_lack_what_is_new():

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, jointed, model, rectangle, shaken
 
 RHO = ROCK["density"]
@@ -38,15 +39,15 @@ def test_at_rest_and_after_motion_stresses_agree(kind, with_joints):
     """To 0.5 % of the largest stress, as specified for elastic bodies."""
     sim = leaning(kind, with_joints)
     sim.option(dynamic=False)
-    assert sim.solve(ratio=1e-6, cycles=50000).reason == "ratio"
-    rest = {name: sim.values(name) for name in ("stress_xx", "stress_yy", "stress_xy")}
+    assert convergence.solve(sim, ratio=1e-6, cycles=50000).reason == "ratio"
+    rest = {name: diagnostics.values(sim, name) for name in ("stress_xx", "stress_yy", "stress_xy")}
     moved = leaning(kind, with_joints)
     while moved.clock.time < 0.05:
-        moved.advance(500)
-    assert moved.unbalanced_ratio() < 1e-4
+        convergence.advance(moved, 500)
+    assert diagnostics.unbalanced_ratio(moved) < 1e-4
     scale = max(np.abs(values).max() for values in rest.values())
     for name, values in rest.items():
-        assert moved.values(name) == pytest.approx(values, abs=0.005 * scale)
+        assert diagnostics.values(moved, name) == pytest.approx(values, abs=0.005 * scale)
 
 
 @pytest.mark.parametrize("kind", ["cross", "quad"])
@@ -71,11 +72,11 @@ def test_a_block_rests_on_a_slope(kind, with_joints):
     slope = math.radians(20.0)
     sim.gravity(9.81 * math.sin(slope), -9.81 * math.cos(slope))
     sim.option(dynamic=False)
-    assert sim.solve(ratio=1e-6, cycles=20000).reason == "ratio"
+    assert convergence.solve(sim, ratio=1e-6, cycles=20000).reason == "ratio"
     weight = RHO * 9.81 * (0.6 + 0.32)
-    assert sim.total("reaction_x", held) == pytest.approx(-weight * math.sin(slope), rel=1e-4)
-    assert sim.total("reaction_y", held) == pytest.approx(weight * math.cos(slope), rel=1e-4)
-    assert np.abs(sim.values("displacement_x")).max() < 1e-4
+    assert diagnostics.total(sim, "reaction_x", held) == pytest.approx(-weight * math.sin(slope), rel=1e-4)
+    assert diagnostics.total(sim, "reaction_y", held) == pytest.approx(weight * math.cos(slope), rel=1e-4)
+    assert np.abs(diagnostics.values(sim, "displacement_x")).max() < 1e-4
 
 
 def test_rollers_on_an_oblique_line_do_not_rub():
@@ -94,11 +95,11 @@ def test_rollers_on_an_oblique_line_do_not_rub():
     sim.move_constraint(np.flatnonzero((x < 1e-9) & (y < 1e-9)), 1)
     sim.gravity(0.0, -9.81)
     sim.option(dynamic=False, collision=False)
-    assert sim.solve(ratio=1e-9, cycles=20000).reason == "ratio"
+    assert convergence.solve(sim, ratio=1e-9, cycles=20000).reason == "ratio"
     weight = RHO * 9.81 * 0.48
     corner = np.flatnonzero((x < 1e-9) & (y < 1e-9))
-    carried = np.array([sim.total(f"reaction_{c}", np.union1d(low, corner)) for c in "xy"])
-    assert carried[1] + sim.total("reaction_y", np.flatnonzero((x < 1e-9) & (y > 1e-9))) == pytest.approx(
+    carried = np.array([diagnostics.total(sim, f"reaction_{c}", np.union1d(low, corner)) for c in "xy"])
+    assert carried[1] + diagnostics.total(sim, "reaction_y", np.flatnonzero((x < 1e-9) & (y > 1e-9))) == pytest.approx(
         weight, rel=1e-8
     )
     other = model(mesh)
@@ -108,36 +109,38 @@ def test_rollers_on_an_oblique_line_do_not_rub():
     other.move_constraint(corner, 1)
     other.gravity(0.0, -9.81)
     other.option(dynamic=False, collision=False)
-    other.solve_elastic()
+    equilibrium.solve_elastic(other)
     for name in ("stress_xx", "stress_yy", "stress_xy"):
-        expected = other.values(name)
-        assert sim.values(name) == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
-    assert sim.unbalanced_ratio() < 1e-9
+        expected = diagnostics.values(other, name)
+        assert diagnostics.values(sim, name) == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+    assert diagnostics.unbalanced_ratio(sim) < 1e-9
 
 
 def test_what_is_taken_out_lets_go_slowly():
     """With `relax` the balance is kept at first and lost bit by bit; in the end all forces are gone."""
     sim = leaning("mixed", True)
     sim.option(dynamic=False)
-    sim.solve(ratio=1e-7, cycles=50000)
-    before = sim.values("stress_yy")
+    convergence.solve(sim, ratio=1e-7, cycles=50000)
+    before = diagnostics.values(sim, "stress_yy")
     hole = np.flatnonzero(np.hypot(*(sim.mesh.centroids() - [0.4, 0.3]).T) < 0.12)
-    sim.null(hole, relax=1000)
-    assert sim.unbalanced_ratio() < 1e-6  # the forces left behind stand for the elements
-    sim.advance(1)
-    assert sim.values("stress_yy")[~np.isin(np.arange(len(before)), hole)] == pytest.approx(
+    changes.null(sim, hole, relax=1000)
+    assert diagnostics.unbalanced_ratio(sim) < 1e-6  # the forces left behind stand for the elements
+    convergence.advance(sim, 1)
+    assert diagnostics.values(sim, "stress_yy")[~np.isin(np.arange(len(before)), hole)] == pytest.approx(
         np.delete(before, hole), abs=1e-3 * np.abs(before).max()
     )
-    sim.advance(1000)
-    assert sim.solve(ratio=1e-6, cycles=50000).reason == "ratio"
+    convergence.advance(sim, 1000)
+    assert convergence.solve(sim, ratio=1e-6, cycles=50000).reason == "ratio"
     gone = leaning("mixed", True)
     gone.option(dynamic=False)
-    gone.null(hole)
-    assert gone.unbalanced_ratio() > 1e-3
-    gone.solve(ratio=1e-6, cycles=50000)
+    changes.null(gone, hole)
+    assert diagnostics.unbalanced_ratio(gone) > 1e-3
+    convergence.solve(gone, ratio=1e-6, cycles=50000)
     rest = np.setdiff1d(np.arange(len(before)), hole)
     for name in ("stress_xx", "stress_yy", "stress_xy"):
-        assert sim.values(name, rest) == pytest.approx(gone.values(name, rest), abs=2e-3 * np.abs(before).max())
+        assert diagnostics.values(sim, name, rest) == pytest.approx(
+            diagnostics.values(gone, name, rest), abs=2e-3 * np.abs(before).max()
+        )
 
 
 def test_mixed_discretisation_lets_quads_bend():
@@ -147,7 +150,7 @@ def test_mixed_discretisation_lets_quads_bend():
     for nu in (0.0, 0.3, 0.49):
         for kind in ("quad", "cross"):
             sim = model(rectangle(1, 1, 1.0, 1.0, kind=kind))
-            sim.element_model(None, "mech_iso_elastic", {**ROCK, "poisson_ratio": nu})
+            changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "poisson_ratio": nu})
             sim.option(dynamic=False, collision=False, large_strain=False)
             a = 1e-6
             for node, sign in zip(range(4), (1.0, -1.0, -1.0, 1.0)):  # (0, 0), (0, 1), (1, 0), (1, 1)
@@ -157,7 +160,7 @@ def test_mixed_discretisation_lets_quads_bend():
             lame = 2.0 * mu * nu / (1.0 - 2.0 * nu)
             plain = 0.5 * lame * (2.0 * a) ** 2 + mu * (4.0 * a * a + 2.0 * a * a)
             expected = 4.0 * mu * a * a if kind == "quad" else plain
-            assert sim.total("strain_energy") == pytest.approx(expected, rel=1e-9)
+            assert diagnostics.total(sim, "strain_energy") == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.slow
@@ -178,6 +181,6 @@ def test_a_cantilever_of_quads_approaches_the_beam():
             outer = mesh.points[node, 1] < 1e-9 or mesh.points[node, 1] > height - 1e-9
             sim.force_condition([node], fy=-load / (n * (2 if outer else 1)))
         sim.option(dynamic=False, collision=False)
-        assert sim.solve(ratio=1e-6, cycles=100000).reason == "ratio"
-        missing.append(1.0 + float(sim.values("displacement_y", end).mean()) / beam)
+        assert convergence.solve(sim, ratio=1e-6, cycles=100000).reason == "ratio"
+        missing.append(1.0 + float(diagnostics.values(sim, "displacement_y", end).mean()) / beam)
     assert 0.0 < missing[1] < 0.1 and missing[0] / missing[1] == pytest.approx(4.0, rel=0.25)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.surface_loads import ORDER, SurfaceLoads
 from tests.blocks.support import model, rectangle
 

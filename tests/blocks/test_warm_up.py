@@ -10,7 +10,8 @@ from tests.conftest import ROOT, run
 
 PROGRAM = """
 import numpy as np
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem import build, histories, pairs
 from hpcdem.physics.fdem.warm_up import warm_up
 from hpcdem.physics.fdem import connectivity
@@ -29,8 +30,8 @@ for kind in ("cross", "quad", "mixed"):
     sim = model(rectangle(4, 4, 1.0, 1.0, kind=kind))
     sim.advance(3)
     sim.unbalanced_ratio()
-    sim.save("x.sav")
-    Blocks().restore("x.sav")
+    saved_state.save(sim, "x.sav")
+    saved_state.restore(Blocks(), "x.sav")
     sim = jointed(model(rectangle(4, 4, 1.0, 1.0, kind=kind)))
     sim.option(dynamic=False)
     sim.gravity(0.0, -1.0)

@@ -13,7 +13,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 
 COHESIVE = "classic_intrinsic_cohesive_interface"
@@ -44,7 +45,7 @@ def impact(sim: Blocks, shape: str = "cross") -> None:
     plate = rectangle(24, 1, 2.4, 0.1, x0=-0.4, y0=-0.101, kind=shape)
     sim.take_mesh(joined(block, plate))
     n = len(block.cells)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
     edges = sim.mesh.edges()
     inner = edges.faces[edges.inner & (edges.faces[:, 0] < 4 * n)]
     if shape == "mixed":  # joints on the right half only
@@ -52,9 +53,9 @@ def impact(sim: Blocks, shape: str = "cross") -> None:
         inner = inner[centre > 0.8]
     sim.joint_model(inner[:, 0], COHESIVE, WEAK)
     sim.velocity_condition(np.arange(len(block.points), len(sim.mesh.points)), vx=0.0, vy=0.0)
-    sim.set_velocity(np.arange(len(block.points)), vx=0.5, vy=-2.0)
+    changes.set_velocity(sim, np.arange(len(block.points)), vx=0.5, vy=-2.0)
     sim.gravity(0.0, -9.81)
-    sim.account_energy()
+    diagnostics.account_energy(sim)
 
 
 def mixed(sim: Blocks) -> None:
@@ -68,7 +69,7 @@ def flight(sim: Blocks) -> None:
     one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
     two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13, kind="mixed"), 0.2, seed=2)
     sim.take_mesh(joined(one, two))
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
     sim.face_model(None, "contact_mohr_coulomb",
                    {"friction": 25.0, "penalty_normal": 2e11, "damping_t": 2e8, "damping_b": 2.0})  # fmt: skip
     outside = sim.mesh.edges()
@@ -77,16 +78,16 @@ def flight(sim: Blocks) -> None:
     sim.face_property(outside[1::3], {"penalty_shear": 5e10, "damping_b": 4.0})
     sim.joint_model(None, COHESIVE, WEAK)
     n = len(one.points)
-    sim.set_velocity(np.arange(n), vx=203.0, vy=0.0)
-    sim.set_velocity(np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)
-    sim.account_energy()
+    changes.set_velocity(sim, np.arange(n), vx=203.0, vy=0.0)
+    changes.set_velocity(sim, np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)
+    diagnostics.account_energy(sim)
 
 
 def opening(sim: Blocks) -> None:
     """A stressed bed of triangles and quads, jointed on the left, with a crack; a hole is made in it, then blasted."""
     mesh = shaken(rectangle(16, 8, 1.6, 0.8, kind="mixed"), 0.15)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 20.0})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 20.0})
     edges = mesh.edges()
     inner = edges.faces[edges.inner][:, 0]
     centre = mesh.centroids()[inner // 4]
@@ -94,7 +95,7 @@ def opening(sim: Blocks) -> None:
     ends = mesh.points[edges.points[edges.inner]]
     upright = np.abs(ends[:, 0, 0] - ends[:, 1, 0]) < 0.04
     across = (np.abs(ends[:, :, 0].mean(axis=1) - 0.5) < 0.03) & upright & (ends[:, :, 1].mean(axis=1) < 0.5)
-    sim.crack(inner[across])
+    changes.crack(sim, inner[across])
     x, y = mesh.points.T
     sim.velocity_condition(np.flatnonzero((x < 1e-9) | (x > 1.6 - 1e-9)), vx=0.0)
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
@@ -110,16 +111,16 @@ def open_up(sim: Blocks) -> None:
     """What happens to the bed: the hole at rest, then motion in time with a pressure in the hole."""
     if sim.clock.step == 300:
         middle = sim.mesh.centroids() - [0.75, 0.45]
-        sim.null(np.flatnonzero(np.hypot(*middle.T) < 0.16), relax=250)
+        changes.null(sim, np.flatnonzero(np.hypot(*middle.T) < 0.16), relax=250)
     if sim.clock.step == 750:
         sim.option(dynamic=True)
         sim.time_step(mass_scaling=3e-6)
-        sim.account_energy()
+        diagnostics.account_energy(sim)
         sim.table("blast", [(0.0, 0.0), (1e-4, -2.5e7), (3e-4, -2e6)])
         gone = np.repeat(~sim.alive, 4) & (sim.partner >= 0)
         rim = sim.partner[gone]
         sim.stress_condition(rim[sim.alive[rim // 4]], normal="blast")
-        sim.reset_displacement()
+        changes.reset_displacement(sim)
     if sim.clock.step == 1200:
         sim.element_property(np.arange(40), {"young": 40e9})
         sim.time_step(auto=True)
@@ -136,37 +137,37 @@ def fill_up(sim: Blocks) -> None:
     hole = np.flatnonzero(np.hypot(*middle.T) < 0.16)
     fill = {"density": 2000.0, "young": 5e9, "poisson_ratio": 0.3}
     if sim.clock.step == 200:
-        sim.null(hole, relax=100)
+        changes.null(sim, hole, relax=100)
     if sim.clock.step == 400:
-        sim.element_model(hole, "mech_iso_elastic", fill)
+        changes.element_model(sim, hole, "mech_iso_elastic", fill)
         joints = np.flatnonzero(sim.joint_exists())
         inside = np.isin(joints // 4, hole) & np.isin(sim.partner[joints] // 4, hole)
         sim.joint_model(joints[inside], COHESIVE, WEAK)
     if sim.clock.step == 600:
         sim.option(dynamic=True)
         sim.time_step(mass_scaling=3e-6)
-        sim.account_energy()
-        sim.reset_displacement()
+        diagnostics.account_energy(sim)
+        changes.reset_displacement(sim)
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 0] > 1.6 - 1e-9), vx=0.5)
     if sim.clock.step == 800:
-        sim.null(hole)
+        changes.null(sim, hole)
     if sim.clock.step == 900:
-        sim.element_model(hole[:-3], "mech_iso_elastic", {**fill, "young": 20e9})
+        changes.element_model(sim, hole[:-3], "mech_iso_elastic", {**fill, "young": 20e9})
 
 
 def report_borders(sim: Blocks) -> None:
     """A long bed, its left third shattered and at rest: how many elements each rank has, and their cost."""
     sim.take_mesh(rectangle(60, 4, 6.0, 0.4))
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 30.0})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 30.0})
     sim.joint_model(None, COHESIVE, WEAK)
     edges = sim.mesh.edges()
     inner = edges.faces[edges.inner][:, 0]
-    sim.crack(inner[sim.mesh.centroids()[inner // 4, 0] < 2.0])
+    changes.crack(sim, inner[sim.mesh.centroids()[inner // 4, 0] < 2.0])
     x, y = sim.mesh.points.T
     sim.velocity_condition(None, vx=0.0)
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
     sim.velocity_condition(np.flatnonzero(y > 0.4 - 1e-9), vy=-0.1)
-    sim.advance(200)  # everything touches now, and remembers it
+    convergence.advance(sim, 200)  # everything touches now, and remembers it
     sim.open_model()
     sim.ownership.wanted = True
     sim.close_model()
@@ -188,7 +189,7 @@ def main() -> None:
     kind, threads, steps, out, *more = sys.argv[1:]
     if more[:1] == ["resume"]:
         sim = empty(kind, int(threads))
-        assert sim.restore(more[1]) == {"kind": kind}
+        assert saved_state.restore(sim, more[1]) == {"kind": kind}
     else:
         sim = make(kind, int(threads))
     first = None
@@ -196,11 +197,11 @@ def main() -> None:
         return
     while sim.clock.step < int(steps):
         if len(more) == 2 and more[0] != "resume" and sim.clock.step == int(more[0]):
-            sim.save(more[1], {"kind": kind})
+            saved_state.save(sim, more[1], {"kind": kind})
         KINDS[kind][1](sim)
-        sim.advance(1)
+        convergence.advance(sim, 1)
         first = set(sim.number[sim.owned].tolist()) if first is None else first
-    found = {name: sim.values(name) for name in ("position_x", "position_y", "velocity_x", "velocity_y")}
+    found = {name: diagnostics.values(sim, name) for name in ("position_x", "position_y", "velocity_x", "velocity_y")}
     for name in (
         "stress_xx",
         "stress_yy",
@@ -215,17 +216,19 @@ def main() -> None:
         "shear_stress_largest",
         "shear_stress_first",
     ):
-        found[name] = sim.values(name)
-    found.update({f"event_{name}": values for name, values in sim.events().items()})
-    found["counts"] = np.array(sim.joint_counts())
+        found[name] = diagnostics.values(sim, name)
+    found.update({f"event_{name}": values for name, values in diagnostics.events(sim).items()})
+    found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["time"] = np.array([sim.clock.time, sim.clock.dt])
     if sim.budget is not None:
-        found.update({f"energy_{name}": np.array(value) for name, value in sim.energies().items()})
+        found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
     came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - (first or set())))
     found["about"] = np.array([sim.rebuilds, sim.rebuild_state.late, len(sim.local.pairs), sum(came)])
     if sim.comm.rank == 0:
         np.savez(out, **found)
-    print(sim.comm.rank, sim.n_own, sim.rebuilds, sim.rebuild_state.late, sim.joint_counts(), came, flush=True)
+    print(
+        sim.comm.rank, sim.n_own, sim.rebuilds, sim.rebuild_state.late, diagnostics.joint_counts(sim), came, flush=True
+    )
 
 
 if __name__ == "__main__":

@@ -11,8 +11,9 @@ from hpcdem.commands.dem import cycles, particles, properties, settings
 from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 ROCK = {"density": 2500.0, "young": 1e9, "poisson_ratio": 0.25}
 STIFF = {"density": 2500.0, "young": 50e9, "poisson_ratio": 0.25}
@@ -37,7 +38,7 @@ def body(mesh: Mesh, rock: dict[str, float] = ROCK, fixed: bool = False, gravity
     """A model of blocks; fixed: no corner moves."""
     sim = Blocks()
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", rock)
+    changes.element_model(sim, None, "mech_iso_elastic", rock)
     sim.gravity(0.0, -gravity)
     if fixed:
         sim.velocity_condition(None, vx=0.0, vy=0.0)

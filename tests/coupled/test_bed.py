@@ -9,6 +9,7 @@ import pytest
 
 from hpcdem.commands.dem import particles, walls
 from hpcdem.physics.dem import diagnostics
+from hpcdem.physics.fdem import changes
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
 
@@ -34,7 +35,7 @@ def test_balance_of_momentum(tmp_path, steps):
     count = len(sim.particles)
     assert count > 300
     blocks = body(shaken(rectangle(5, 3, 0.5, 0.3, x0=0.62, y0=0.665), 0.1), gravity=G)
-    blocks.set_velocity(None, vx=1.0, vy=-3.0)
+    changes.set_velocity(blocks, None, vx=1.0, vy=-3.0)
     both = together(sim, blocks)
     both.prepare()
     weight = -G * (count * 2500.0 * math.pi * RADIUS**2 + 2500.0 * 0.15)

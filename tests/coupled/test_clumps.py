@@ -16,6 +16,7 @@ from hpcdem.commands.dem import clumps, properties
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
+from hpcdem.physics.fdem import diagnostics as of_blocks
 from tests.blocks.support import rectangle, shaken
 from tests.coupled.support import body, discs, momentum, together
 
@@ -88,7 +89,11 @@ def test_momentum(tmp_path):
         both.advance(200)
         touched += len(both.contacts()["id"]) > 0
         assert np.abs(momentum(both) - before).max() <= 1e-12 * np.abs(before).max()
-    assert touched > 2 and abs(now(both)["spin"]) > 1.0 and np.abs(both.blocks.values("velocity_y")).max() > 1e-3
+    assert (
+        touched > 2
+        and abs(now(both)["spin"]) > 1.0
+        and np.abs(of_blocks.values(both.blocks, "velocity_y")).max() > 1e-3
+    )
 
 
 def test_no_account_of_energy(tmp_path):

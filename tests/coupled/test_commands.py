@@ -21,7 +21,8 @@ from hpcdem.engine import output
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.post import inventory
 from hpcdem.runtime.progress import BETWEEN, Log
 from tests.coupled.support import ROCK, discs
@@ -42,7 +43,8 @@ def scene(folder) -> tuple[Project, object]:
 def state(project):
     both = project.coupled
     p = both.particles.particles
-    return np.concatenate([project.blocks.values("position_y"), p["x"], p["y"], p["spin"], both.contacts()["fs"],
+    height = diagnostics.values(project.blocks, "position_y")
+    return np.concatenate([height, p["x"], p["y"], p["spin"], both.contacts()["fs"],
                            [both.energies()["lost"]]])  # fmt: skip
 
 
@@ -172,7 +174,7 @@ def test_what_is_said_of_one_only_is_named(tmp_path):
     stepping.step(project, 1500)
     told = said.getvalue()
     assert told.count("wall 7") == told.count("bottom side") == told.count("is in or beyond wall 8") == 1
-    assert len(both.contacts()["id"]) > 0 or project.blocks.values("velocity_x").mean() < 50.0
+    assert len(both.contacts()["id"]) > 0 or diagnostics.values(project.blocks, "velocity_x").mean() < 50.0
 
     settings_.gravity(project, (0.0, -9.81))
     settings_.option(project, collision=True)
@@ -255,16 +257,16 @@ def test_the_tables_of_energy_close_together(tmp_path):
     project, sim = scene(tmp_path)
     said = io.StringIO()
     project.blocks.log = sim.log = Log(stream=said)
-    project.blocks.account_energy()
+    diagnostics.account_energy(project.blocks)
     both = coupling.couple(project, sim)
     falling = 2 * 0.5 * 2500.0 * np.pi * 0.1**2 * (1.0**2 + 0.3**2)
     stepping.step(project, 250)
     checkpoints.save(project, "middle.sav")
     stepping.step(project, 3000)
-    whole = project.blocks.energies()
+    whole = diagnostics.energies(project.blocks)
     checkpoints.restore(project, str(tmp_path / "middle.sav"))
     stepping.step(project, 3000)
-    assert project.blocks.energies() == whole  # a restart forgets nothing of it
+    assert diagnostics.energies(project.blocks) == whole  # a restart forgets nothing of it
     found = both.energies()
     assert whole["work_discs"] == pytest.approx(found["work_on_blocks"], rel=1e-9) and whole["work_discs"] > 1.0
     assert abs(whole["work_outside"]) < 1e-9 * whole["work_discs"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.dem import properties
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
 from tests.blocks.support import JOINT, joined, rectangle, shaken
 from tests.coupled.support import ROCK, STIFF, body, discs, momentum, of_disc, together
@@ -95,7 +96,7 @@ def test_friction_of_the_face_that_is_touched(tmp_path, upper, others, expected)
         edges = mesh.edges()
         joints = edges.faces[(np.abs(mesh.points[edges.points][:, :, 1] - 0.6) < 1e-9).all(axis=1)][:, 0]
         rock.joint_model(joints, "classic_intrinsic_cohesive_interface", {**JOINT, "friction": 10.0})
-        rock.null(np.flatnonzero(mesh.centroids()[:, 1] > 0.6))
+        changes.null(rock, np.flatnonzero(mesh.centroids()[:, 1] > 0.6))
     for faces, angle in ((top, upper), (rest[rest >= 0], others)):
         if isinstance(angle, float):
             rock.face_model(faces, "contact_mohr_coulomb", {"friction": angle, "penalty_normal": 1e10})
@@ -119,7 +120,7 @@ def test_disc_at_rest(tmp_path):
     found = both.contacts()
     assert found["overlap"].sum() / len(found["id"]) == pytest.approx(MASS * G / 1e7, rel=1e-4)
     assert both.force_on_blocks()[1] == pytest.approx(-MASS * G, rel=1e-4)
-    held = blocks.total("reaction_y", base)
+    held = diagnostics.total(blocks, "reaction_y", base)
     assert held == pytest.approx((MASS + 2500.0 * 0.24) * G, rel=1e-3)
 
 
@@ -222,7 +223,7 @@ def test_disc_between_two_flush_blocks(tmp_path):
 def test_energy_across_the_contact(tmp_path):
     """Without friction what one side loses the other gets; the account of both closes."""
     blocks = body(rectangle(6, 3, 1.2, 0.6), ROCK)
-    blocks.account_energy()
+    diagnostics.account_energy(blocks)
     sim = discs([(0.55, 0.6 + R, R)], tmp_path, dt=2e-6)
     properties.prop(sim, yv=-2.0, fric=0.0)
     both = together(sim, blocks)

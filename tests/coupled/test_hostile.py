@@ -7,6 +7,8 @@ import pytest
 from hpcdem.commands.dem import properties, settings
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.coupling.model import Coupled
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem import saved_state as blocks_state
 from tests.blocks.support import rectangle
 from tests.coupled.support import body, discs, together
 
@@ -104,9 +106,9 @@ def test_files_of_another_kind(tmp_path):
     paths = {name: tmp_path / f"{name}.sav" for name in ("both", "discs", "blocks")}
     saved_state.save(both, paths["both"], {"a": 1})
     of_particles.save(both.particles, paths["discs"])
-    both.blocks.save(paths["blocks"])
+    blocks_state.save(both.blocks, paths["blocks"])
     with pytest.raises(CommandError, match="not one of a model of blocks"):
-        both.blocks.restore(paths["both"])
+        blocks_state.restore(both.blocks, paths["both"])
     with pytest.raises(CommandError, match="not one of particles"):
         of_particles.restore(both.particles, paths["both"])
     for name in ("discs", "blocks"):
@@ -135,7 +137,7 @@ def test_blocks_that_are_replaced(tmp_path):
     both.advance(2)
     assert not len(both.contacts()["id"]) and both.force_on_blocks() == (0.0, 0.0)
     both.blocks.take_mesh(rectangle(2, 1, 1.2, 0.6))
-    both.blocks.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(both.blocks, None, "mech_iso_elastic", ROCK)
     both.settle_time_step()
     both.advance(2)
 

@@ -19,7 +19,9 @@ from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.simulation import Simulation
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem import diagnostics as of_blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 from tests.blocks.worker import communicator
 from tests.clumped import write_lattice
@@ -52,13 +54,15 @@ def make(kind: str, threads: int) -> Coupled:
     blocks = Blocks(comm, threads, balance_on=kind != "flight")
     blocks.take_mesh(joined(shaken(rectangle(8, 4, 0.8, 0.4, x0=0.7, y0=0.73, kind="mixed"), 0.15),
                             rectangle(2, 2, 0.2, 0.2, x0=1.9, y0=0.72)))  # fmt: skip
-    blocks.element_model(None, "mech_iso_elastic", {**ROCK, "young": 1e8, "friction": 25.0, "damp_factor": 0.05})
+    changes.element_model(
+        blocks, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "friction": 25.0, "damp_factor": 0.05}
+    )
     if kind != "drop":
         blocks.joint_model(None, "classic_intrinsic_cohesive_interface", WEAK)
-    blocks.set_velocity(None, vx=6.0 if kind == "flight" else 0.5, vy=-5.0)
+    changes.set_velocity(blocks, None, vx=6.0 if kind == "flight" else 0.5, vy=-5.0)
     blocks.gravity(0.0, -G)
     if kind != "clumps":
-        blocks.account_energy()
+        of_blocks.account_energy(blocks)
     return Coupled(sim, blocks)
 
 
@@ -72,9 +76,10 @@ def state(both: Coupled) -> dict[str, np.ndarray]:
     """All that may not depend on ranks, on all of them."""
     sim, blocks = both.particles, both.blocks
     found = {
-        name: blocks.values(name) for name in ("position_x", "position_y", "velocity_x", "velocity_y", "stress_yy")
+        name: of_blocks.values(blocks, name)
+        for name in ("position_x", "position_y", "velocity_x", "velocity_y", "stress_yy")
     }
-    found["broken"] = np.array(blocks.joint_counts())
+    found["broken"] = np.array(of_blocks.joint_counts(blocks))
     p = sim.particles
     names = ("gid", "x", "y", "vx", "vy", "spin", "angle")
     rows = np.column_stack([p[name] for name in names] + [sim.lists.owned_forces()])

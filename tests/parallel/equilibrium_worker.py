@@ -13,7 +13,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, rectangle, shaken
 
 NAMES = (
@@ -32,7 +33,7 @@ def main(solver: str, out: str) -> None:
     sim = Blocks(communicator())
     mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "young": 1e9})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
     joints = sim.numbers_of_joints(None)
     sim.joint_model(joints[: len(joints) // 2], "classic_intrinsic_cohesive_interface",
                     {**JOINT, "penalty_normal": 2e10, "tensile_strength": 1e8, "cohesion": 1e8})  # fmt: skip
@@ -45,14 +46,14 @@ def main(solver: str, out: str) -> None:
     sim.initial_stress(None, xx=-1e4)
     sim.option(dynamic=False, collision=False)
     sim.move_constraint(np.flatnonzero((x < 1e-9) & (y < 1e-9)), 1)
-    first = sim.solve_elastic(cycles=3, solver=solver)
+    first = equilibrium.solve_elastic(sim, cycles=3, solver=solver)
     sim.velocity_condition(right, vx=0.0)
-    sim.null(np.flatnonzero(np.hypot(*(mesh.centroids() - [1.1, 0.4]).T) < 0.2), relax=50)
-    second = sim.solve_elastic(solver=solver)
-    found = {name: sim.values(name) for name in NAMES}
-    sim.advance(30)
-    found.update({f"later_{name}": sim.values(name) for name in NAMES})
-    found["ratios"] = np.array([first.ratio, second.ratio, sim.unbalanced_ratio()])
+    changes.null(sim, np.flatnonzero(np.hypot(*(mesh.centroids() - [1.1, 0.4]).T) < 0.2), relax=50)
+    second = equilibrium.solve_elastic(sim, solver=solver)
+    found = {name: diagnostics.values(sim, name) for name in NAMES}
+    convergence.advance(sim, 30)
+    found.update({f"later_{name}": diagnostics.values(sim, name) for name in NAMES})
+    found["ratios"] = np.array([first.ratio, second.ratio, diagnostics.unbalanced_ratio(sim)])
     found["counts"] = np.array([first.iterations, first.factors, first.unknowns, second.iterations, sim.clock.step])
     if sim.comm.rank == 0:
         np.savez(out, **found)

@@ -23,7 +23,8 @@ from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.simulation import Simulation
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import rectangle
 from tests.clumped import write_lattice
 from tests.pretended import Pretended, Ranks
@@ -434,7 +435,9 @@ def raft(comm: Any, size: int, save: Path | None = None, restore: Path | None = 
         properties.prop(sim, density=1000.0, kn=1e6, ks=1e6, fric=0.5, xv=30.0)
         cycles.prepare(sim)
         blocks.take_mesh(rectangle(8 * size, 1, 8.0 * size + 20.0, 1.0))
-        blocks.element_model(None, "mech_iso_elastic", {"density": 2500.0, "young": 1e8, "poisson_ratio": 0.25})
+        changes.element_model(
+            blocks, None, "mech_iso_elastic", {"density": 2500.0, "young": 1e8, "poisson_ratio": 0.25}
+        )
         blocks.velocity_condition(None, vx=0.0, vy=0.0)
     both = Coupled(sim, blocks)
     if restore is None:

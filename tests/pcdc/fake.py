@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from contextlib import nullcontext
+from functools import partial
+from inspect import isfunction
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,9 +18,11 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.timers import Timers
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.connectivity import centroids
+from hpcdem.physics.fdem.convergence import Watch
+from hpcdem.physics.fdem.equilibrium import Balanced
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Balanced, Watch
 from hpcdem.physics.fdem.properties import MODELS, Rows
 from hpcdem.physics.fdem.tables import Table
 
@@ -40,9 +44,10 @@ class Noted:
 
 
 class FakeBlocks:
-    """The interface of `hpcdem.physics.fdem.model.Blocks`, as far as the commands use it. calls: (method, arguments) in
-    order; the time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2 time), reactions are 1 and 2 per
-    node."""
+    """`hpcdem.physics.fdem.simulation.Blocks` with the functions on it (see `_note`), as far as the commands use them.
+
+    calls: (name, arguments) in order; the time step is 0.01, the ratio falls as 1 / step, a node moves by (time, 2
+    time), reactions are 1 and 2 per node."""
 
     def __init__(self, comm: Any = None, outdir: Path | str = "data") -> None:
         self.comm = comm or SerialComm()
@@ -180,6 +185,24 @@ class FakeBlocks:
             points, cells, layers = state["mesh"]
             self.mesh = Mesh.of(points, cells, None, layers)
         return state["extra"]
+
+
+def _note(module: Any) -> None:
+    """Let the functions of a module that act on a model of blocks ask a `FakeBlocks` by their name."""
+
+    def noted(name: str, function: Any) -> Any:
+        def call(sim: Any, *args: Any, **kwargs: Any) -> Any:
+            return (getattr(sim, name) if isinstance(sim, FakeBlocks) else partial(function, sim))(*args, **kwargs)
+
+        return call
+
+    for name, function in list(vars(module).items()):
+        if isfunction(function) and function.__module__ == module.__name__ and name[0] != "_":
+            setattr(module, name, noted(name, function))
+
+
+for _one in (changes, convergence, diagnostics, equilibrium, saved_state):
+    _note(_one)
 
 
 class FakeProbe:

@@ -8,7 +8,9 @@ from dataclasses import asdict
 import pytest
 
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError
-from hpcdem.physics.fdem.model import Blocks, Watch
+from hpcdem.physics.fdem import convergence
+from hpcdem.physics.fdem.convergence import Watch
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import joined, model, rectangle
 from tests.pcdc.test_time import Rock, resumed
 
@@ -120,13 +122,16 @@ def test_the_same_in_python():
         return sim
 
     sim = blocks()
-    found = sim.solve(window=2000)
+    found = convergence.solve(sim, window=2000)
     assert found.reason == "no progress" and 2000 < found.steps < 4000 and found.ratio > 0.01
-    body = sim.sliding_body()
+    body = convergence.sliding_body(sim)
     assert body.elements == 2 and body.first == 8 and body.vy < 0.0 and body.x == pytest.approx(0.25, abs=0.01)
-    assert blocks().solve(limit=300).reason == "limit" and blocks().solve(cycles=300, ratio=1e-9).reason == "cycles"
+    assert (
+        convergence.solve(blocks(), limit=300).reason == "limit"
+        and convergence.solve(blocks(), cycles=300, ratio=1e-9).reason == "cycles"
+    )
     with pytest.raises(CommandError, match="limit must not be negative"):
-        sim.solve(limit=-1)
+        convergence.solve(sim, limit=-1)
 
 
 def test_the_usual_window_grows_with_the_way_of_a_wave():
@@ -134,13 +139,17 @@ def test_the_usual_window_grows_with_the_way_of_a_wave():
     sim = model(rectangle(300, 1, 300.0, 1.0, kind="quad"))
     sim.option(dynamic=False)
     sim.close_model()
-    assert sim.watch().window == 20_000 and sim.watch().limit == 1_000_000 and sim.watch(ends=True).limit == 0
+    assert (
+        convergence.watch(sim).window == 20_000
+        and convergence.watch(sim).limit == 1_000_000
+        and convergence.watch(sim, ends=True).limit == 0
+    )
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", {
         "cohesion": 1e9, "tensile_strength": 1e9, "gf1": 1e9, "gf2": 1e9, "penalty_normal": 99 * 50e9})  # fmt: skip
     sim.close_model()
-    assert sim.watch().window == pytest.approx(120_000, rel=0.01)
+    assert convergence.watch(sim).window == pytest.approx(120_000, rel=0.01)
     sim.option(dynamic=True)
-    assert sim.watch().window == 0 and sim.watch().limit == 10_000_000
+    assert convergence.watch(sim).window == 0 and convergence.watch(sim).limit == 10_000_000
 
 
 @pytest.mark.mpi

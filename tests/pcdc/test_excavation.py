@@ -10,7 +10,8 @@ import pytest
 from hpcdem.commands.fdem import Project
 from hpcdem.core.errors import HpcdemError
 from hpcdem.lang.pcdc.execute import Interpreter
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.pcdc.fake import Noted
 
 BOX = """
@@ -80,7 +81,7 @@ AFTERWARDS = [
 def test_ranges_that_touch_what_was_removed(desk, line):
     """Each acts on what is there, and the model runs on."""
     desk(OUT + f"pcdc {line}\npcdc model step 5\n")
-    assert not np.isnan(desk.blocks.values("position_x")[desk.blocks.node_exists()]).any()
+    assert not np.isnan(diagnostics.values(desk.blocks, "position_x")[desk.blocks.node_exists()]).any()
 
 
 def test_what_was_chosen_is_what_is_there(desk):
@@ -93,12 +94,12 @@ def test_what_was_chosen_is_what_is_there(desk):
         pcdc.numbers("joint")
     )
     assert not np.isnan(pcdc.values("node", "reaction-x")).any()
-    assert sum(blocks.joint_counts()) == int(blocks.joint_exists().sum())
+    assert sum(diagnostics.joint_counts(blocks)) == int(blocks.joint_exists().sum())
     desk("pcdc element property young 5e9 range x 1 5\n")
     young = np.array(blocks.element_rows.column("young"))[blocks.element_row]
     centre = blocks.mesh.centroids()[:, 0]
     assert (young[blocks.alive & (centre > 1) & (centre < 5)] == 5e9).all() and (young[~blocks.alive] == 20e9).all()
-    assert desk.pcdc.history("all")[-1, 2] == pytest.approx(np.nanmin(blocks.values("stress_yy")))
+    assert desk.pcdc.history("all")[-1, 2] == pytest.approx(np.nanmin(diagnostics.values(blocks, "stress_yy")))
 
 
 @pytest.mark.parametrize(
@@ -134,27 +135,27 @@ def test_excavate_then_line(desk):
     desk(OUT + "pcdc element group 'lining' set 'stage' range geometry 'half'\n")
     void = desk.project.groups["element"].members("void", "stage")
     lining = desk.project.groups["element"].members("lining", "stage")
-    before = desk.blocks.values("stress_yy", np.flatnonzero(desk.blocks.alive))
+    before = diagnostics.values(desk.blocks, "stress_yy", np.flatnonzero(desk.blocks.alive))
     stay = np.flatnonzero(desk.blocks.alive)
     desk("pcdc element c-model mech-iso-e property density 2400 young 30e9 p-r 0.2 range group 'lining' set 'stage'\n")
     assert desk.project.alive[lining].all() and not desk.project.alive[void].any()
     assert np.array_equal(desk.project.alive, desk.blocks.alive)
-    assert np.array_equal(desk.blocks.values("stress_yy", stay), before)
-    assert np.abs(desk.blocks.values("stress_yy", lining)).max() < 1e-3
+    assert np.array_equal(diagnostics.values(desk.blocks, "stress_yy", stay), before)
+    assert np.abs(diagnostics.values(desk.blocks, "stress_yy", lining)).max() < 1e-3
     desk(
         "pcdc face-joint c-model c-i-c-i property cohesion 4e6 tensile-s 2e6 gf1 50 gf2 90 range "
         "face-of 'lining' set 'stage'\n"
         "pcdc model save 'lined.sav'\n"
         "pcdc element-face boundary m-s-b-c stress-normal -2e5 range geometry 'outline'\npcdc model step 300\n"
     )
-    carried = desk.blocks.values("stress_yy", lining)
+    carried = diagnostics.values(desk.blocks, "stress_yy", lining)
     assert np.abs(carried).max() > 1e3
     again = Desk(desk.project.directory)
     again(
         "pcdc model restore 'lined.sav'\n"
         "pcdc element-face boundary m-s-b-c stress-normal -2e5 range geometry 'outline'\npcdc model step 300\n"
     )
-    assert np.array_equal(again.blocks.values("stress_yy", lining), carried)
+    assert np.array_equal(diagnostics.values(again.blocks, "stress_yy", lining), carried)
     assert np.array_equal(again.project.alive, desk.project.alive)
 
 

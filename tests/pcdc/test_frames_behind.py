@@ -10,7 +10,8 @@ from hpcdem.commands.fdem import assignments, checkpoints, frames, meshes, steps
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.behind import under_way
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import ROCK
 
 EVERY, STEPS = 7, 63
@@ -21,7 +22,7 @@ def plate(folder) -> Project:
     project = Project(Blocks(outdir=folder / "data"), folder, folder / "data")
     meshes.rectangle(project, (0.0, 0.0), (1.2, 0.6), (6, 3))
     assignments.element_model(project, "mech_iso_elastic", ROCK)
-    project.blocks.set_velocity(None, vx=1.0, vy=-2.0)
+    changes.set_velocity(project.blocks, None, vx=1.0, vy=-2.0)
     return project
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from hpcdem.commands.fdem import checkpoints
 from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import convergence, diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.runtime.stop_requests import STOP
 from tests.pcdc.fake import Bench, Noted
 from tests.pcdc.test_running import Asked
@@ -54,10 +55,10 @@ class Rock(Bench):
 def resumed(folder, script: str, step: int, monkeypatch) -> Rock:
     """A script that was stopped at a step and went on from its checkpoint."""
     stopped, again = Rock(folder, ""), Rock(folder, "")
-    usual = stopped.blocks.advance
+    usual = convergence.advance
     monkeypatch.setattr(stopped.blocks, "stop", Stop())
-    monkeypatch.setattr(stopped.blocks, "advance", lambda steps: usual(1) or STOP * (stopped.project.step == step))
-    with pytest.raises(StoppedWithCheckpoint):
+    with monkeypatch.context() as patch, pytest.raises(StoppedWithCheckpoint):
+        patch.setattr(convergence, "advance", lambda sim, steps: usual(sim, 1) or STOP * (stopped.project.step == step))
         stopped(script)
     past = checkpoints.take_up(again.project)
     again.interpreter.run(again.interpreter.read(script, "script.sc"), past)
@@ -129,20 +130,22 @@ def test_in_any_order_the_time_passes_and_the_step_is_the_one_said_last(tmp_path
         rock.passes(choose.choice([3.3e-6, 4.7e-5, 2.1e-4]))
         blocks = rock.blocks
         assert blocks.options.safety == said["safety"]
-        assert blocks.clock.dt == (said["value"] or said["mass"] or pytest.approx(blocks.critical_time_step()))
-        assert (blocks.added_mass() > 0.0) == (said["mass"] > blocks.critical_time_step())
+        assert blocks.clock.dt == (
+            said["value"] or said["mass"] or pytest.approx(diagnostics.critical_time_step(blocks))
+        )
+        assert (diagnostics.added_mass(blocks) > 0.0) == (said["mass"] > diagnostics.critical_time_step(blocks))
 
 
 def test_mass_scaling_reaches_the_right_velocity_with_its_step_and_ends_with_a_value(rock):
     """A free fall with mass scaling is slow, as its description says; a value that is said after it ends it: g t."""
     rock("pcdc node boundary remove\npcdc model time-step mass-scaling 1e-3\npcdc model step 1\n")
-    told = f"(by mass scaling, which adds {rock.blocks.added_mass():.3g} times the mass)"
-    assert rock.blocks.added_mass() > 1000.0 and any(told in line for line in rock.blocks.log.lines)
+    told = f"(by mass scaling, which adds {diagnostics.added_mass(rock.blocks):.3g} times the mass)"
+    assert diagnostics.added_mass(rock.blocks) > 1000.0 and any(told in line for line in rock.blocks.log.lines)
     rock("pcdc node reset velocity\npcdc model time-step value 1e-5\n")
     rock.blocks.clock.time = 0.0
     rock.passes(1e-3)
-    assert rock.blocks.values("velocity_y").mean() == pytest.approx(-10.0 * rock.time, rel=0.01)
-    assert rock.blocks.added_mass() == 0.0
+    assert diagnostics.values(rock.blocks, "velocity_y").mean() == pytest.approx(-10.0 * rock.time, rel=0.01)
+    assert diagnostics.added_mass(rock.blocks) == 0.0
 
 
 @pytest.mark.parametrize(
@@ -165,7 +168,7 @@ def test_words_that_do_not_go_together_are_refused_by_their_line(rock, words, to
 
 def test_the_log_names_the_step_its_limit_and_the_safety_factor(rock):
     rock("pcdc model step 1\npcdc model time-step safety 0.5\npcdc model step 1\n")
-    limit = rock.blocks.critical_time_step() / 0.5
+    limit = diagnostics.critical_time_step(rock.blocks) / 0.5
     rock(f"pcdc model time-step value {0.9 * limit!r}\npcdc model step 1\n")
     steps = [line for line in rock.blocks.log.lines if "time step" in line]
     told = f"time step {0.8 * limit:.4g} s (estimated), 0.80 of the stability limit {limit:.4g} s; safety factor 0.8"
@@ -189,4 +192,4 @@ def test_a_stop_in_the_middle_changes_nothing(tmp_path, monkeypatch, after):
     straight, again = Rock(tmp_path / "a", script), resumed(tmp_path / "b", script, 40 + after, monkeypatch)
     assert again.blocks.clock == straight.blocks.clock and straight.blocks.clock.step > 200
     for name in ("position_y", "velocity_x"):
-        assert np.array_equal(again.blocks.values(name), straight.blocks.values(name))
+        assert np.array_equal(diagnostics.values(again.blocks, name), diagnostics.values(straight.blocks, name))

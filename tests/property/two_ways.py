@@ -25,6 +25,7 @@ from hpcdem import session
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.runtime.progress import Log
 from hpcdem.runtime.stop_requests import StopRequests
 from hpcdem.session import Session
@@ -547,12 +548,12 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
         scales = {"position_x": u.l, "position_y": u.l, "velocity_x": u.l / u.t, "velocity_y": u.l / u.t,
                   "stress_xx": u.m / u.t**2, "stress_xy": u.m / u.t**2, "stress_yy": u.m / u.t**2}  # fmt: skip
         for name, scale in scales.items():
-            found[name] = blocks.values(name) / scale
-        if blocks.joint_counts() != (0, 0, 0):
-            found["opening"] = blocks.values("opening") / u.l
-            found["damage"] = blocks.values("damage")
+            found[name] = diagnostics.values(blocks, name) / scale
+        if diagnostics.joint_counts(blocks) != (0, 0, 0):
+            found["opening"] = diagnostics.values(blocks, "opening") / u.l
+            found["damage"] = diagnostics.values(blocks, "damage")
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
-        found["joints"] = np.array(blocks.joint_counts(), float)
+        found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():
             if name in project.histories:
                 found[f"history {name}"] = np.array(project.histories[name].rows)

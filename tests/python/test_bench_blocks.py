@@ -9,34 +9,36 @@ import sys
 import numpy as np
 import pytest
 
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.conftest import ROOT, run
 
 sys.path.insert(0, str(ROOT / "scripts" / "lib"))
 
 from bench import blocks
 
+from hpcdem.physics.fdem import convergence, diagnostics
+
 
 def made(kind: str, side: int = 8) -> Blocks:
     sim = Blocks()
     blocks.MAKERS[kind](sim, side)
-    sim.advance(20)
+    convergence.advance(sim, 20)
     return sim
 
 
 def test_workloads_are_what_they_say():
     inner = 8 * 8 + 2 * 8 * 7
-    assert made("intact").joint_counts() == (inner, 0, 0)
-    intact, yielded, broken = made("yielded").joint_counts()
+    assert diagnostics.joint_counts(made("intact")) == (inner, 0, 0)
+    intact, yielded, broken = diagnostics.joint_counts(made("yielded"))
     assert yielded > 0.9 * inner and broken == 0
     pairs = made("pairs")
-    assert int(pairs.local.pairs.touching.sum()) == 64 and len(pairs.contacts()["x"]) == 64
+    assert int(pairs.local.pairs.touching.sum()) == 64 and len(diagnostics.contacts(pairs)["x"]) == 64
     shattered = made("shattered")
-    assert shattered.joint_counts() == (0, 0, 0)
+    assert diagnostics.joint_counts(shattered) == (0, 0, 0)
     assert int(shattered.local.pairs.touching.sum()) > inner / 2
     quads = made("quads")
     assert len(quads.mesh.cells) == 64 and (quads.mesh.cells[:, 3] >= 0).all()
-    assert np.abs(quads.values("stress_xx")).max() > 1e3
+    assert np.abs(diagnostics.values(quads, "stress_xx")).max() > 1e3
     for work in blocks.WORKLOADS.values():
         assert work.kind in blocks.RATES and work.kind in blocks.MAKERS
 

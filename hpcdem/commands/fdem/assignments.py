@@ -11,6 +11,7 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 
@@ -29,7 +30,7 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     taken out come back, free of stress where their place is now; without a range these stay away."""
     blocks = project.ready()
     elements = chosen(project, ELEMENT, where, null_too=True)
-    blocks.element_model(elements, name, properties)
+    changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True
 
@@ -42,7 +43,7 @@ def null(project: Project, relax: float = 0.0, where: Range | None = None) -> No
     left[elements] = False
     if not left.any():
         raise CommandError("no element would be left")
-    blocks.null(elements, relax)
+    changes.null(blocks, elements, relax)
     project.alive = left
 
 
@@ -109,7 +110,7 @@ def initial_stress(
 
 def initial_velocity(project: Project, velocity: tuple[float, float], where: Range | None = None) -> None:
     """Velocity (2,) [m/s] of nodes now."""
-    project.ready().set_velocity(chosen(project, NODE, where), *velocity)
+    changes.set_velocity(project.ready(), chosen(project, NODE, where), *velocity)
 
 
 # ---- conditions ----------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem import convergence
 from hpcdem.physics.fdem import saved_state as of_blocks
 
 if TYPE_CHECKING:
@@ -164,7 +165,7 @@ def advance(project: Project, steps: int) -> int:
     so. Collective."""
     both, due = project.coupled, project.due
     if both is None or due is None:
-        return project.blocks.advance(steps)
+        return convergence.advance(project.blocks, steps)
     sim = both.particles
     assert project.progress is not None and sim.progress is not None
     last, request = sim.clock.step + steps, 0
@@ -233,7 +234,7 @@ def save(project: Project, path: Path, extra: dict[str, Any]) -> None:
         output.secure_series(project.coupled.particles)
         saved_state.save(project.coupled, path, extra)
     else:
-        project.blocks.save(path, extra)
+        of_blocks.save(project.blocks, path, extra)
 
 
 def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
@@ -249,9 +250,9 @@ def restore(project: Project, path: Path, begins: bool) -> dict[str, Any]:
             sim.energy.pause(sim)
         return of_both
     if not begins:
-        return project.blocks.restore(path)
+        return of_blocks.restore(project.blocks, path)
     found = of_blocks.restore_part(project.blocks, path)
     if found is None:
-        return project.blocks.restore(path)
+        return of_blocks.restore(project.blocks, path)
     project.continues = path
     return found

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.io.columns import append_rows
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.state import Crack
 
 NAME = "cracks.csv"
@@ -14,7 +15,7 @@ COLUMNS = {
     "length": "length [m]", "kinetic": "kinetic_energy [J/m]", "peak_step": "peak_step",
     "peak_kinetic": "peak_kinetic_energy [J/m]",
 }  # fmt: skip
-"""Names of `Blocks.events` and of the columns, in their order."""
+"""Names of `diagnostics.events` and of the columns, in their order."""
 
 
 def record(project: Project) -> None:
@@ -25,7 +26,7 @@ def record(project: Project) -> None:
 def flush(project: Project) -> None:
     """Add all that has broken so far. The file of another model goes, if this one has no joints. Collective."""
     if project.taken:
-        _write(project, project.blocks.crack_rows())
+        _write(project, diagnostics.crack_rows(project.blocks))
         if project.cracks_filed is None and project.folder_made and project.comm.rank == 0:
             (project.outdir / NAME).unlink(missing_ok=True)
 
@@ -37,7 +38,7 @@ def _write(project: Project, cracks: Sequence[Crack]) -> None:
         return
     with project.blocks.timers.around("output"):
         path = project.folder() / NAME
-        new = project.blocks.described(cracks[done or 0 :])
+        new = diagnostics.described(project.blocks, cracks[done or 0 :])
         table = zip(*(new[name].tolist() for name in COLUMNS), strict=True)
         rows = [",".join(map(repr, row)) for row in table]
         append_rows(path, ",".join(COLUMNS.values()), rows, 0 if done is None else None, project.comm)

@@ -18,10 +18,11 @@ from hpcdem.io.behind import Deliveries, under_way
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import face_points
-from hpcdem.physics.fdem.diagnostics import PROPERTIES
+from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT
-from hpcdem.physics.fdem.model import QUANTITIES, Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 
 def vtk(project: Project, name: str, every: int | None = None) -> None:
@@ -123,7 +124,7 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
     """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
     vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
-    columns = blocks.owned_values("corner", vectors)
+    columns = diagnostics.owned_values(blocks, "corner", vectors)
     columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
     return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
 
@@ -146,8 +147,10 @@ def frame(project: Project) -> MeshFrame:
     """What is written at this moment. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     corners = _corners(blocks)
-    elements = blocks.owned_values("element", _names(blocks, "element"))
-    joints = _with_cracks(blocks, elements["number"], blocks.owned_values("joint", _names(blocks, "joint")))
+    elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
+    joints = _with_cracks(
+        blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
+    )
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():

@@ -9,6 +9,7 @@ import numpy as np
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
@@ -139,7 +140,9 @@ def intersect(project: Project, layer: str, follow: bool = False) -> None:
         edges = mesh.edges()
         new = ~np.isin(crack_rows(cracked, edges), crack_rows(mesh, edges))
         joints = edges.faces[crack_rows(cracked, edges)[new]]
-        project.blocks.crack(joints[project.alive[joints // 4].all(axis=1), 0])  # others are, once they are back
+        changes.crack(
+            project.blocks, joints[project.alive[joints // 4].all(axis=1), 0]
+        )  # others are, once they are back
         project.mesh = cracked
     else:
         project.replace_mesh(cracked)

@@ -11,6 +11,7 @@ import numpy as np
 
 from hpcdem.commands.fdem.records import Chart, History
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.connectivity import Edges
 from hpcdem.physics.fdem.groups import ELEMENT, KINDS, NODE, Groups
 from hpcdem.physics.fdem.mesh import Mesh
@@ -20,7 +21,7 @@ from hpcdem.runtime import launch, run_folder
 if TYPE_CHECKING:
     from hpcdem.commands.dem.cycles import Due
     from hpcdem.physics.coupling.model import Coupled
-    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.simulation import Blocks
 
 
 class Project:
@@ -183,14 +184,14 @@ class Project:
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return mesh.points
-        return np.column_stack([self.blocks.values(f"position_{axis}") for axis in "xy"])
+        return np.column_stack([diagnostics.values(self.blocks, f"position_{axis}") for axis in "xy"])
 
     def corner_positions(self) -> np.ndarray:
         """(4 ne, 2) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, 2)
-        return self.blocks.corner_values("position")
+        return diagnostics.corner_values(self.blocks, "position")
 
     # ---- files ---------------------------------------------------------------------------------------------------
 

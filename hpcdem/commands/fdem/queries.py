@@ -6,6 +6,7 @@ import numpy as np
 
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import Range
 
 
@@ -16,14 +17,19 @@ def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarr
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
     """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
-    return project.ready(use=False).values(name, everything(project, kind, where))
+    return diagnostics.values(project.ready(use=False), name, everything(project, kind, where))
 
 
 def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
     """Exact sum of a quantity; of nodes over all corners there. Collective."""
-    return project.ready(use=False).total(name, everything(project, kind, where))
+    return diagnostics.total(project.ready(use=False), name, everything(project, kind, where))
+
+
+def energies(project: Project) -> dict[str, float]:
+    """The energy budget. Collective."""
+    return diagnostics.energies(project.blocks)
 
 
 def ratio(project: Project) -> float:
     """Unbalanced over all forces of the nodes. Collective."""
-    return project.ready(use=False).unbalanced_ratio()
+    return diagnostics.unbalanced_ratio(project.ready(use=False))

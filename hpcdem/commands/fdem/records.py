@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
-    from hpcdem.physics.fdem.model import Blocks
     from hpcdem.physics.fdem.probes import Probe
+    from hpcdem.physics.fdem.simulation import Blocks
 
 MODEL = "model"
 UNITS = {
@@ -38,17 +39,17 @@ _FORCES = ("reaction_x", "reaction_y")
 
 
 def _of_joints(kind: int) -> Callable[[Any], float]:
-    return lambda blocks: float(blocks.joint_counts()[kind])
+    return lambda blocks: float(diagnostics.joint_counts(blocks)[kind])
 
 
 def _energy(name: str) -> Callable[[Any], float]:
-    return lambda blocks: float(blocks.energies()[name])
+    return lambda blocks: float(diagnostics.energies(blocks)[name])
 
 
 _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "time": lambda blocks: float(blocks.clock.time),
     "cycle": lambda blocks: float(blocks.clock.step),
-    "ratio": lambda blocks: float(blocks.unbalanced_ratio()),
+    "ratio": lambda blocks: float(diagnostics.unbalanced_ratio(blocks)),
     "intact_joints": _of_joints(0),
     "yielded_joints": _of_joints(1),
     "broken_joints": _of_joints(2),
@@ -120,7 +121,7 @@ class History:
 
     def _probe_of(self, blocks: Blocks) -> Probe:
         if self._probe is None or self._probe.sim is not blocks:
-            self._probe = blocks.probe(self.value, self.numbers)
+            self._probe = diagnostics.probe(blocks, self.value, self.numbers)
         return self._probe
 
     def measure(self, blocks: Any) -> float:

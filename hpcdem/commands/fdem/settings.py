@@ -6,6 +6,7 @@ from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
 
 
@@ -37,7 +38,7 @@ def option(
         needed = [name for name, history in project.histories.items() if history.value in ENERGIES]
         if not energy and needed:
             raise CommandError(f"history '{needed[0]}' follows the energy budget: history delete '{needed[0]}' first")
-        project.ready().account_energy(energy)
+        diagnostics.account_energy(project.ready(), energy)
 
 
 def time_step(
@@ -55,19 +56,19 @@ def time_step(
 
 def reset_velocity(project: Project) -> None:
     """All velocities become zero."""
-    project.ready().reset_velocity()
+    changes.reset_velocity(project.ready())
 
 
 def reset_displacement(project: Project) -> None:
     """Displacements are counted from here."""
-    project.ready().reset_displacement()
+    changes.reset_displacement(project.ready())
 
 
 def reset_elements(project: Project, where: Range | None = None) -> None:
     """Plastic states are forgotten."""
-    project.ready().reset_state(chosen(project, ELEMENT, where))
+    changes.reset_state(project.ready(), chosen(project, ELEMENT, where))
 
 
 def reset_joints(project: Project, where: Range | None = None) -> None:
     """Damage of joints is forgotten."""
-    project.ready().reset_joint_state(chosen(project, JOINT, where))
+    changes.reset_joint_state(project.ready(), chosen(project, JOINT, where))

@@ -12,12 +12,13 @@ from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, historie
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.io.behind import under_way
+from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.simulation import Blocks
 
 LOOK_STATIC, LOOK_DYNAMIC = 50, 100
 """Steps between two looks at the ratio, counted from the beginning of the command."""
@@ -60,7 +61,7 @@ def solve(
     """Steps until the unbalanced forces are so small, so many are done, or so much time [s] has passed: whatever comes
     first. Without any of them: until the ratio is RATIO.
 
-    window, limit [steps]: when a run towards a ratio has failed, see `Blocks.watch`; it ends the script with an
+    window, limit [steps]: when a run towards a ratio has failed, see `convergence.watch`; it ends the script with an
     EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
     """
     command = "solve", {"ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit,
@@ -87,13 +88,13 @@ def solve(
 
 
 def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto") -> None:
-    """Static equilibrium at once, see `Blocks.solve_elastic`; the histories and frames that are due then."""
+    """Static equilibrium at once, see `equilibrium.solve_elastic`; the histories and frames that are due then."""
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
     blocks = project.ready()
     began = clocks.monotonic()
     given = {} if ratio is None else {"ratio": ratio}
-    found = blocks.solve_elastic(cycles=cycles, solver=solver, **given)
+    found = equilibrium.solve_elastic(blocks, cycles=cycles, solver=solver, **given)
     project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
     if project.log is not None:
         where = f"line {project.line}: " if project.line else ""
@@ -125,7 +126,7 @@ def _run(
         project.progress = {"first": clock.step, "end": end, "command": command}
         if ratio is not None:
             ends = steps is not None or time is not None
-            project.progress["watch"] = asdict(project.blocks.watch(window, limit, ends))
+            project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
     first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
     alone = steps if ratio is None and time is None else None  # the number of steps, if it is known
     try:
@@ -172,8 +173,8 @@ def _advance(
         cracks.record(project)
         frames.write_due(project)
         if ratio is not None and ((clock.step - first) % look == 0 or clock.step == last):
-            found = blocks.unbalanced_ratio()
-            reason = "ratio" if found <= ratio else watch.failed(clock.step, found, blocks.joint_counts()[2])
+            found = diagnostics.unbalanced_ratio(blocks)
+            reason = "ratio" if found <= ratio else watch.failed(clock.step, found, diagnostics.joint_counts(blocks)[2])
             done = progress.get("done", False) or bool(reason)
             progress.update(watch=asdict(watch), done=done, ended=[reason, found])
         report.tell(blocks)
@@ -207,7 +208,7 @@ def _no_equilibrium(project: Project, watch: Watch, reason: str, ratio: float, f
 
 def _what_moves(project: Project) -> str:
     """The body that slides away, or that there is none. Collective."""
-    body = project.blocks.sliding_body()
+    body = convergence.sliding_body(project.blocks)
     if body is None:
         return "no body slides away: joints may go on to yield, loads to change, or rounding allows no better balance"
     return f"{body} {'m/s' if project.dynamic else 'm per step'}: hold it, or give it time to come to rest (window)"
@@ -303,10 +304,10 @@ class _Report:
 
     def _state(self, blocks: Blocks) -> str:
         clock = blocks.clock
-        intact, yielded, broken = blocks.joint_counts()
+        intact, yielded, broken = diagnostics.joint_counts(blocks)
         joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
         time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
-        return f"step {clock.step}{time} | ratio {blocks.unbalanced_ratio():.3g}{joints}"
+        return f"step {clock.step}{time} | ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"
 
     def finish(self, blocks: Blocks) -> None:
         """Collective: how it ended."""

@@ -9,6 +9,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
+from hpcdem.physics.fdem import diagnostics
 
 ENERGY_WORDS = {
     "kinetic": "stored: motion",
@@ -41,7 +42,7 @@ def close(project: Project, figure: bool = True) -> None:
     if log is None or not (blocks.timers.steps or (both is not None and both.particles.timers.steps)):
         return
     if blocks.budget is not None:
-        energies = blocks.energies()
+        energies = diagnostics.energies(blocks)
         rows = [
             (text, f"{energies[name]:.6g}")
             for name, text in ENERGY_WORDS.items()

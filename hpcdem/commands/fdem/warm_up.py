@@ -11,7 +11,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import saved_state
 from hpcdem.physics.fdem import warm_up as physics
 from hpcdem.physics.fdem.groups import OnLayer
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 
 def warm_up(threads: int = 1) -> None:

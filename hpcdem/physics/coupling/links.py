@@ -23,7 +23,7 @@ from hpcdem.physics.coupling.kernels.disc_faces import ENDS, SCRATCH
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.kernels.elements import FORCE
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 TO_DISCS, TO_FACES = 41, 42
 """Tags of messages."""

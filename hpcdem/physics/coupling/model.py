@@ -29,7 +29,8 @@ from hpcdem.physics.dem.kernels import laws, motion
 from hpcdem.physics.dem.kernels.neighbours import NO_ROWS
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem import build
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem import diagnostics as of_blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 __all__ = ["Coupled"]
 
@@ -494,7 +495,7 @@ class Coupled:
         found = {"work_on_particles": discs, "work_on_blocks": faces, "stored": stored, "stored_before": before}
         found["lost"] = -(discs + faces) - (stored - before)
         if self.particles.energy is not None and self.blocks.budget is not None:
-            one, other = self.particles.energy.look(self.particles), self.blocks.energies()
+            one, other = self.particles.energy.look(self.particles), of_blocks.energies(self.blocks)
             found["closing"] = one.closing + other["closing"]
             flows = [abs(v) for name, v in vars(one).items() if name not in ("closing", "relative")]
             flows += [abs(v) for name, v in other.items() if name not in ("closing", "relative")]

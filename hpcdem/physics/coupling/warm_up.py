@@ -10,8 +10,9 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.simulation import Simulation
+from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
 
 
@@ -19,7 +20,7 @@ def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     blocks = Blocks(SerialComm(), threads)
     blocks.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, 3)]))
-    blocks.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(blocks, None, "mech_iso_elastic", ROCK)
     sim = Simulation(SerialComm(), threads, Path("."))
     sim.settings.dt = sim.clock.dt = 1e-6
     sim.settings.disk = "on"

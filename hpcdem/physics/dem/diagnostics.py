@@ -1,4 +1,4 @@
-"""Looking at a simulation without touching it: contacts, wall forces, energy, critical time step, frames.
+"""What can be asked of a simulation, which stays as it is: contacts, wall forces, energy, critical time step, frames.
 
 Sums that are written to files are exact (order-free), so that files do not depend on the rank count.
 """

@@ -15,7 +15,7 @@ from hpcdem.numerics.exact_sum import exact_sum, from_integer
 from hpcdem.physics.fdem.kernels import energy
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.simulation import Core
+    from hpcdem.physics.fdem.simulation import Blocks
 
 STORED = ("kinetic", "strain", "joints")
 WORK = ("joints", "contact", "viscous", "gravity", "outside")
@@ -41,14 +41,14 @@ class Budget:
 
     # ---- called by the step ----------------------------------------------------------------------------------------
 
-    def before_forces(self, sim: Core) -> None:
+    def before_forces(self, sim: Blocks) -> None:
         """A step begins: take up the account again after an interruption; keep the velocities. Collective."""
         if not self.running:
             self._begin(sim)
         with sim.timers("energy"):
             self._before = sim.v.copy()
 
-    def after_forces(self, sim: Core) -> None:
+    def after_forces(self, sim: Blocks) -> None:
         """Velocities are new, positions still old: book the work of this moment's forces."""
         local, pairs = sim.local, sim.local.pairs
         with sim.timers("energy"):
@@ -59,7 +59,7 @@ class Budget:
 
     # ---- interruptions ---------------------------------------------------------------------------------------------
 
-    def _begin(self, sim: Core) -> None:
+    def _begin(self, sim: Blocks) -> None:
         stored, half = self._read(sim)
         if self.start is None:
             self.start = stored
@@ -71,7 +71,7 @@ class Budget:
         sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
         self.running = True
 
-    def pause(self, sim: Core) -> None:
+    def pause(self, sim: Blocks) -> None:
         """A command is about to change the model: bring the account to the whole step. Collective."""
         if not self.running:
             return
@@ -84,8 +84,8 @@ class Budget:
 
     # ---- readings --------------------------------------------------------------------------------------------------
 
-    def reading(self, sim: Core) -> dict[str, float]:
-        """The budget now, see `Looking.energies`. Collective."""
+    def reading(self, sim: Blocks) -> dict[str, float]:
+        """The budget now, see `diagnostics.energies`. Collective."""
         stored, half = self._read(sim) if self.running else (dict(self.left), dict.fromkeys(WORK, 0.0))
         if self.start is None:
             stored, _ = self._read(sim)
@@ -124,15 +124,15 @@ class Budget:
         exact_sum.as_integer."""
         self.discs += work
 
-    def _of_discs(self, sim: Core) -> float:
+    def _of_discs(self, sim: Blocks) -> float:
         return from_integer(sum(sim.comm.allgather(self.discs)))
 
-    def _done(self, sim: Core) -> dict[str, float]:
+    def _done(self, sim: Blocks) -> dict[str, float]:
         """Work booked in the columns of the elements, summed over the model."""
         columns = sim.cold["work"]
         return {name: exact_sum(columns[:, k], sim.comm) for k, name in enumerate(WORK)}
 
-    def _read(self, sim: Core) -> tuple[dict[str, float], dict[str, float]]:
+    def _read(self, sim: Blocks) -> tuple[dict[str, float], dict[str, float]]:
         """What is stored at the present step, and the first half of the work of this moment's forces."""
         seen, local = sim.evaluate(), sim.local
         with sim.timers("energy"):
@@ -149,7 +149,7 @@ class Budget:
 
     @staticmethod
     def _book(
-        sim: Core, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray,
+        sim: Blocks, before: np.ndarray, after: np.ndarray, a: float, b: float, of_joints: np.ndarray,
         pushed: np.ndarray, felt: np.ndarray, outside: np.ndarray, work: np.ndarray,
     ) -> None:  # fmt: skip
         local, o, dt = sim.local, sim.options, sim.clock.dt
@@ -166,7 +166,7 @@ class Budget:
 
     # ---- state on disk ---------------------------------------------------------------------------------------------
 
-    def state(self, sim: Core) -> dict[str, Any]:
+    def state(self, sim: Blocks) -> dict[str, Any]:
         """As JSON values; the columns of the elements are saved with them. Collective."""
         return {
             "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,

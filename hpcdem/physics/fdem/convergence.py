@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import connectivity
-from hpcdem.physics.fdem.changes import Changing
+from hpcdem.physics.fdem import connectivity, diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
 
 RATIO = 1e-5
 """Balance at which a model counts as being at rest, if nothing else is asked for."""
@@ -29,7 +29,7 @@ LIMIT_STATIC, LIMIT_DYNAMIC = 1_000_000, 10_000_000
 
 @dataclass(frozen=True)
 class Solved:
-    """How `Blocks.solve` ended. ratio: unbalanced over contributing forces at the last look, NaN if nobody looked;
+    """How `solve` ended. ratio: unbalanced over contributing forces at the last look, NaN if nobody looked;
     reason: "ratio", "cycles", "time", "request" (a signal or limit asked to stop); without equilibrium "no progress" or
     "limit", see `Watch`."""
 
@@ -89,107 +89,108 @@ class Moving:
         )
 
 
-class Solving(Changing):
-    """Commands of `Blocks` that step. All collective."""
+def advance(sim: Blocks, steps: int) -> int:
+    """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
+    if steps < 0:
+        raise CommandError(f"the number of steps must not be negative, got {steps}")
+    request = done = 0
+    while done < steps and not request:
+        request = sim.step()
+        done += 1
+    sim.timers.count(done, len(sim.number[sim.owned]))
+    return request
 
-    def advance(self, steps: int) -> int:
-        """Up to `steps` steps; ends early if the outside asks for something, and returns that (0: nothing)."""
-        if steps < 0:
-            raise CommandError(f"the number of steps must not be negative, got {steps}")
-        request = done = 0
-        while done < steps and not request:
-            request = self.step()
-            done += 1
-        self.timers.count(done, len(self.number[self.owned]))
-        return request
 
-    def solve(
-        self,
-        ratio: float | None = None,
-        cycles: int | None = None,
-        time: float | None = None,
-        every: int = EVERY,
-        window: int | None = None,
-        limit: int | None = None,
-    ) -> Solved:
-        """Step until the sum of unbalanced over the sum of contributing nodal forces falls below `ratio` (1e-5 if none
-        of the three is given), or after so many steps, or so much model time [s], whatever comes first.
+def solve(
+    sim: Blocks,
+    ratio: float | None = None,
+    cycles: int | None = None,
+    time: float | None = None,
+    every: int = EVERY,
+    window: int | None = None,
+    limit: int | None = None,
+) -> Solved:
+    """Step until the sum of unbalanced over the sum of contributing nodal forces falls below `ratio` (1e-5 if none
+    of the three is given), or after so many steps, or so much model time [s], whatever comes first.
 
-        every: steps between two looks at the ratio. window, limit: see `watch`; they end the run without equilibrium.
-        """
-        if ratio is None and cycles is None and time is None:
-            ratio = RATIO
-        given = {"ratio": ratio, "cycles": cycles, "time": time, "every": every}
-        for name, value in given.items():
-            if value is not None and not value > 0:
-                raise CommandError(f"{name} must be positive, got {value}")
-        if time is not None and not self.options.dynamic:
-            raise CommandError("time does not pass in static mode: use cycles or ratio")
-        self.close_model()
-        clock = self.clock
-        watch = self.watch(window, limit, ends=cycles is not None or time is not None)
-        end = math.inf if time is None else clock.time + time
-        done, found = 0, math.nan
-        while (cycles is None or done < cycles) and clock.time < end - 0.5 * clock.dt:
-            request = self.step()
-            self.close_model()
-            done += 1
-            self.timers.count(1, len(self.number[self.owned]))
-            if request:
-                return Solved(done, found, "request", request)
-            if ratio is not None and (done % every == 0 or done == cycles):
-                found = self.unbalanced_ratio()
-                why = "ratio" if found < ratio else watch.failed(clock.step, found, self.joint_counts()[2])
-                if why:
-                    return Solved(done, found, why)
-        return Solved(done, found, "cycles" if cycles is not None and done >= cycles else "time")
+    every: steps between two looks at the ratio. window, limit: see `watch`; they end the run without equilibrium.
+    """
+    if ratio is None and cycles is None and time is None:
+        ratio = RATIO
+    given = {"ratio": ratio, "cycles": cycles, "time": time, "every": every}
+    for name, value in given.items():
+        if value is not None and not value > 0:
+            raise CommandError(f"{name} must be positive, got {value}")
+    if time is not None and not sim.options.dynamic:
+        raise CommandError("time does not pass in static mode: use cycles or ratio")
+    sim.close_model()
+    clock = sim.clock
+    watched = watch(sim, window, limit, ends=cycles is not None or time is not None)
+    end = math.inf if time is None else clock.time + time
+    done, found = 0, math.nan
+    while (cycles is None or done < cycles) and clock.time < end - 0.5 * clock.dt:
+        request = sim.step()
+        sim.close_model()
+        done += 1
+        sim.timers.count(1, len(sim.number[sim.owned]))
+        if request:
+            return Solved(done, found, "request", request)
+        if ratio is not None and (done % every == 0 or done == cycles):
+            found = diagnostics.unbalanced_ratio(sim)
+            why = "ratio" if found < ratio else watched.failed(clock.step, found, diagnostics.joint_counts(sim)[2])
+            if why:
+                return Solved(done, found, why)
+    return Solved(done, found, "cycles" if cycles is not None and done >= cycles else "time")
 
-    def watch(self, window: int | None = None, limit: int | None = None, ends: bool = False) -> Watch:
-        """A watch over a run towards a ratio that begins now. window, limit [steps]; 0: none; None: what is usual.
 
-        ends: the run ends by itself, so that usually there is neither. Otherwise the limit is 1 000 000 static or
-        10 000 000 dynamic steps, and the window of static runs ten times as long as a wave takes there and back, at
-        least 20 000 steps; waves in motion die down as slowly as their damping is low, so there is none in dynamic
-        runs."""
-        for name, value in (("window", window), ("limit", limit)):
-            if value is not None and value < 0:
-                raise CommandError(f"{name} must not be negative, got {value}")
-        static = not self.options.dynamic
-        if window is None:
-            window = 0 if ends or not static else max(WINDOW, math.ceil(CROSSINGS * self._crossing()))
-        if limit is None:
-            limit = 0 if ends else LIMIT_STATIC if static else LIMIT_DYNAMIC
-        return Watch(window, limit, self.clock.step)
+def watch(sim: Blocks, window: int | None = None, limit: int | None = None, ends: bool = False) -> Watch:
+    """A watch over a run towards a ratio that begins now. window, limit [steps]; 0: none; None: what is usual.
 
-    def _crossing(self) -> float:
-        """About how many static steps a wave takes through the model and back, twice: 4 n sqrt(1 + P / E), n: edges
-        along it; masses are those of the stiffest part, joints with the penalty P."""
-        size = float(np.ptp(self.the_mesh().points, axis=0).max())
-        tied = self.joint_row[self.closed_faces()]
-        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
-        penalty = np.max([self.joint_rows.column(name) for name in names], axis=0)[tied].max(initial=0.0)
-        young = np.array(self.element_rows.column("young"))[self.element_row[self.alive]].min()
-        return 4.0 * size / self._mean_edge * math.sqrt(1.0 + penalty / young)
+    ends: the run ends by itself, so that usually there is neither. Otherwise the limit is 1 000 000 static or
+    10 000 000 dynamic steps, and the window of static runs ten times as long as a wave takes there and back, at
+    least 20 000 steps; waves in motion die down as slowly as their damping is low, so there is none in dynamic
+    runs."""
+    for name, value in (("window", window), ("limit", limit)):
+        if value is not None and value < 0:
+            raise CommandError(f"{name} must not be negative, got {value}")
+    static = not sim.options.dynamic
+    if window is None:
+        window = 0 if ends or not static else max(WINDOW, math.ceil(CROSSINGS * _crossing(sim)))
+    if limit is None:
+        limit = 0 if ends else LIMIT_STATIC if static else LIMIT_DYNAMIC
+    return Watch(window, limit, sim.clock.step)
 
-    def sliding_body(self) -> Moving | None:
-        """The fastest body, if it slides or falls as a whole: all its corners move, and it would go more than rounding
-        (1e-6 of an edge in 10 000 steps). Equal on all ranks. Collective."""
-        hold = np.where(self.closed_faces() & np.repeat(self.alive, 4), self.partner, -1)
-        of_elements = connectivity.bodies(hold)
-        names = [f"{name}_{axis}" for name in ("position", "velocity") for axis in "xy"]
-        mine = self.owned_values("corner", names)
-        rows = np.concatenate(self.comm.allgather(np.column_stack(list(mine.values()))))
-        rows = rows[np.argsort(rows[:, 0])]
-        element = rows[:, 0].astype(np.int64) // 4
-        _, body = np.unique(of_elements[element], return_inverse=True)
-        count = np.bincount(body)
-        x, y, vx, vy = (np.bincount(body, column) / count for column in rows[:, 1:].T)
-        least = np.full(len(count), math.inf)
-        np.minimum.at(least, body, np.hypot(rows[:, 3], rows[:, 4]))
-        speed = np.hypot(vx, vy)
-        speed[(least < SLIDES * speed) | (1e4 * speed * self.clock.dt < 1e-6 * self._mean_edge)] = 0.0
-        k = int(speed.argmax())
-        if speed[k] == 0.0:
-            return None
-        members = np.unique(element[body == k])
-        return Moving(len(members), int(members[0]), float(x[k]), float(y[k]), float(vx[k]), float(vy[k]))
+
+def _crossing(sim: Blocks) -> float:
+    """About how many static steps a wave takes through the model and back, twice: 4 n sqrt(1 + P / E), n: edges
+    along it; masses are those of the stiffest part, joints with the penalty P."""
+    size = float(np.ptp(sim.the_mesh().points, axis=0).max())
+    tied = sim.joint_row[sim.closed_faces()]
+    names = ("penalty_normal", "penalty_overlay", "penalty_shear")
+    penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[tied].max(initial=0.0)
+    young = np.array(sim.element_rows.column("young"))[sim.element_row[sim.alive]].min()
+    return 4.0 * size / sim.mean_edge * math.sqrt(1.0 + penalty / young)
+
+
+def sliding_body(sim: Blocks) -> Moving | None:
+    """The fastest body, if it slides or falls as a whole: all its corners move, and it would go more than rounding
+    (1e-6 of an edge in 10 000 steps). Equal on all ranks. Collective."""
+    hold = np.where(sim.closed_faces() & np.repeat(sim.alive, 4), sim.partner, -1)
+    of_elements = connectivity.bodies(hold)
+    names = [f"{name}_{axis}" for name in ("position", "velocity") for axis in "xy"]
+    mine = diagnostics.owned_values(sim, "corner", names)
+    rows = np.concatenate(sim.comm.allgather(np.column_stack(list(mine.values()))))
+    rows = rows[np.argsort(rows[:, 0])]
+    element = rows[:, 0].astype(np.int64) // 4
+    _, body = np.unique(of_elements[element], return_inverse=True)
+    count = np.bincount(body)
+    x, y, vx, vy = (np.bincount(body, column) / count for column in rows[:, 1:].T)
+    least = np.full(len(count), math.inf)
+    np.minimum.at(least, body, np.hypot(rows[:, 3], rows[:, 4]))
+    speed = np.hypot(vx, vy)
+    speed[(least < SLIDES * speed) | (1e4 * speed * sim.clock.dt < 1e-6 * sim.mean_edge)] = 0.0
+    k = int(speed.argmax())
+    if speed[k] == 0.0:
+        return None
+    members = np.unique(element[body == k])
+    return Moving(len(members), int(members[0]), float(x[k]), float(y[k]), float(vx[k]), float(vy[k]))

@@ -142,10 +142,10 @@ class ModelDefinition:
 
     # What the simulation does when something has changed.
 
-    def _before_change(self) -> None:
+    def before_change(self) -> None:
         """Assignments are about to change."""
 
-    def _changed(self, topology: bool = False, stiffness: bool = True) -> None:
+    def changed(self, topology: bool = False, stiffness: bool = True) -> None:
         """Assignments have changed; topology: also who hangs together with whom; stiffness: perhaps the stable time
         step too."""
 
@@ -158,11 +158,11 @@ class ModelDefinition:
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
-        return self._numbers(elements, self.alive, "element")
+        return self.existing(elements, self.alive, "element")
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
-        return self._numbers(nodes, self.node_exists(), "node")
+        return self.existing(nodes, self.node_exists(), "node")
 
     def node_exists(self) -> np.ndarray:
         """(np,) bool."""
@@ -173,11 +173,11 @@ class ModelDefinition:
 
     def numbers_of_faces(self, faces: Any) -> np.ndarray:
         """Checked face numbers; None: all faces of elements that are there."""
-        return self._numbers(faces, self.face_exists(), "face")
+        return self.existing(faces, self.face_exists(), "face")
 
     def numbers_of_joints(self, joints: Any) -> np.ndarray:
         """Checked numbers of inner edges (lower faces); None: all between elements that are there."""
-        return self._numbers(joints, self.joint_exists(), "joint (the lower face of an inner edge)")
+        return self.existing(joints, self.joint_exists(), "joint (the lower face of an inner edge)")
 
     def joint_exists(self) -> np.ndarray:
         """(4 ne,) bool: lower faces of edges between elements that are there."""
@@ -192,7 +192,7 @@ class ModelDefinition:
         exists[3::4] &= self._mesh().cells[:, 3] >= 0
         return exists
 
-    def _numbers(self, given: Any, there: np.ndarray, what: str) -> np.ndarray:
+    def existing(self, given: Any, there: np.ndarray, what: str) -> np.ndarray:
         self._mesh()
         if given is None:
             return np.flatnonzero(there)
@@ -227,9 +227,9 @@ class ModelDefinition:
         self.partner = connectivity.face_partners(mesh.cells, len(mesh.points))
         if len(mesh.cracks):
             rows = meshes.crack_rows(mesh, mesh.edges())
-            self._open_faces(mesh.edges().faces[rows, 0])
+            self.open_faces(mesh.edges().faces[rows, 0])
 
-    def _open_faces(self, lower: np.ndarray) -> None:
+    def open_faces(self, lower: np.ndarray) -> None:
         for faces in (lower, self.partner[lower]):
             self.open[faces] = True
             if self._closed is not None:
@@ -266,7 +266,7 @@ class ModelDefinition:
 
     # ---- models --------------------------------------------------------------------------------------------------
 
-    def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+    def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
@@ -318,9 +318,9 @@ class ModelDefinition:
         """Give objects a model. columns: where the row of each object goes, as (array, places (n,)) in turn."""
         model = properties.model(name, on)
         all_of_them = np.arange(len(of))
-        made = [(all_of_them, model, self._complete(on, of, model, {}, given))]
+        made = [(all_of_them, model, self.complete(on, of, model, {}, given))]
         self._put_rows(rows, columns, made, on, given, all_of_them)
-        self._changed(topology)
+        self.changed(topology)
 
     def _adjust(
         self, rows: Rows, columns: Sequence[np.ndarray], of: np.ndarray, on: str, given: Mapping[str, Value],
@@ -344,9 +344,9 @@ class ModelDefinition:
         for name in np.unique(names).tolist():
             at, model = np.flatnonzero(names == name), properties.MODELS[name]
             before = {p.name: rows.column(p.name)[old[at]] for p in model.properties}
-            made.append((at, model, self._complete(on, of[at], model, before, given, keep)))
+            made.append((at, model, self.complete(on, of[at], model, before, given, keep)))
         self._put_rows(rows, columns, made, on, given, which)
-        self._changed()
+        self.changed()
 
     def _put_rows(
         self, rows: Rows, columns: Sequence[np.ndarray], made: Sequence[tuple[np.ndarray, Model, np.ndarray]], on: str,
@@ -354,7 +354,7 @@ class ModelDefinition:
     ) -> None:  # fmt: skip
         """Make rows of complete sets of properties, (1, k) for all of these places or one for each, and give each
         object the one at the place `which` (n,)."""
-        self._before_change()
+        self.before_change()
         number = np.zeros(sum(len(at) for at, *_ in made), np.int32)
         for at, model, values in made:
             number[at] = rows.numbers(model, values)
@@ -364,7 +364,7 @@ class ModelDefinition:
             if isinstance(value, (Over, Drawn)) and [on, name] not in self.varied:
                 self.varied.append([on, name])
 
-    def _complete(
+    def complete(
         self, on: str, of: np.ndarray, model: Model, before: Mapping[str, np.ndarray], given: Mapping[str, Value],
         keep: Callable[[dict[str, Any], Mapping[str, Any]], dict[str, Any]] | None = None,
     ) -> np.ndarray:  # fmt: skip
@@ -427,18 +427,18 @@ class ModelDefinition:
         at = self.numbers_of_elements(elements)
         mesh = self._mesh()
         names = ("xx", "yy", "xy", "zz")
-        values = np.tile(_finite("initial stress", [xx, yy, xy, zz]), (len(at), 1))
+        values = np.tile(finite("initial stress", [xx, yy, xy, zz]), (len(at), 1))
         for name, slope in (gradient or {}).items():
             if name not in names:
                 raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
             centre = connectivity.centroids(mesh.points, mesh.cells[at])
-            values[:, names.index(name)] += centre @ _finite(f"gradient of {name}", list(slope))
-        self._before_change()
+            values[:, names.index(name)] += centre @ finite(f"gradient of {name}", list(slope))
+        self.before_change()
         if self.stress0 is None:
             self.stress0 = np.zeros((len(mesh.cells), 4))
         self.stress0[at] = values
         self.stress0_row[at] = self.element_row[at]
-        self._changed()
+        self.changed()
 
     def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
         """Stress [Pa] (n, 4) xx, yy, xy, zz of elements (n,) at zero strain, by their present moduli.
@@ -466,9 +466,9 @@ class ModelDefinition:
     def table(self, name: str, pairs: Sequence[tuple[float, float]]) -> None:
         """Make or replace a table of (time [s], value)."""
         made = Table.of(pairs, name)
-        self._before_change()
+        self.before_change()
         self.tables[name] = made
-        self._changed(stiffness=False)
+        self.changed(stiffness=False)
 
     def remove_table(self, name: str) -> None:
         """Delete a table; CommandError while a condition uses it."""
@@ -497,7 +497,7 @@ class ModelDefinition:
                 known = ", ".join(f"'{n}'" for n in self.tables) or "none"
                 raise CommandError(f"{what}: there is no table '{value}' (tables: {known})")
             return value
-        return float(_finite(what, [value])[0])
+        return float(finite(what, [value])[0])
 
     def velocity_condition(
         self,
@@ -537,7 +537,7 @@ class ModelDefinition:
             raise CommandError(f"a move constraint is 0 (free), 1 (fixed) or 2 (along a vector), got {kind}")
         way = (0.0, 0.0)
         if kind == moving.ALONG:
-            x, y = _finite("direction", list(direction)).tolist()
+            x, y = finite("direction", list(direction)).tolist()
             if x == 0.0 == y:
                 raise CommandError("a move constraint along a vector needs a vector that is not zero")
             way = (x / math.hypot(x, y), y / math.hypot(x, y))
@@ -545,9 +545,9 @@ class ModelDefinition:
 
     def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
         at = self.numbers_of_nodes(nodes)
-        self._before_change()
+        self.before_change()
         self._change_rows(self.conditions, self.point_row, at, changes)
-        self._changed(stiffness=False)
+        self.changed(stiffness=False)
 
     def stress_condition(
         self,
@@ -564,9 +564,9 @@ class ModelDefinition:
         if not changes:
             raise CommandError("a stress condition needs a stress")
         at = self.numbers_of_faces(faces)
-        self._before_change()
+        self.before_change()
         self._change_rows(self.loads, self.load_row, at, changes)
-        self._changed(stiffness=False)
+        self.changed(stiffness=False)
 
     @staticmethod
     def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
@@ -581,22 +581,22 @@ class ModelDefinition:
         """Take back velocities, accelerations, forces and constraints of nodes; None: of all, those too that have no
         element at this moment."""
         at = np.arange(len(self._mesh().points)) if nodes is None else self.numbers_of_nodes(nodes)
-        self._before_change()
+        self.before_change()
         self.point_row[at] = 0
-        self._changed(stiffness=False)
+        self.changed(stiffness=False)
 
     def remove_stress_conditions(self, faces: Numbers = None) -> None:
         """Take back tractions of faces."""
         at = self.numbers_of_faces(faces)
-        self._before_change()
+        self.before_change()
         self.load_row[at] = 0
-        self._changed(stiffness=False)
+        self.changed(stiffness=False)
 
     # ---- options -------------------------------------------------------------------------------------------------
 
     def gravity(self, gx: float, gy: float) -> None:
         """Acceleration of gravity [m/s2]."""
-        x, y = _finite("gravity", [gx, gy]).tolist()
+        x, y = finite("gravity", [gx, gy]).tolist()
         self._set(gx=x, gy=y)
 
     def option(
@@ -636,7 +636,7 @@ class ModelDefinition:
         changes: dict[str, Any] = {}
         for name, number in (("dt", value), ("mass_scaling", mass_scaling)):
             if number is not None:
-                changes[name] = float(_finite("a time step", [number])[0])
+                changes[name] = float(finite("a time step", [number])[0])
                 if changes[name] < 0.0:
                     raise CommandError(f"a time step must not be negative, got {number:g}")
         if safety is not None:
@@ -656,9 +656,9 @@ class ModelDefinition:
         self._set(**changes)
 
     def _set(self, **changes: Any) -> None:
-        self._before_change()
+        self.before_change()
         self.options = replace(self.options, **changes)
-        self._changed()
+        self.changed()
 
     # ---- tables of the kernels -----------------------------------------------------------------------------------
 
@@ -756,7 +756,7 @@ def _bounds(field: dict[str, Any]) -> dict[str, Any]:
     return {name: _OPEN[name] if value is None else value for name, value in field.items()}
 
 
-def _finite(what: str, values: list) -> np.ndarray:
+def finite(what: str, values: list) -> np.ndarray:
     try:
         numbers = np.array(values, np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""Looking at a model of blocks without touching it: quantities by number, forces, contacts, events, balance."""
+"""What can be asked of a model of blocks: quantities by number, forces, contacts, events, balance. Changes nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIE
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC
-from hpcdem.physics.fdem.simulation import Core
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 
 
@@ -67,7 +67,7 @@ QUANTITIES: dict[str, Quantity] = {
     },
     "length": Quantity("joint", "m", "length in the mesh"),
 }
-"""Names that `Blocks.values`, `Blocks.total` and frames know. With `element_` or `joint_` before they are means of
+"""Names that `values`, `total` and frames know. With `element_` or `joint_` before they are means of
 corners. The points of a joint go from the first corner of the face that it is numbered by to the last; the laws are
 evaluated there."""
 
@@ -91,361 +91,382 @@ _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
 _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for point in ("first", "middle", "last"))
 
 
-class Looking(Core):
-    """Commands of `Blocks` that only look."""
+def probe(sim: Blocks, name: str, numbers: Numbers = None) -> Probe:
+    """A quantity of these elements, nodes or joints (None: all), to be asked for again and again. CommandError if
+    there is no such quantity or number. Not collective."""
+    on = quantity(sim, name).on
+    some = numbers_on(sim, on, numbers)
+    if name.startswith(("reaction", "unbalanced")):
+        return ForceProbe(sim, name, some)
+    return _ColumnProbe(sim, name, on, some)
 
-    # ---- quantities ------------------------------------------------------------------------------------------------
 
-    def probe(self, name: str, numbers: Numbers = None) -> Probe:
-        """A quantity of these elements, nodes or joints (None: all), to be asked for again and again. CommandError if
-        there is no such quantity or number. Not collective."""
-        on = self.quantity(name).on
-        some = self.numbers_on(on, numbers)
+def values(sim: Blocks, name: str, numbers: Numbers = None) -> np.ndarray:
+    """A quantity of `QUANTITIES` for these elements, nodes or joints (None: all, in ascending order), on all ranks.
+
+    A node shows what the lowest of its corners has; forces are those of all its corners. NaN for what is not there
+    (null elements, edges without joint). Collective."""
+    return probe(sim, name, numbers).values()
+
+
+def total(sim: Blocks, name: str, numbers: Numbers = None) -> float:
+    """Exact sum of a quantity over elements, joints, or all corners of nodes (reaction_x: the whole support).
+    Collective."""
+    return probe(sim, name, numbers).total()
+
+
+def quantity(sim: Blocks, name: str) -> Quantity:
+    """The quantity of this name. CommandError if there is none. Not collective."""
+    if name not in QUANTITIES:
+        raise CommandError(f"there is no quantity {name}; there are {', '.join(QUANTITIES)}")
+    return QUANTITIES[name]
+
+
+def numbers_on(sim: Blocks, on: str, numbers: Numbers) -> np.ndarray:
+    """Checked numbers of elements, nodes or joints; None: all. Not collective."""
+    sizes = {"element": len(sim.alive), "node": len(sim.the_mesh().points), "joint": len(sim.partner)}
+    if numbers is not None:
+        asked = np.asarray(numbers, np.int64).reshape(-1)
+        there = sizes[on]
+        bad = asked[(asked < 0) | (asked >= there)]
+        if len(bad):
+            raise CommandError(f"there is no {on} {bad[0]}")
+        return asked
+    if on == "joint":
+        return np.flatnonzero(sim.partner > np.arange(len(sim.partner)))
+    return np.arange(sizes[on])
+
+
+def owned_values(sim: Blocks, on: str, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Columns of this rank's elements, nodes (by their lowest corner) or joints (by their lower face), with their
+    "number"; every number that is there is on one rank. on = "corner": position, displacement and velocity of every
+    corner by itself, by element * 4 + k. For files (io.slabs.to_slabs). Collective."""
+    sim.close_model()
+    for name in names:
+        belongs = quantity(sim, name).on
+        if belongs != on and not (on == "corner" and name.startswith(("position", "displacement", "velocity"))):
+            raise CommandError(f"{name} belongs to a {belongs}, not to a {on}")
+    made = _corner_columns(sim) if on == "corner" else columns_of(sim, on, names)
+    return {"number": made["number"], **{name: made[name] for name in names}}
+
+
+def columns_of(sim: Blocks, on: str, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Columns of some of this rank's elements (at: the how-manieth of the owned ones), nodes (points) or joints
+    (lower faces); at None: of all. With their "number", and perhaps more than was asked for. Collective, but for
+    single nodes and elements."""
+    made = {"element": _element_columns, "node": _node_columns, "joint": _joint_columns}
+    return made[on](sim, names, at)
+
+
+def rows_of(sim: Blocks, on: str, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of these numbers (n,) this rank has, and how `columns_of` calls them. Not collective."""
+    own = sim.owned
+    if on == "node":
+        lead = sim.local.leads[numbers]
+        row = np.where(lead >= 0, sim.where[lead // 4], -1)
+    elif on == "joint":
+        row = sim.where[numbers // 4]
+        row = np.where(sim.joint_exists()[numbers] & (sim.joint_row[numbers] > 0), row, -1)
+    else:
+        row = sim.where[numbers]
+    mine = np.flatnonzero((row >= own.start) & (row < own.stop))
+    return mine, row[mine] - own.start if on == "element" else numbers[mine]
+
+
+def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    mesh, own, local = sim.the_mesh(), sim.owned, sim.local
+    some = slice(None) if at is None else at
+    number = sim.number[own][some]
+    columns: dict[str, np.ndarray] = {"number": number.copy()}
+    wanted = set(names)
+    if wanted & {"stress_xx", "stress_yy", "stress_xy", "stress_zz", "stress_max", "stress_min", "strain_energy"}:
+        stress, energy = local.stresses(at, "strain_energy" in wanted)
+        for k, c in enumerate(("xx", "yy", "xy", "zz")):
+            columns[f"stress_{c}"] = stress[:, k].copy()
+        mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+        radius = np.hypot(half, stress[:, 2])
+        columns["stress_max"], columns["stress_min"] = mean + radius, mean - radius
+        columns["strain_energy"] = energy
+    if any(name.startswith(("element_", "kinetic")) for name in wanted):
+        x, v, real = sim.x[own][some], sim.v[own][some], mesh.cells[number] >= 0
+        n = real.sum(axis=1)
+        for axis, along in enumerate("xy"):
+            for name, rows in (("position", x), ("velocity", v)):
+                if f"element_{name}_{along}" in wanted:
+                    columns[f"element_{name}_{along}"] = _mean(_corners(rows, real)[:, :, axis], real, n)
+            if f"element_displacement_{along}" in wanted:
+                way = _corners(x, real)[:, :, axis] - homes(sim, at).reshape(-1, 4, 2)[:, :, axis]
+                columns[f"element_displacement_{along}"] = _mean(way, real, n)
+        if "kinetic_energy" in wanted:
+            v2 = (_corners(v, real) ** 2).sum(axis=2)
+            columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
+    for name in wanted & PROPERTIES["element"].keys():
+        columns[name] = sim.element_rows.column(name)[sim.element_row[number]]
+    columns["area"] = sim.areas[number]
+    columns["element_model"] = sim.element_row[number].astype(float)
+    return columns
+
+
+def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    own, lead = sim.owned, sim.local.leads
+    points = rows_of(sim, "node", np.arange(len(lead)))[1] if at is None else at
+    row, k = sim.where[lead[points] // 4], lead[points] % 4
+    columns: dict[str, np.ndarray] = {"number": points}
+    home = sim.cold.get("home")
+    for name in names:
+        kind, _, axis = name.rpartition("_")
+        c = 0 if axis == "x" else 1
         if name.startswith(("reaction", "unbalanced")):
-            return ForceProbe(self, name, some)
-        return _ColumnProbe(self, name, on, some)
-
-    def values(self, name: str, numbers: Numbers = None) -> np.ndarray:
-        """A quantity of `QUANTITIES` for these elements, nodes or joints (None: all, in ascending order), on all ranks.
-
-        A node shows what the lowest of its corners has; forces are those of all its corners. NaN for what is not there
-        (null elements, edges without joint). Collective."""
-        return self.probe(name, numbers).values()
-
-    def total(self, name: str, numbers: Numbers = None) -> float:
-        """Exact sum of a quantity over elements, joints, or all corners of nodes (reaction_x: the whole support).
-        Collective."""
-        return self.probe(name, numbers).total()
-
-    def quantity(self, name: str) -> Quantity:
-        """The quantity of this name. CommandError if there is none. Not collective."""
-        if name not in QUANTITIES:
-            raise CommandError(f"there is no quantity {name}; there are {', '.join(QUANTITIES)}")
-        return QUANTITIES[name]
-
-    def numbers_on(self, on: str, numbers: Numbers) -> np.ndarray:
-        """Checked numbers of elements, nodes or joints; None: all. Not collective."""
-        sizes = {"element": len(self.alive), "node": len(self.the_mesh().points), "joint": len(self.partner)}
-        if numbers is not None:
-            asked = np.asarray(numbers, np.int64).reshape(-1)
-            there = sizes[on]
-            bad = asked[(asked < 0) | (asked >= there)]
-            if len(bad):
-                raise CommandError(f"there is no {on} {bad[0]}")
-            return asked
-        if on == "joint":
-            return np.flatnonzero(self.partner > np.arange(len(self.partner)))
-        return np.arange(sizes[on])
-
-    def owned_values(self, on: str, names: Sequence[str]) -> dict[str, np.ndarray]:
-        """Columns of this rank's elements, nodes (by their lowest corner) or joints (by their lower face), with their
-        "number"; every number that is there is on one rank. on = "corner": position, displacement and velocity of every
-        corner by itself, by element * 4 + k. For files (io.slabs.to_slabs). Collective."""
-        self.close_model()
-        for name in names:
-            belongs = self.quantity(name).on
-            if belongs != on and not (on == "corner" and name.startswith(("position", "displacement", "velocity"))):
-                raise CommandError(f"{name} belongs to a {belongs}, not to a {on}")
-        made = self._corner_columns() if on == "corner" else self.columns_of(on, names)
-        return {"number": made["number"], **{name: made[name] for name in names}}
-
-    def columns_of(self, on: str, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        """Columns of some of this rank's elements (at: the how-manieth of the owned ones), nodes (points) or joints
-        (lower faces); at None: of all. With their "number", and perhaps more than was asked for. Collective, but for
-        single nodes and elements."""
-        made = {"element": self._element_columns, "node": self._node_columns, "joint": self._joint_columns}
-        return made[on](names, at)
-
-    def rows_of(self, on: str, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which of these numbers (n,) this rank has, and how `columns_of` calls them. Not collective."""
-        own = self.owned
-        if on == "node":
-            lead = self.local.leads[numbers]
-            row = np.where(lead >= 0, self.where[lead // 4], -1)
-        elif on == "joint":
-            row = self.where[numbers // 4]
-            row = np.where(self.joint_exists()[numbers] & (self.joint_row[numbers] > 0), row, -1)
+            columns[name] = _whole_point(sim, name, points)
+        elif kind == "velocity":
+            columns[name] = sim.v[row, 2 * k + c]
         else:
-            row = self.where[numbers]
-        mine = np.flatnonzero((row >= own.start) & (row < own.stop))
-        return mine, row[mine] - own.start if on == "element" else numbers[mine]
+            columns[name] = sim.x[row, 2 * k + c]
+            if kind == "displacement":
+                columns[name] -= sim.the_mesh().points[points, c] if home is None else home[row - own.start, 2 * k + c]
+    return columns
 
-    def _element_columns(self, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        mesh, own, local = self.the_mesh(), self.owned, self.local
-        some = slice(None) if at is None else at
-        number = self.number[own][some]
-        columns: dict[str, np.ndarray] = {"number": number.copy()}
-        wanted = set(names)
-        if wanted & {"stress_xx", "stress_yy", "stress_xy", "stress_zz", "stress_max", "stress_min", "strain_energy"}:
-            stress, energy = local.stresses(at, "strain_energy" in wanted)
-            for k, c in enumerate(("xx", "yy", "xy", "zz")):
-                columns[f"stress_{c}"] = stress[:, k].copy()
-            mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
-            radius = np.hypot(half, stress[:, 2])
-            columns["stress_max"], columns["stress_min"] = mean + radius, mean - radius
-            columns["strain_energy"] = energy
-        if any(name.startswith(("element_", "kinetic")) for name in wanted):
-            x, v, real = self.x[own][some], self.v[own][some], mesh.cells[number] >= 0
-            n = real.sum(axis=1)
-            for axis, along in enumerate("xy"):
-                for name, rows in (("position", x), ("velocity", v)):
-                    if f"element_{name}_{along}" in wanted:
-                        columns[f"element_{name}_{along}"] = _mean(_corners(rows, real)[:, :, axis], real, n)
-                if f"element_displacement_{along}" in wanted:
-                    way = _corners(x, real)[:, :, axis] - self.homes(at).reshape(-1, 4, 2)[:, :, axis]
-                    columns[f"element_displacement_{along}"] = _mean(way, real, n)
-            if "kinetic_energy" in wanted:
-                v2 = (_corners(v, real) ** 2).sum(axis=2)
-                columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
-        for name in wanted & PROPERTIES["element"].keys():
-            columns[name] = self.element_rows.column(name)[self.element_row[number]]
-        columns["area"] = self.areas[number]
-        columns["element_model"] = self.element_row[number].astype(float)
-        return columns
 
-    def _node_columns(self, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        own, lead = self.owned, self.local.leads
-        points = self.rows_of("node", np.arange(len(lead)))[1] if at is None else at
-        row, k = self.where[lead[points] // 4], lead[points] % 4
-        columns: dict[str, np.ndarray] = {"number": points}
-        home = self.cold.get("home")
-        for name in names:
-            kind, _, axis = name.rpartition("_")
-            c = 0 if axis == "x" else 1
-            if name.startswith(("reaction", "unbalanced")):
-                columns[name] = self._whole_point(name, points)
-            elif kind == "velocity":
-                columns[name] = self.v[row, 2 * k + c]
-            else:
-                columns[name] = self.x[row, 2 * k + c]
-                if kind == "displacement":
-                    columns[name] -= (
-                        self.the_mesh().points[points, c] if home is None else home[row - own.start, 2 * k + c]
-                    )
-        return columns
+def _corner_columns(sim: Blocks) -> dict[str, np.ndarray]:
+    own = sim.owned
+    number = sim.number[own]
+    real = sim.the_mesh().cells[number] >= 0
+    i, k = np.nonzero(real)
+    columns: dict[str, np.ndarray] = {"number": 4 * number[i] + k}
+    place, speed, home = _corners(sim.x[own], real), _corners(sim.v[own], real), homes(sim).reshape(-1, 4, 2)
+    for c, axis in enumerate("xy"):
+        columns[f"position_{axis}"] = place[i, k, c]
+        columns[f"displacement_{axis}"] = place[i, k, c] - home[i, k, c]
+        columns[f"velocity_{axis}"] = speed[i, k, c]
+    return columns
 
-    def _corner_columns(self) -> dict[str, np.ndarray]:
-        own = self.owned
-        number = self.number[own]
-        real = self.the_mesh().cells[number] >= 0
-        i, k = np.nonzero(real)
-        columns: dict[str, np.ndarray] = {"number": 4 * number[i] + k}
-        place, speed, homes = _corners(self.x[own], real), _corners(self.v[own], real), self.homes().reshape(-1, 4, 2)
+
+def corner_values(sim: Blocks, name: str, corners: np.ndarray | None = None) -> np.ndarray:
+    """(4 ne, 2) position [m], displacement [m] or velocity [m/s] of every corner (element * 4 + k), on all ranks;
+    NaN where there is none. corners: only these, NaN for the others. Collective."""
+    columns = owned_values(sim, "corner", [f"{name}_x", f"{name}_y"])
+    rows = np.column_stack([columns["number"].astype(float), columns[f"{name}_x"], columns[f"{name}_y"]])
+    if corners is not None:
+        rows = rows[np.isin(columns["number"], corners)]
+    out = np.full((len(sim.partner), 2), np.nan)
+    for part in sim.comm.allgather(rows) if sim.comm.size > 1 else [rows]:
+        out[part[:, 0].astype(np.int64)] = part[:, 1:]
+    return out
+
+
+def _whole_point(sim: Blocks, name: str, points: np.ndarray) -> np.ndarray:
+    """Force of all corners at these points, in the order of corners. Collective."""
+    every = np.arange(len(sim.the_mesh().points))
+    return probe(sim, name, every).values()[points]
+
+
+def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    mesh, local = sim.the_mesh(), sim.local
+    wanted = set(names)
+    lower = local.lower_faces if at is None else at
+    columns: dict[str, np.ndarray] = {"number": lower}
+    slot = local.slot_of(lower)
+    now = local.slot_state[slot]
+    broken = sim.broken[lower] > 0
+    columns["state"] = np.where(broken, float(BROKEN), now)
+    if wanted & {"mode", "break_time", "break_energy"}:
+        columns |= _last_events(sim, lower, broken | (now == BROKEN))
+    if "damage" in wanted:
+        damage = local.slot_history[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
+        columns["damage"] = np.where(broken, 1.0, damage)
+    held = np.flatnonzero(now != NONE)
+    if set(_MEANS) & wanted:
+        seen = np.full((len(lower), len(_MEANS)), np.nan)
+        seen[held] = local.joint_means(slot[held])
+        columns |= {name: seen[:, k].copy() for k, name in enumerate(_MEANS)}
+    if {*_AT_POINTS, "normal_stress_largest", "shear_stress_largest"} & wanted:
+        seen = np.full((len(lower), len(_AT_POINTS)), np.nan)
+        seen[held] = local.joint_points(slot[held])
+        columns |= {name: seen[:, k].copy() for k, name in enumerate(_AT_POINTS)}
+        columns["normal_stress_largest"] = seen[:, :3].max(axis=1)
+        columns["shear_stress_largest"] = np.abs(seen[:, 3:]).max(axis=1)
+    for name in PROPERTIES["joint"].keys() & wanted:
+        columns[name] = sim.joint_rows.column(PROPERTIES["joint"][name])[sim.joint_row[lower]]
+    if "length" in wanted:
+        ends = connectivity.face_points(mesh.cells, lower)
+        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
+        columns["length"] = np.hypot(way[:, 0], way[:, 1])
+    if {"joint_position_x", "joint_position_y"} & wanted:
+        row, k = sim.where[lower // 4], lower % 4
+        after = np.where(k + 1 < np.where(mesh.cells[lower // 4, 3] >= 0, 4, 3), k + 1, 0)
         for c, axis in enumerate("xy"):
-            columns[f"position_{axis}"] = place[i, k, c]
-            columns[f"displacement_{axis}"] = place[i, k, c] - homes[i, k, c]
-            columns[f"velocity_{axis}"] = speed[i, k, c]
-        return columns
+            columns[f"joint_position_{axis}"] = 0.5 * (sim.x[row, 2 * k + c] + sim.x[row, 2 * after + c])
+    return columns
 
-    def corner_values(self, name: str, corners: np.ndarray | None = None) -> np.ndarray:
-        """(4 ne, 2) position [m], displacement [m] or velocity [m/s] of every corner (element * 4 + k), on all ranks;
-        NaN where there is none. corners: only these, NaN for the others. Collective."""
-        columns = self.owned_values("corner", [f"{name}_x", f"{name}_y"])
-        rows = np.column_stack([columns["number"].astype(float), columns[f"{name}_x"], columns[f"{name}_y"]])
-        if corners is not None:
-            rows = rows[np.isin(columns["number"], corners)]
-        out = np.full((len(self.partner), 2), np.nan)
-        for part in self.comm.allgather(rows) if self.comm.size > 1 else [rows]:
-            out[part[:, 0].astype(np.int64)] = part[:, 1:]
-        return out
 
-    def _whole_point(self, name: str, points: np.ndarray) -> np.ndarray:
-        """Force of all corners at these points, in the order of corners. Collective."""
-        every = np.arange(len(self.the_mesh().points))
-        return self.probe(name, every).values()[points]
+def _last_events(sim: Blocks, lower: np.ndarray, broken: np.ndarray) -> dict[str, np.ndarray]:
+    """How, when and with what kinetic energy these joints broke; `broken`: those that are. Collective."""
+    rows = crack_rows(sim)
+    last = np.full(len(sim.partner), -1, np.int64)
+    last[[row.joint for row in rows]] = np.arange(len(rows))
+    event = np.where(broken, last[lower], -1)
+    table = np.array([(row.mode, row.time, row.kinetic) for row in rows] + [(0.0, np.nan, np.nan)])
+    return dict(zip(("mode", "break_time", "break_energy"), table[event].T.copy()))
 
-    def _joint_columns(self, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
-        mesh, local = self.the_mesh(), self.local
-        wanted = set(names)
-        lower = local.lower_faces if at is None else at
-        columns: dict[str, np.ndarray] = {"number": lower}
-        slot = local.slot_of(lower)
-        now = local.slot_state[slot]
-        broken = self.broken[lower] > 0
-        columns["state"] = np.where(broken, float(BROKEN), now)
-        if wanted & {"mode", "break_time", "break_energy"}:
-            columns |= self._last_events(lower, broken | (now == BROKEN))
-        if "damage" in wanted:
-            damage = local.slot_history[slot, DAMAGE : DAMAGE + 3].max(axis=1) if len(slot) else np.empty(0)
-            columns["damage"] = np.where(broken, 1.0, damage)
-        held = np.flatnonzero(now != NONE)
-        if set(_MEANS) & wanted:
-            seen = np.full((len(lower), len(_MEANS)), np.nan)
-            seen[held] = local.joint_means(slot[held])
-            columns |= {name: seen[:, k].copy() for k, name in enumerate(_MEANS)}
-        if {*_AT_POINTS, "normal_stress_largest", "shear_stress_largest"} & wanted:
-            seen = np.full((len(lower), len(_AT_POINTS)), np.nan)
-            seen[held] = local.joint_points(slot[held])
-            columns |= {name: seen[:, k].copy() for k, name in enumerate(_AT_POINTS)}
-            columns["normal_stress_largest"] = seen[:, :3].max(axis=1)
-            columns["shear_stress_largest"] = np.abs(seen[:, 3:]).max(axis=1)
-        for name in PROPERTIES["joint"].keys() & wanted:
-            columns[name] = self.joint_rows.column(PROPERTIES["joint"][name])[self.joint_row[lower]]
-        if "length" in wanted:
-            ends = connectivity.face_points(mesh.cells, lower)
-            way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
-            columns["length"] = np.hypot(way[:, 0], way[:, 1])
-        if {"joint_position_x", "joint_position_y"} & wanted:
-            row, k = self.where[lower // 4], lower % 4
-            after = np.where(k + 1 < np.where(mesh.cells[lower // 4, 3] >= 0, 4, 3), k + 1, 0)
-            for c, axis in enumerate("xy"):
-                columns[f"joint_position_{axis}"] = 0.5 * (self.x[row, 2 * k + c] + self.x[row, 2 * after + c])
-        return columns
 
-    def _last_events(self, lower: np.ndarray, broken: np.ndarray) -> dict[str, np.ndarray]:
-        """How, when and with what kinetic energy these joints broke; `broken`: those that are. Collective."""
-        rows = self.crack_rows()
-        last = np.full(len(self.partner), -1, np.int64)
-        last[[row.joint for row in rows]] = np.arange(len(rows))
-        event = np.where(broken, last[lower], -1)
-        table = np.array([(row.mode, row.time, row.kinetic) for row in rows] + [(0.0, np.nan, np.nan)])
-        return dict(zip(("mode", "break_time", "break_energy"), table[event].T.copy()))
+def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
+    """Where displacement is zero: (n_own, 8) corners [m], in the order of the owned elements; or of some of them.
+    Not collective."""
+    some = slice(None) if at is None else at
+    if "home" in sim.cold:
+        return sim.cold["home"][some]
+    mesh = sim.the_mesh()
+    cells = mesh.cells[sim.number[sim.owned][some]]
+    return np.where((cells >= 0)[:, :, None], mesh.points[cells], 0.0).reshape(-1, 8)
 
-    def homes(self, at: np.ndarray | None = None) -> np.ndarray:
-        """Where displacement is zero: (n_own, 8) corners [m], in the order of the owned elements; or of some of them.
-        Not collective."""
-        some = slice(None) if at is None else at
-        if "home" in self.cold:
-            return self.cold["home"][some]
-        mesh = self.the_mesh()
-        cells = mesh.cells[self.number[self.owned][some]]
-        return np.where((cells >= 0)[:, :, None], mesh.points[cells], 0.0).reshape(-1, 8)
 
-    # ---- contacts, events, balance ---------------------------------------------------------------------------------
+# ---- contacts, events, balance ---------------------------------------------------------------------------------
 
-    def contacts(self) -> dict[str, np.ndarray]:
-        """Touching pairs of this rank: element_1 < element_2, force_x, force_y [N/m] on element_1, x, y: middle of both
-        [m]. Every pair is on one rank, the owner of element_1. Collective."""
-        seen = self.evaluate()
-        pairs, own = self.local.pairs, self.owned
-        out = seen.pair_force
-        at = np.flatnonzero(seen.touching)
-        row = pairs.row[pairs.first[at]]
-        at = at[(row >= own.start) & (row < own.stop)]
-        at, force = pairs.by_pairs(at, out[at])
-        first, second = pairs.first[at], pairs.second[at]
-        columns = {
-            "element_1": pairs.element[first],
-            "element_2": pairs.element[second],
-            "body_1": pairs.number[first],
-            "body_2": pairs.number[second],
-            "force_x": force[:, 0:6:2].sum(axis=1),
-            "force_y": force[:, 1:6:2].sum(axis=1),
-        }
-        flat = self.x.reshape(-1)
-        for c, axis in enumerate("xy"):
-            ends = [flat[pairs.x_place[body] + 2 * k + c] for body in (first, second) for k in range(3)]
-            columns[axis] = np.mean(ends, axis=0) if len(at) else np.empty(0)
-        return columns
 
-    def crack_rows(self) -> list[Crack]:
-        """Joints broken so far, in order. Collective."""
-        return [*self.event_rows, *(self.waiting_events() if self.closed else [])]
+def contacts(sim: Blocks) -> dict[str, np.ndarray]:
+    """Touching pairs of this rank: element_1 < element_2, force_x, force_y [N/m] on element_1, x, y: middle of both
+    [m]. Every pair is on one rank, the owner of element_1. Collective."""
+    seen = sim.evaluate()
+    pairs, own = sim.local.pairs, sim.owned
+    out = seen.pair_force
+    at = np.flatnonzero(seen.touching)
+    row = pairs.row[pairs.first[at]]
+    at = at[(row >= own.start) & (row < own.stop)]
+    at, force = pairs.by_pairs(at, out[at])
+    first, second = pairs.first[at], pairs.second[at]
+    columns = {
+        "element_1": pairs.element[first],
+        "element_2": pairs.element[second],
+        "body_1": pairs.number[first],
+        "body_2": pairs.number[second],
+        "force_x": force[:, 0:6:2].sum(axis=1),
+        "force_y": force[:, 1:6:2].sum(axis=1),
+    }
+    flat = sim.x.reshape(-1)
+    for c, axis in enumerate("xy"):
+        ends = [flat[pairs.x_place[body] + 2 * k + c] for body in (first, second) for k in range(3)]
+        columns[axis] = np.mean(ends, axis=0) if len(at) else np.empty(0)
+    return columns
 
-    def events(self) -> dict[str, np.ndarray]:
-        """Joints broken so far, in order: joint, step, time [s], x, y of its middle in the mesh [m], mode (1 opened, 2
-        slid; between: mixed), length [m], kinetic energy [J/m] of the two elements; peak_step, peak_kinetic: when it
-        passed its strength. Equal on all ranks. Collective."""
-        return self.described(self.crack_rows())
 
-    def described(self, cracks: Sequence[Crack]) -> dict[str, np.ndarray]:
-        """Columns of joints that broke, see `events`. Not collective."""
-        mesh = self.the_mesh()
-        table = np.array(cracks, np.float64).reshape(-1, len(Crack._fields))
-        found = {name: table[:, k].copy() for k, name in enumerate(Crack._fields)}
-        for name in ("joint", "step", "peak_step"):
-            found[name] = found[name].astype(np.int64)
-        ends = connectivity.face_points(mesh.cells, found["joint"])
-        a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
-        found["x"], found["y"] = (0.5 * (a + b)).T
-        found["length"] = np.hypot(*(b - a).T)
-        return found
+def crack_rows(sim: Blocks) -> list[Crack]:
+    """Joints broken so far, in order. Collective."""
+    return [*sim.event_rows, *(sim.waiting_events() if sim.closed else [])]
 
-    def joint_counts(self) -> tuple[int, int, int]:
-        """Joints that are intact, have passed their peak, are broken. Collective."""
-        self.close_model()
-        state = self.local.slot_state[self.local.lower_slots]
-        counts = np.bincount(state, minlength=BROKEN + 1)[[INTACT, YIELDED, BROKEN]].astype(np.int64)
-        intact, yielded, broken = self.comm.sum_into(counts).tolist()
-        return intact, yielded, broken + int(self.broken[self.local.edges].sum())
 
-    def unbalanced_ratio(self) -> float:
-        """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions. Collective."""
-        seen, local, own = self.evaluate(), self.local, self.owned
-        felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
-        alone = seen.force[own].reshape(-1, 4, 2)[local.alone()].reshape(-1)
-        unbalanced = np.concatenate([np.abs(felt[:, :2] + outside).reshape(-1), np.abs(alone)])
-        total = exact_sum(self.contributing(seen), self.comm)
-        return exact_sum(unbalanced, self.comm) / total if total != 0.0 else 0.0
+def events(sim: Blocks) -> dict[str, np.ndarray]:
+    """Joints broken so far, in order: joint, step, time [s], x, y of its middle in the mesh [m], mode (1 opened, 2
+    slid; between: mixed), length [m], kinetic energy [J/m] of the two elements; peak_step, peak_kinetic: when it
+    passed its strength. Equal on all ranks. Collective."""
+    return described(sim, crack_rows(sim))
 
-    def contributing(self, seen: Evaluation) -> np.ndarray:
-        """Sizes of the components of all forces on this rank's nodes [N/m]: stress, joints, contact and gravity on each
-        corner, and what is applied from outside. Not collective."""
-        local, own = self.local, self.owned
-        felt = seen.felt[local.my_nodes]
-        stress = seen.force[own] - seen.of_joints[own]
-        parts = [stress, seen.of_joints[own], felt[:, 2:]]
-        if len(local.pairs.rows):
-            pushed = seen.pushed[: len(local.pairs.rows)]
-            stress[local.pairs.rows - self.n_left] -= pushed
-            parts.append(pushed)
-        if self.options.gx or self.options.gy:
-            pull = local.true_mass[own][:, :, None] * np.array([self.options.gx, self.options.gy])
-            real = self.the_mesh().cells[self.number[own]][:, :, None] >= 0
-            pull = np.where(real, pull, 0.0).reshape(-1, elements.FORCE)
-            stress -= pull
-            parts.append(pull)
-        return np.concatenate([np.abs(part).reshape(-1) for part in parts])
 
-    def critical_time_step(self) -> float:
-        """Stability limit of the model as it is, times the safety factor [s]; infinite in static mode. Collective."""
-        self.close_model()
-        return self.local.critical_time_step()
+def described(sim: Blocks, cracks: Sequence[Crack]) -> dict[str, np.ndarray]:
+    """Columns of joints that broke, see `events`. Not collective."""
+    mesh = sim.the_mesh()
+    table = np.array(cracks, np.float64).reshape(-1, len(Crack._fields))
+    found = {name: table[:, k].copy() for k, name in enumerate(Crack._fields)}
+    for name in ("joint", "step", "peak_step"):
+        found[name] = found[name].astype(np.int64)
+    ends = connectivity.face_points(mesh.cells, found["joint"])
+    a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
+    found["x"], found["y"] = (0.5 * (a + b)).T
+    found["length"] = np.hypot(*(b - a).T)
+    return found
 
-    def added_mass(self) -> float:
-        """Mass that mass scaling has added, over the true mass. Collective."""
-        self.close_model()
-        return self.local.added_mass() if self.options.dynamic else 0.0
 
-    # ---- energy ----------------------------------------------------------------------------------------------------
+def joint_counts(sim: Blocks) -> tuple[int, int, int]:
+    """Joints that are intact, have passed their peak, are broken. Collective."""
+    sim.close_model()
+    state = sim.local.slot_state[sim.local.lower_slots]
+    counts = np.bincount(state, minlength=BROKEN + 1)[[INTACT, YIELDED, BROKEN]].astype(np.int64)
+    intact, yielded, broken = sim.comm.sum_into(counts).tolist()
+    return intact, yielded, broken + int(sim.broken[sim.local.edges].sum())
 
-    def account_energy(self, on: bool = True) -> None:
-        """Keep the energy budget from now on. In dynamic mode only. Collective."""
-        if on and not self.options.dynamic:
-            raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
-        self.open_model()
-        self.cold.pop("work", None)
-        self.budget = Budget() if on else None
 
-    def energies(self) -> dict[str, float]:
-        """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
+def unbalanced_ratio(sim: Blocks) -> float:
+    """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions. Collective."""
+    seen, local, own = sim.evaluate(), sim.local, sim.owned
+    felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
+    alone = seen.force[own].reshape(-1, 4, 2)[local.alone()].reshape(-1)
+    unbalanced = np.concatenate([np.abs(felt[:, :2] + outside).reshape(-1), np.abs(alone)])
+    total = exact_sum(contributing(sim, seen), sim.comm)
+    return exact_sum(unbalanced, sim.comm) / total if total != 0.0 else 0.0
 
-        Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
-        in joints), contact (stored or lost there), viscous_lost, work_gravity, work_outside (loads and conditions),
-        work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
-        what is stored + lost - work - commands; relative: that over the largest of all.
-        """
-        if self.budget is None:
-            raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")
-        self.close_model()
-        budget = self.budget
-        return self._once("budget", lambda: budget.reading(self))
+
+def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
+    """Sizes of the components of all forces on this rank's nodes [N/m]: stress, joints, contact and gravity on each
+    corner, and what is applied from outside. Not collective."""
+    local, own = sim.local, sim.owned
+    felt = seen.felt[local.my_nodes]
+    stress = seen.force[own] - seen.of_joints[own]
+    parts = [stress, seen.of_joints[own], felt[:, 2:]]
+    if len(local.pairs.rows):
+        pushed = seen.pushed[: len(local.pairs.rows)]
+        stress[local.pairs.rows - sim.n_left] -= pushed
+        parts.append(pushed)
+    if sim.options.gx or sim.options.gy:
+        pull = local.true_mass[own][:, :, None] * np.array([sim.options.gx, sim.options.gy])
+        real = sim.the_mesh().cells[sim.number[own]][:, :, None] >= 0
+        pull = np.where(real, pull, 0.0).reshape(-1, elements.FORCE)
+        stress -= pull
+        parts.append(pull)
+    return np.concatenate([np.abs(part).reshape(-1) for part in parts])
+
+
+def critical_time_step(sim: Blocks) -> float:
+    """Stability limit of the model as it is, times the safety factor [s]; infinite in static mode. Collective."""
+    sim.close_model()
+    return sim.local.critical_time_step()
+
+
+def added_mass(sim: Blocks) -> float:
+    """Mass that mass scaling has added, over the true mass. Collective."""
+    sim.close_model()
+    return sim.local.added_mass() if sim.options.dynamic else 0.0
+
+
+# ---- energy ----------------------------------------------------------------------------------------------------
+
+
+def account_energy(sim: Blocks, on: bool = True) -> None:
+    """Keep the energy budget from now on. In dynamic mode only. Collective."""
+    if on and not sim.options.dynamic:
+        raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
+    sim.open_model()
+    sim.cold.pop("work", None)
+    sim.budget = Budget() if on else None
+
+
+def energies(sim: Blocks) -> dict[str, float]:
+    """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
+
+    Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
+    in joints), contact (stored or lost there), viscous_lost, work_gravity, work_outside (loads and conditions),
+    work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
+    what is stored + lost - work - commands; relative: that over the largest of all.
+    """
+    if sim.budget is None:
+        raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")
+    sim.close_model()
+    budget = sim.budget
+    return sim._once("budget", lambda: budget.reading(sim))
 
 
 class _ColumnProbe(Probe):
     """A quantity that is a column of elements, nodes or joints."""
 
-    def __init__(self, sim: Looking, name: str, on: str, numbers: np.ndarray) -> None:
+    def __init__(self, sim: Blocks, name: str, on: str, numbers: np.ndarray) -> None:
         super().__init__(sim, numbers)
-        self.looking, self.name, self.on = sim, name, on
+        self.name, self.on = name, on
         self._rows = np.empty(0, np.int64)
 
     def _find(self) -> None:
-        self._at, self._rows = self.looking.rows_of(self.on, self.numbers)
+        self._at, self._rows = rows_of(self.sim, self.on, self.numbers)
         self._n = len(self.numbers)
 
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
-        return self.looking.columns_of(self.on, [self.name], self._rows)[self.name]
+        return columns_of(self.sim, self.on, [self.name], self._rows)[self.name]
 
 
 def _corners(rows: np.ndarray, real: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcdem.halo.comm import SerialComm
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem.simulation import Core
+from hpcdem.physics.fdem.simulation import Blocks
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Evaluation, Local
@@ -25,7 +25,7 @@ _NAN = np.array([np.nan]).view(np.int64)[0]
 class Probe(ABC):
     """A quantity at numbers (n,) of elements, nodes or joints. Every method is collective."""
 
-    def __init__(self, sim: Core, numbers: np.ndarray) -> None:
+    def __init__(self, sim: Blocks, numbers: np.ndarray) -> None:
         """Not collective."""
         self.sim, self.numbers = sim, numbers
         self.local: Local | None = None
@@ -93,7 +93,7 @@ class Probe(ABC):
 class ForceProbe(Probe):
     """A component of reaction or unbalanced force [N/m] of nodes: a sum over corners that several ranks may have."""
 
-    def __init__(self, sim: Core, name: str, nodes: np.ndarray) -> None:
+    def __init__(self, sim: Blocks, name: str, nodes: np.ndarray) -> None:
         """Not collective."""
         super().__init__(sim, nodes)
         self.name = name

@@ -21,7 +21,7 @@ from hpcdem.physics.fdem.state import Crack
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
-    from hpcdem.physics.fdem.convergence import Solving
+    from hpcdem.physics.fdem.simulation import Blocks
 
 KIND = checkpoint.BLOCKS
 ARRAYS = {
@@ -32,13 +32,14 @@ ARRAYS = {
 """Assignments, known to all ranks; rank 0 writes them."""
 
 
-def save(sim: Solving, path: Path | str, extra: Mapping[str, Any]) -> None:
-    """Write the state. Reads only: a run that saves goes on exactly like one that does not. Collective."""
+def save(sim: Blocks, path: Path | str, extra: Mapping[str, Any] | None = None) -> None:
+    """Write the state, and `extra` (JSON values) with it. Reads only: a run that saves goes on exactly like one that
+    does not. Collective."""
     with sim.timers("checkpoint"):
-        checkpoint.write(path, state_of(sim, extra), tables(sim), sim.comm)
+        checkpoint.write(path, state_of(sim, extra or {}), tables(sim), sim.comm)
 
 
-def state_of(sim: Solving, extra: Mapping[str, Any]) -> dict[str, Any]:
+def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
     """Everything that is not a table, as JSON values. Collective."""
     mesh = sim.mesh
     tally = sim.comm.sum_into(sim.local.tally.sum(axis=0)) if sim.closed else np.zeros(1, np.int64)
@@ -64,7 +65,7 @@ def state_of(sim: Solving, extra: Mapping[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def tables(sim: Solving) -> dict[str, Table]:
+def tables(sim: Blocks) -> dict[str, Table]:
     """The arrays of the state, as slabs. Collective."""
     if sim.mesh is None:
         return {}
@@ -104,7 +105,7 @@ def _whole(columns: dict[str, np.ndarray], root: bool) -> Table:
     return Table(made, offset=0 if root else n, total=n)
 
 
-def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
+def restore(sim: Blocks, path: Path | str) -> dict[str, Any]:
     """Take the state of a file written by `save`. Collective. Returns `extra`. CommandError if the file is missing,
     foreign or damaged; the simulation is then as it was."""
     state, found = read(sim.comm, path, KIND, "a model of blocks")
@@ -112,7 +113,7 @@ def restore(sim: Solving, path: Path | str) -> dict[str, Any]:
     return state["extra"]
 
 
-def restore_part(sim: Solving, path: Path | str) -> dict[str, Any] | None:
+def restore_part(sim: Blocks, path: Path | str) -> dict[str, Any] | None:
     """Take the blocks of a checkpoint that holds particles as well (physics/coupling/saved_state.py), without the
     kernels of these; returns `extra`, or None if the file is not one of both. Collective."""
     try:
@@ -149,7 +150,7 @@ def read(comm: SerialComm, path: Path | str, kind: str, what: str) -> tuple[dict
     return state, tables
 
 
-def put(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> None:
+def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     """Take a state and tables that were read. Collective."""
     sim.clear()
     if state["mesh"] is not None:
@@ -192,7 +193,7 @@ def put(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     sim.rebuilds = state["rebuilds"]
 
 
-def _take_rows(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -> dict[str, np.ndarray]:
+def _take_rows(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> dict[str, np.ndarray]:
     """Slabs of rows; the first close sends them to their owners. Returns positions when storage and lists were made.
     Collective."""
     width, speed = sim.x.shape[1], sim.v.shape[1]
@@ -212,7 +213,7 @@ def _take_rows(sim: Solving, state: dict[str, Any], tables: checkpoint.Tables) -
     return {name: table(name, width) for name in ("origin", "listed")}
 
 
-def _close_as_it_was(sim: Solving, state: dict[str, Any], places: dict[str, np.ndarray]) -> None:
+def _close_as_it_was(sim: Blocks, state: dict[str, Any], places: dict[str, np.ndarray]) -> None:
     """Storage and lists again at the present positions: no sum depends on them. When they are due to be made again does
     depend on the positions at which they were, which are put back."""
     sim.cold.update(places)

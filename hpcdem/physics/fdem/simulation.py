@@ -50,8 +50,17 @@ AUTO = 100
 """Steps after which an automatic time step is estimated again."""
 
 
-class Core(State):
-    """Step and rebuild; `Blocks` adds the commands. Every method is collective unless it says otherwise."""
+class Blocks(State):
+    """One model of blocks on one communicator. Every method is collective unless it says otherwise.
+
+    Numbers are those of the mesh, from 0, and know no ranks: elements are rows of `mesh.cells`, nodes are rows of
+    `mesh.points`, faces are element * 4 + local edge, joints have the number of their lower face. Arguments called
+    elements, nodes, faces, joints take an array of numbers, or None for all. What is said of a node holds for all
+    corners of elements at that point, and stays with them when joints break. Step and rebuild are here; what acts on a
+    model are functions: diagnostics, changes between steps, many steps (convergence), equilibrium at once, saved_state.
+
+    CommandError for values that make no sense, equal on all ranks.
+    """
 
     local: Local
     _known: dict[str, Any] | None = None
@@ -88,7 +97,7 @@ class Core(State):
         self.areas, self.cut = mesh.areas(), cut_corner(mesh)
         edges = mesh.edges().points
         way = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-        self._mean_edge = float(np.sqrt((way * way).sum(axis=1)).mean())
+        self.mean_edge = float(np.sqrt((way * way).sum(axis=1)).mean())
         n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
         self.number = np.arange(n * rank // size, n * (rank + 1) // size)
         wide = bool((mesh.cells[:, 3] >= 0).any())
@@ -98,14 +107,14 @@ class Core(State):
         self.cold = {}
         self.histories = Histories.empty(len(self.number))
 
-    def _before_change(self) -> None:
+    def before_change(self) -> None:
         if self.budget is not None and self.closed:
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)
         self.open_model()
 
-    def _changed(self, topology: bool = False, stiffness: bool = True) -> None:
+    def changed(self, topology: bool = False, stiffness: bool = True) -> None:
         self._topology_stale |= topology
         if topology:
             self._closed = None
@@ -113,9 +122,9 @@ class Core(State):
         if stiffness:
             self.rebuild_state.dt = 0.0
 
-    def element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
+    def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         before = self.element_row.copy()
-        super().element_model(elements, name, properties)
+        super().set_element_model(elements, name, properties)
         if self.log is None or self.stress0 is None:
             return
         at = np.flatnonzero((before != self.element_row) & (before > 0))
@@ -127,6 +136,22 @@ class Core(State):
                 f"element {other[0]} has {_pascals(self.initial_stresses(other[:1])[0])} in place of "
                 f"{_pascals(self.stress0[other[0]])}; element initial after the models sets it for the present ones",
             )
+
+    def option(
+        self,
+        dynamic: bool | None = None,
+        collision: bool | None = None,
+        large_strain: bool | None = None,
+        overlap: str | None = None,
+    ) -> None:
+        """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
+        changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
+        any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
+        it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        before = self.options.dynamic
+        super().option(dynamic, collision, large_strain, overlap)
+        if self.options.dynamic != before:
+            self.v[:] = 0.0
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
@@ -203,7 +228,7 @@ class Core(State):
         path2, speed2, broken, inverted, breaks, yields, request, way2 = found.tolist()
         dt = self.clock.dt
         stride = math.sqrt(speed2) * dt
-        if broken or inverted or stride > 0.5 * self._mean_edge:
+        if broken or inverted or stride > 0.5 * self.mean_edge:
             self._stop_on_runaway(bool(broken), bool(inverted))
         self.local.tally[:, elements.NEW_YIELDED] = 0
         stale, outdated = breaks > 0.0, rebuild_state.stored >= OLDEST
@@ -212,7 +237,7 @@ class Core(State):
             room = 0.5 * rebuild_state.skin - math.sqrt(path2)
             rebuild_state.late += room < 0.0
             # Lists end where the ghosts do, so some of their room is left for the next ones.
-            outdated |= 0.5 * (ROOM - WIDE) * self._mean_edge < math.sqrt(way2) + stride
+            outdated |= 0.5 * (ROOM - WIDE) * self.mean_edge < math.sqrt(way2) + stride
             stale |= room < stride
             if stale or outdated:
                 room = 0.5 * rebuild_state.skin
@@ -229,7 +254,7 @@ class Core(State):
         with np.errstate(invalid="ignore", over="ignore"):
             speed = np.hypot(v[:, 0:6:2], v[:, 1:6:2]).max(axis=1)
             turn = _turn(x, 0, 2, 4)
-            bad = ~np.isfinite(x[:, :6]).all(axis=1) | ~(speed * self.clock.dt <= 0.5 * self._mean_edge) | ~(turn > 0.0)
+            bad = ~np.isfinite(x[:, :6]).all(axis=1) | ~(speed * self.clock.dt <= 0.5 * self.mean_edge) | ~(turn > 0.0)
             if self.wide:
                 bad |= (corners == 4) & ~(_turn(x, 0, 4, 6) > 0.0)
         rows = np.flatnonzero(bad)[np.argsort(number[bad])][:10]
@@ -350,7 +375,7 @@ class Core(State):
         """Buffer of the next contact lists [m], from global values only."""
         rebuild_state = self.rebuild_state
         rebuild_state.adapt_skin(NARROW, WIDE, SHORT_LIVED, LONG_LIVED)
-        return rebuild_state.skin_factor * self._mean_edge
+        return rebuild_state.skin_factor * self.mean_edge
 
     def _collect_events(self) -> None:
         """Joints that broke since the last rebuild become free faces, on all ranks. Collective."""
@@ -359,7 +384,7 @@ class Core(State):
             self.event_rows += rows
             joints = np.array([row[0] for row in rows])
             self.broken[joints] = 1
-            self._open_faces(joints)
+            self.open_faces(joints)
 
     def close_again(self) -> None:
         """Close a restored model: its rebuild_state stays as it was."""
@@ -376,7 +401,7 @@ class Core(State):
         mesh = self.the_mesh()
         with self.timers("neighbour"):
             if self._topology_stale:
-                self._renew_topology()
+                self.renew_topology()
             if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
             middle = np.empty((len(self.number), 2))
@@ -408,7 +433,7 @@ class Core(State):
         if not self.alive.any():
             raise CommandError("there are no elements left")
 
-    def _renew_topology(self) -> None:
+    def renew_topology(self) -> None:
         """Which corners are one node."""
         mesh = self.the_mesh()
         apart = (self.joint_row > 0) | self.open
@@ -434,7 +459,7 @@ class Core(State):
         if frozen:
             return
         rebuild_state.skin = self._skin()
-        room = ROOM * self._mean_edge if self.options.collision else 0.0
+        room = ROOM * self.mean_edge if self.options.collision else 0.0
         needed = max(2.0 * radius, self._longest) * (1.0 + 1e-9) + room
         if not needed <= rebuild_state.side <= 1.2 * needed:
             rebuild_state.side = 1.05 * needed

@@ -126,7 +126,7 @@ class State(ModelDefinition):
         self.budget: Any = None
         self._topology_stale = True
         self._longest = 0.0
-        self._mean_edge = 0.0
+        self.mean_edge = 0.0
         self.untouched = True
         """Nothing has moved since there is this mesh."""
         self._told_step = 0.0

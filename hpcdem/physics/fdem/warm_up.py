@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 
 ROCK = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 0.1, "friction": 20.0}
 JOINT = {
@@ -29,31 +29,31 @@ def warm_up(threads: int = 1) -> None:
         sim = Blocks(SerialComm(), threads)
         sim.take_mesh(mesh)
         sim.option(overlap="keep")
-        sim.element_model(None, "mech_iso_elastic", ROCK)
+        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
         sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
         sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10, "damping_t": 1e8})
         sim.face_property([0], {"friction": 1.0})
         sim.velocity_condition([0], vx=0.0, vy=0.0)
         sim.stress_condition([0], normal=-1.0)
-        sim.account_energy()
-        sim.set_velocity([len(used) - 1], 0.0, -1e-3)
+        diagnostics.account_energy(sim)
+        changes.set_velocity(sim, [len(used) - 1], 0.0, -1e-3)
         sim.close_model()
-        sim.tangent()
+        equilibrium.tangent(sim)
         connectivity.bodies(sim.partner)
-        sim.advance(3)
-        sim.energies()
-        sim.set_velocity(None, 0.0, 0.0)
-        sim.set_velocity([0, 1], 10.0, 10.0)
-        sim.advance(20)
+        convergence.advance(sim, 3)
+        diagnostics.energies(sim)
+        changes.set_velocity(sim, None, 0.0, 0.0)
+        changes.set_velocity(sim, [0, 1], 10.0, 10.0)
+        convergence.advance(sim, 20)
         sim.rebuild()
-        sim.unbalanced_ratio()
+        diagnostics.unbalanced_ratio(sim)
         for name in ("stress_xx", "opening", "position_x", "reaction_x"):
-            sim.values(name)
-        sim.contacts()
-        sim.account_energy(False)
+            diagnostics.values(sim, name)
+        diagnostics.contacts(sim)
+        diagnostics.account_energy(sim, False)
         sim.option(dynamic=False)
-        sim.null([len(cells) - 2], relax=2)
-        sim.advance(2)
+        changes.null(sim, [len(cells) - 2], relax=2)
+        convergence.advance(sim, 2)
         sim.time_step(mass_scaling=1e-3)
         sim.option(dynamic=True)
         sim.step()
@@ -63,9 +63,9 @@ def _rest(mesh: Mesh, threads: int) -> None:
     """One body at rest, of which an element is taken out slowly."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     sim.initial_stress(None, yy=-1.0)
     sim.option(dynamic=False, overlap="keep")
     sim.step()
-    sim.null([1], relax=2)
-    sim.advance(2)
+    changes.null(sim, [1], relax=2)
+    convergence.advance(sim, 2)

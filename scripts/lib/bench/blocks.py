@@ -22,6 +22,7 @@ from bench import launch
 from bench.launch import Layout
 from bench.runs import say
 from bench.tables import Lines, Spread
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 
 RATES = {"intact": 15e6, "yielded": 3e6, "quads": 5e6, "pairs": 3e6, "shattered": 1e6}
 """Element-steps per second from which the number of steps follows."""
@@ -97,7 +98,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, step it by the clock; collective."""
     from bench.worker import versions
     from hpcdem import session
-    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.simulation import Blocks
     from hpcdem.physics.fdem.warm_up import warm_up
 
     shared = session.current()
@@ -106,12 +107,12 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     workload = WORKLOADS[job["workload"]]
     MAKERS[workload.kind](sim, workload.side)
     warm = max(3, job["steps"] // 10)
-    sim.advance(warm)
+    convergence.advance(sim, warm)
     sim.close_model()
     sim.comm.allgather(0)
     before = {name: watch.ns for name, watch in sim.timers.watches.items()}
     cpu, began, rebuilds = time.process_time(), time.perf_counter(), sim.rebuilds
-    sim.advance(job["steps"])
+    convergence.advance(sim, job["steps"])
     sim.comm.allgather(0)
     seconds, used = time.perf_counter() - began, time.process_time() - cpu
     own = {name: (watch.ns - before.get(name, 0)) * 1e-9 for name, watch in sim.timers.watches.items()}
@@ -129,7 +130,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     return {
         "elements": n, "steps": job["steps"], "wall_s": wall, "element_steps_per_s": n * job["steps"] / wall,
         "pairs_per_s": sum(touching) * job["steps"] / contact if contact > 0.0 else 0.0, "touching": sum(touching),
-        "joints": sim.joint_counts(), "stages": stages, "rebuilds": sim.rebuilds - rebuilds,
+        "joints": diagnostics.joint_counts(sim), "stages": stages, "rebuilds": sim.rebuilds - rebuilds,
         "cpu_use": sum(r[1] for r in ranks) / (wall * len(ranks) * job["threads"]), "digest": digest(sim),
     } | versions()  # fmt: skip
 
@@ -138,7 +139,9 @@ def digest(sim: Any) -> str:
     """The same if the positions are, to the last bit, whatever the layout."""
     import hashlib
 
-    return hashlib.sha256(sim.values("position_x").tobytes() + sim.values("position_y").tobytes()).hexdigest()[:16]
+    return hashlib.sha256(
+        diagnostics.values(sim, "position_x").tobytes() + diagnostics.values(sim, "position_y").tobytes()
+    ).hexdigest()[:16]
 
 
 ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25, "friction": 30.0, "damp_factor": 0.1}
@@ -174,7 +177,7 @@ def square(side: int, gap: float = 0.0, quads: bool = False) -> Any:
 def intact(sim: Any, side: int) -> None:
     """In vibration, all joints before their peak."""
     sim.take_mesh(square(side))
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
     sim.close_model()
     x = sim.x[:, :6]
@@ -191,7 +194,7 @@ def yielded(sim: Any, side: int) -> None:
 def quads(sim: Any, side: int) -> None:
     """Quads without joints, in vibration."""
     sim.take_mesh(square(side, quads=True))
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     sim.close_model()
     x = sim.x[:, :12]
     sim.v[:, :12] = 0.02 * np.sin(300.0 * x + 1.0)
@@ -201,9 +204,9 @@ def pairs(sim: Any, side: int) -> None:
     """Each square is two triangles that lie on each other along its diagonal, pressed and sheared."""
     mesh = square(side, gap=0.01)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", ROCK)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     inner = mesh.edges()
-    sim.crack(inner.faces[inner.inner, 0])
+    changes.crack(sim, inner.faces[inner.inner, 0])
     _swell(sim, 1.0005)
     sim.velocity_condition(None, vx=0.0, vy=0.0)
     sim.close_model()
@@ -213,12 +216,12 @@ def shattered(sim: Any, side: int) -> None:
     """Every element a body of its own, all pressed together by a frame that does not give way."""
     mesh = square(side)
     sim.take_mesh(mesh)
-    sim.element_model(None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.5})
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.5})
     inner = mesh.edges()
-    sim.crack(inner.faces[inner.inner, 0])
+    changes.crack(sim, inner.faces[inner.inner, 0])
     sim.velocity_condition(np.unique(inner.points[~inner.inner]), vx=0.0, vy=0.0)
     _swell(sim, 1.0005)
-    sim.set_velocity(None, 0.001, -0.001)
+    changes.set_velocity(sim, None, 0.001, -0.001)
     sim.close_model()
 
 

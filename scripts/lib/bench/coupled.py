@@ -14,6 +14,7 @@ from bench.blocks import JOINT, ROCK, digest
 from bench.launch import Layout
 from bench.runs import say
 from bench.tables import Lines, Spread
+from hpcdem.physics.fdem import changes
 
 RATE = 500.0
 """Steps per second of one rank from which the number of steps follows."""
@@ -95,7 +96,7 @@ def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     from hpcdem.commands.dem import cycles, particles, properties, settings, walls
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.dem.simulation import Simulation
-    from hpcdem.physics.fdem.model import Blocks
+    from hpcdem.physics.fdem.simulation import Blocks
     from hpcdem.pre.mesh import structured
 
     width = 2.0 * RADIUS * across
@@ -111,10 +112,10 @@ def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     blocks = Blocks(comm, threads)
     ends = (0.0, width, across - 1), (top, top + 20.0 * RADIUS, 10)
     blocks.take_mesh(structured.rectangle(*(structured.spaced(*each) for each in ends), "tri"))
-    blocks.element_model(None, "mech_iso_elastic", {**ROCK, "young": 1e9})
+    changes.element_model(blocks, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
     blocks.joint_model(None, "classic_intrinsic_cohesive_interface", {**JOINT, "penalty_normal": 1e10})
     blocks.gravity(0.0, -9.81)
-    blocks.set_velocity(None, vy=-0.2)
+    changes.set_velocity(blocks, None, vy=-0.2)
     both = Coupled(sim, blocks)
     both.settle_time_step()
     return both

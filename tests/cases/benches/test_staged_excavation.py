@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import model, rectangle
 from tests.cases.benches import plain_fe
 
@@ -29,7 +30,7 @@ def bench(mesh: Mesh, stage: int) -> np.ndarray:
 def ground(mesh: Mesh) -> Blocks:
     """Rollers on both sides and the floor, weight."""
     sim = model(mesh)
-    sim.element_model(None, "mech_iso_elastic", {"density": RHO, "young": YOUNG, "poisson_ratio": NU})
+    changes.element_model(sim, None, "mech_iso_elastic", {"density": RHO, "young": YOUNG, "poisson_ratio": NU})
     x, y = mesh.points.T
     sim.velocity_condition(np.flatnonzero((x < 1e-9) | (x > WIDTH - 1e-9)), vx=0.0)
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
@@ -40,7 +41,7 @@ def ground(mesh: Mesh) -> Blocks:
 
 def moved(sim: Blocks) -> np.ndarray:
     """(np, 2) displacements, NaN where nothing is left."""
-    return np.column_stack([sim.values(f"displacement_{axis}") for axis in "xy"])
+    return np.column_stack([diagnostics.values(sim, f"displacement_{axis}") for axis in "xy"])
 
 
 def test_staged_excavation_of_quads_by_relaxation_and_at_once():
@@ -48,19 +49,19 @@ def test_staged_excavation_of_quads_by_relaxation_and_at_once():
     is lost, every stage of relaxation ends at a ratio of 1e-5, and the floor carries what is left."""
     mesh = box("quad", 1.25)
     at_once, slowly = ground(mesh), ground(mesh)
-    at_once.solve_elastic()
-    slowly.solve(ratio=1e-6, cycles=50000)
+    equilibrium.solve_elastic(at_once)
+    convergence.solve(slowly, ratio=1e-6, cycles=50000)
     floor = np.flatnonzero(mesh.points[:, 1] < 1e-9)
     left, farthest = mesh.areas().sum(), 0.0
     for sim in (at_once, slowly):
-        sim.reset_displacement()
+        changes.reset_displacement(sim)
     for stage in range(STAGES):
         out = bench(mesh, stage)
-        at_once.null(out)
-        slowly.null(out, relax=200)
-        at_once.solve_elastic()
-        slowly.advance(200)
-        found = slowly.solve(ratio=1e-5, cycles=50000)
+        changes.null(at_once, out)
+        changes.null(slowly, out, relax=200)
+        equilibrium.solve_elastic(at_once)
+        convergence.advance(slowly, 200)
+        found = convergence.solve(slowly, ratio=1e-5, cycles=50000)
         assert found.reason == "ratio" and found.ratio < 1e-5
         a, b = moved(at_once), moved(slowly)
         assert np.array_equal(np.isnan(a), np.isnan(b))
@@ -70,7 +71,7 @@ def test_staged_excavation_of_quads_by_relaxation_and_at_once():
         assert np.nanmax(np.abs(a - b)) < 0.01 * largest
         left -= mesh.areas()[out].sum()
         assert int(at_once.alive.sum()) == len(mesh.cells) - sum(len(bench(mesh, k)) for k in range(stage + 1))
-        assert at_once.total("reaction_y", floor) == pytest.approx(RHO * G * left, rel=1e-8)
+        assert diagnostics.total(at_once, "reaction_y", floor) == pytest.approx(RHO * G * left, rel=1e-8)
 
 
 def test_staged_excavation_of_triangles_against_another_program():
@@ -83,14 +84,14 @@ def test_staged_excavation_of_triangles_against_another_program():
     held[(x < 1e-9) | (x > WIDTH - 1e-9), 0] = held[y < 1e-9, 1] = True
     triangles = mesh.cells[:, :3]
     before = plain_fe.displacement(mesh.points, triangles, YOUNG, NU, RHO, G, held)
-    sim.solve_elastic()
+    equilibrium.solve_elastic(sim)
     assert moved(sim) == pytest.approx(before, abs=1e-8 * np.abs(before).max())
-    sim.reset_displacement()
+    changes.reset_displacement(sim)
     there = np.ones(len(triangles), bool)
     for stage in range(STAGES):
         there[bench(mesh, stage)] = False
-        sim.null(bench(mesh, stage), relax=100)
-        sim.solve_elastic()
+        changes.null(sim, bench(mesh, stage), relax=100)
+        equilibrium.solve_elastic(sim)
         after = plain_fe.displacement(mesh.points, triangles[there], YOUNG, NU, RHO, G, held) - before
         found = moved(sim)
         known = ~np.isnan(found[:, 0])

@@ -7,8 +7,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hpcdem.physics.fdem import convergence, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.model import Blocks
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, model, rectangle
 from tests.cases.penalty import exact
 
@@ -62,7 +63,7 @@ def pulled(mesh: Mesh, penalty: float, sense: float = 1.0) -> Blocks:
     assert (np.bincount(mesh.cells[mesh.cells >= 0])[corners] == 1).all()
     sim.velocity_condition(corners[:1], vx=0.0, vy=0.0)
     sim.velocity_condition(corners[1:], vx=0.0)
-    assert sim.solve(ratio=1e-6, cycles=200000).reason == "ratio"
+    assert convergence.solve(sim, ratio=1e-6, cycles=200000).reason == "ratio"
     return sim
 
 
@@ -71,7 +72,7 @@ def strains(sim: Blocks) -> tuple[float, float]:
     these is affine."""
     mesh = sim.mesh
     x, y = mesh.centroids().T
-    u, v = sim.values("element_displacement_x"), sim.values("element_displacement_y")
+    u, v = diagnostics.values(sim, "element_displacement_x"), diagnostics.values(sim, "element_displacement_y")
     real = (mesh.cells >= 0)[:, :, None]
     corners = np.where(real, mesh.points[mesh.cells] - mesh.centroids()[:, None, :], 0.0)
     shapes = np.unique(
