@@ -693,7 +693,7 @@ class BlockCommands:
     @property
     def energies(self) -> dict[str, float]:
         """The energy budget of the blocks [J per m of thickness], after ``option(energy=True)``. Collective."""
-        return dict(self._blocks.project().blocks.energies())
+        return fdem.queries.energies(self._blocks.project())
 
     @property
     def block_time(self) -> float:

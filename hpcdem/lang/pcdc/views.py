@@ -49,7 +49,7 @@ class Model:
     @property
     def energies(self) -> dict[str, float]:
         """The energy budget [J per m of thickness]."""
-        return self._look(lambda: self._commands.queries.energies(self._project))
+        return self._look(lambda: fdem.queries.energies(self._project))
 
     @property
     def ratio(self) -> float:
