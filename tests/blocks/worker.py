@@ -77,6 +77,7 @@ def flight(sim: Blocks) -> None:
     sim.face_property(outside[::3], {"friction": 5.0, "penalty_normal": 1e11, "damping_ratio": 0.3})
     sim.face_property(outside[1::3], {"penalty_shear": 5e10, "damping_b": 4.0})
     sim.joint_model(None, COHESIVE, WEAK)
+    sim.stress_condition(outside[5::40], quiet=True)
     n = len(one.points)
     changes.set_velocity(sim, np.arange(n), vx=203.0, vy=0.0)
     changes.set_velocity(sim, np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)

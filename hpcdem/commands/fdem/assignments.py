@@ -149,12 +149,14 @@ def stress(
     xx: Number | None = None,
     yy: Number | None = None,
     normal: Number | None = None,
+    quiet: bool | None = None,
     where: Range | None = None,
 ) -> None:
-    """Traction of faces [Pa]. Without a range: all faces on the surface of the model."""
+    """Traction of faces [Pa]; quiet: waves leave through them. Without a range: all faces on the surface of the
+    model."""
     _known(project, xx, yy, normal)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
-    project.ready().stress_condition(faces, xx=xx, yy=yy, normal=normal)
+    project.ready().stress_condition(faces, xx=xx, yy=yy, normal=normal, quiet=quiet)
 
 
 def remove_node_conditions(project: Project, where: Range | None = None) -> None:

@@ -260,7 +260,9 @@ STRESS = Model(
     "Traction on surfaces: stress times the present normal. Tension is positive.",
     (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa"), Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa"),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
-            "pressure", "Pa")),
+            "pressure", "Pa"),
+     Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
+            "given beside it enters as a wave of half its size")),
     any_of=True, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 _LATER_NODE = (

@@ -50,12 +50,13 @@ class NodeCondition:
 
 @dataclass(frozen=True)
 class Traction:
-    """Stress on faces [Pa]: components, and along the normal."""
+    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face."""
 
     xx: Number = 0.0
     yy: Number = 0.0
     xy: Number = 0.0
     normal: Number = 0.0
+    quiet: bool = False
 
 
 @dataclass(frozen=True)
@@ -556,17 +557,24 @@ class ModelDefinition:
         yy: Number | None = None,
         xy: Number | None = None,
         normal: Number | None = None,
+        quiet: bool | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
-        pressure)."""
+        pressure).
+
+        quiet: besides, dashpots of the impedances rho c_p along n and rho c_s across take up what arrives (Lysmer and
+        Kuhlemeyer 1969): plane waves along n leave without reflection, a stress that is given enters as a wave of half
+        its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give."""
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
+        if quiet is not None:
+            changes["quiet"] = bool(quiet)
         if not changes:
-            raise CommandError("a stress condition needs a stress")
+            raise CommandError("a stress condition needs a stress, or quiet")
         at = self.numbers_of_faces(faces)
         self.before_change()
         self._change_rows(self.loads, self.load_row, at, changes)
-        self.changed(stiffness=False)
+        self.changed(stiffness=quiet is not None)  # dashpots limit the time step
 
     @staticmethod
     def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
@@ -589,8 +597,9 @@ class ModelDefinition:
         """Take back tractions of faces."""
         at = self.numbers_of_faces(faces)
         self.before_change()
+        was_quiet = bool(self.quiet_faces()[at].any())
         self.load_row[at] = 0
-        self.changed(stiffness=False)
+        self.changed(stiffness=was_quiet)
 
     # ---- options -------------------------------------------------------------------------------------------------
 
@@ -688,6 +697,10 @@ class ModelDefinition:
     def loads_at(self, time: float) -> np.ndarray:
         """The table of tractions (rows, 4) [Pa] at a moment."""
         return np.array([[self._now(v, time) for v in (one.xx, one.yy, one.xy, one.normal)] for one in self.loads])
+
+    def quiet_faces(self) -> np.ndarray:
+        """(4 ne,) bool: faces with dashpots."""
+        return np.array([one.quiet for one in self.loads])[self.load_row]
 
     def _now(self, value: Number, time: float) -> float:
         return self.tables[value](time) if isinstance(value, str) else value

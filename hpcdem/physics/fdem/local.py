@@ -200,6 +200,7 @@ class Local:
         self.load_edge = row * sim.x.shape[1] + 2 * k
         self.load_a, self.load_b = 8 * row + 2 * k, 8 * row + 2 * k2
         self.load_of = sim.load_row[faces[i, k]].astype(np.int64)
+        self._make_dashpots(np.flatnonzero(sim.quiet_faces()[faces[i, k]]), row, k, k2)
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
         force = np.concatenate([one.force for one in parts] or [np.empty((0, 2))])
@@ -214,6 +215,30 @@ class Local:
         self.relaxing_steps = np.repeat(np.array([one.in_steps for one in parts], bool), each)[at]
         sim.surface_loads.corners(sim, self.special)
         self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0 or len(at) > 0)
+
+    def _make_dashpots(self, quiet: np.ndarray, row: np.ndarray, k: np.ndarray, k2: np.ndarray) -> None:
+        """Dashpots of the quiet ones among the loaded faces: row, corner k to k2."""
+        sim = self.sim
+        if not sim.options.dynamic:
+            if sim.log is not None and sim.quiet_faces().any():
+                sim.log.warn_once(
+                    "quiet",
+                    "quiet faces act in dynamic runs only: in this static stage they carry no more than their stress",
+                )
+            quiet = quiet[:0]
+        row, ends = row[quiet], np.column_stack([k[quiet], k2[quiet]])
+        self.quiet_edge = self.load_edge[quiet]
+        self.quiet_corner = 8 * row[:, None] + 2 * ends
+        self.quiet_place = row[:, None] * sim.v.shape[1] + 2 * ends
+        self.quiet_p, self.quiet_s = self._impedances(sim.number[row])
+
+    def _impedances(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """rho c_p and rho c_s of elements (n,) [Pa s/m]."""
+        rho, bulk, shear = (
+            np.array(self.sim.element_rows.column(name))[self.sim.element_row[number]]
+            for name in ("density", "bulk", "shear")
+        )
+        return np.sqrt(rho * (bulk + 4.0 / 3.0 * shear)), np.sqrt(rho * shear)
 
     def _make_nodes(self) -> None:
         """Nodes that do not move by themselves: of several corners, with conditions or loads, of quads."""
@@ -268,7 +293,8 @@ class Local:
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
-        contact of its free faces can have. And the dashpots (n_own, 4) [N s/m per m] of these contacts.
+        contact of its free faces can have. And the dashpots (n_own, 4) [N s/m per m] of these contacts,
+        and of quiet faces.
 
         Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
         altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
@@ -301,6 +327,9 @@ class Local:
             ratio = float(sim.comm.max_into(np.array([surfaces.ratio.max(initial=0.0)]))[0])
             heavy = 2.0 * self.true_mass[own].max(axis=1, initial=0.0)[:, None]
             drag = np.where(may_touch, ratio * np.sqrt(2.0 * contact * heavy), 0.0)
+        quiet = sim.quiet_faces()[faces] & real
+        if quiet.any():
+            drag = drag + np.where(quiet, 0.5 * self._impedances(number)[0][:, None] * self.shapes.length[own], 0.0)
         before = np.where(np.arange(4) > 0, np.arange(4) - 1, corners[:, None] - 1)
         springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
         return np.where(real, springs, 0.0), np.where(real, dashpots, 0.0)
@@ -412,6 +441,11 @@ class Local:
             self.applied[:] = 0.0
             loads = sim.loads_at(clock.time)
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
+            if len(self.quiet_edge):
+                moving.dashpots(
+                    self.quiet_edge, self.quiet_corner, self.quiet_place, self.quiet_p, self.quiet_s, sim.x, sim.v,
+                    self.applied,
+                )  # fmt: skip
             if len(self.relaxing_corner):
                 now = np.where(self.relaxing_steps, float(clock.step), clock.time)
                 left = np.clip(1.0 - (now - self.relaxing_begin) / self.relaxing_span, 0.0, 1.0)

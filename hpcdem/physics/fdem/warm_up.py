@@ -34,7 +34,7 @@ def warm_up(threads: int = 1) -> None:
         sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10, "damping_t": 1e8})
         sim.face_property([0], {"friction": 1.0})
         sim.velocity_condition([0], vx=0.0, vy=0.0)
-        sim.stress_condition([0], normal=-1.0)
+        sim.stress_condition([0], normal=-1.0, quiet=True)
         diagnostics.account_energy(sim)
         changes.set_velocity(sim, [len(used) - 1], 0.0, -1e-3)
         sim.close_model()

@@ -7,6 +7,8 @@ of other ranks' elements come by the halo), so all ranks get the same bits.
 
 from __future__ import annotations
 
+import math
+
 from numba import njit, prange
 
 from hpcdem.physics.fdem.kernels import laws
@@ -42,6 +44,27 @@ def tractions(edges, corner_a, corner_b, row, table, x, applied):
         applied[a + 1] += fy
         applied[b] += fx
         applied[b + 1] += fy
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def dashpots(edges, corners, places, along, across, x, v, applied):
+    """Take L / 2 (z_p v_n n + z_s v_s s) from both corners of faces through which waves leave.
+
+    edges (m,): where the edge begins in x; corners, places (m, 2): its ends in `applied` and in v (all flat); along,
+    across (m,): impedances rho c_p and rho c_s [Pa s/m].
+    """
+    x, v, applied = x.reshape(x.size), v.reshape(v.size), applied.reshape(applied.size)
+    for m in range(len(edges)):
+        p = edges[m]
+        lx, ly = x[p + 2] - x[p], x[p + 3] - x[p + 1]
+        length = math.sqrt(lx * lx + ly * ly)
+        nx, ny = ly / length, -lx / length
+        for end in range(2):
+            vx, vy = v[places[m, end]], v[places[m, end] + 1]
+            vn = vx * nx + vy * ny
+            normal, shear = 0.5 * length * along[m] * vn, 0.5 * length * across[m]
+            applied[corners[m, end]] -= normal * nx + shear * (vx - vn * nx)
+            applied[corners[m, end] + 1] -= normal * ny + shear * (vy - vn * ny)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
