@@ -374,11 +374,12 @@ class Faces(_Modelled):
         xx: Number | None = None,
         yy: Number | None = None,
         normal: Number | None = None,
+        quiet: bool | None = None,
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface. Numbers or names of tables of
-        time. Without a range: the whole surface of the model."""
-        given = {"stress_xx": xx, "stress_yy": yy, "stress_normal": normal}
+        time. quiet: waves leave through them in dynamic runs. Without a range: the whole surface of the model."""
+        given = {"stress_xx": xx, "stress_yy": yy, "stress_normal": normal, "quiet": quiet}
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
 
     def remove_boundary(self, *, where: Where = None) -> None:

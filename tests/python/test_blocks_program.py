@@ -6,6 +6,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import re
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +24,7 @@ from hpcdem.lang.pcdc import bindings, execute
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
 from hpcdem.runtime.run_folder import RECORD
-from tests.conftest import Launcher
+from tests.conftest import ROOT, Launcher
 from tests.pcdc.fake import Bench
 from tests.short_push import contents
 
@@ -99,8 +100,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc element-face c-model contact-m-c property friction 30", "sim.faces.model('contact-m-c', friction=30)"),
     ("pcdc element-face property friction 20 range geometry 'l'",
      "sim.faces.property(friction=20, where=g.OnLayer('l'))"),
-    ("pcdc element-face boundary m-s-b-c stress-xx 1 stress-yy 2 stress-normal table 'blast' range face-of 'a' set 'd'",
-     "sim.faces.stress(xx=1, yy=2, normal='blast', where=g.OfElements('a', 'd'))"),
+    ("pcdc element-face boundary m-s-b-c stress-xx 1 stress-yy 2 stress-normal table 'blast' quiet on range face-of 'a' set 'd'",
+     "sim.faces.stress(xx=1, yy=2, normal='blast', quiet=True, where=g.OfElements('a', 'd'))"),
     ("pcdc element-face boundary remove range boundary", "sim.faces.remove_boundary(where=g.OnBoundary())"),
     ("pcdc face-joint group 'a' set 's'", "sim.joints.group('a', 's')"),
     ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200 np 3",
@@ -131,6 +132,10 @@ SAME: list[tuple[str, str]] = [
      "sim.histories.create('h', 'node', 'reaction-y', how='sum', every=100, where=\"group 'p' set 'bc'\")"),
     ("pcdc history create 'h' joint value normal-stress-largest max range crack",
      "sim.histories.create('h', 'joint', 'normal_stress_largest', how='maximum', where='crack')"),
+    ("pcdc history create 'h' element value stress-yy min",
+     "sim.histories.create('h', 'element', 'stress-yy', how='minimum')"),
+    ("pcdc history create 'h' node value velocity-x mean",
+     "sim.histories.create('h', 'node', 'velocity-x', how='mean')"),
     ("pcdc history create 'h' element nearest (5,0) value stress-yy",
      "sim.histories.create('h', 'element', 'stress-yy', nearest=(5, 0))"),
     ("pcdc history create 'h' element id 3 value stress-yy", "sim.histories.create('h', 'element', 'stress-yy', id=3)"),
@@ -211,7 +216,7 @@ def test_every_command_has_a_method() -> None:
         statement = Bench(Path()).interpreter.read(line, "a.sc").statements[0]
         names = {name for name in statement.arguments if name not in ("model", "properties")}
         if "model" in statement.arguments:
-            names |= {statement.arguments["model"]}
+            names |= {statement.arguments["model"], *statement.arguments["properties"]}
         said.setdefault(statement.command.name, set()).update(names)
     for command in PCDC.commands:
         if command.later:
@@ -224,7 +229,10 @@ def test_every_command_has_a_method() -> None:
         }  # any property goes the same way
         options = () if command.name in of_models else command.options
         wanted = {option.name for option in options if not option.later}
-        wanted |= {model.keyword.name for model in command.models if not model.later}
+        for model in command.models:
+            wanted |= set() if model.later else {model.keyword.name}
+            if not model.later and model.of is None:  # those of a law go the same way, whatever their names
+                wanted |= {option.name for option in model.options if not option.later}
         assert wanted - said[command.name] <= NOT_IN_PYTHON.get(command.name, set()), command.name
 
 
@@ -276,7 +284,7 @@ WRONG = {
     "word for a number": ("sim.elements.property(young='stiff')", "young: expected a number above 0, got 'stiff'"),
     "value out of range": ("sim.elements.property(poisson_ratio=0.5)", "poisson_ratio: expected a number"),
     "not finite": ("sim.elements.property(young=float('inf'))", "young: expected a number above 0, got inf"),
-    "one of an array": ("sim.elements.property(young=np.array([1.0, -1.0]))", "young: expected a number above 0, got -"),
+    "one of an array": ("sim.elements.property(young=np.array([1.0, -1.0]))", "young: expected a number above 0, got"),
     "array of arrays": ("sim.elements.property(young=np.ones((2, 2)))", "young: expected a number above 0, got array"),
     "truth value for a number": ("sim.step(True)", "step: steps: expected a whole number, not negative, got True"),
     "part of a step": ("sim.step(2.5)", "step: steps: expected a whole number"),
@@ -595,17 +603,20 @@ sim.mesh.structured((0, 0), (1, 1), (2, 2))
 sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25)
 """
 REFUSED = {
-    "two states": ("sim.ball(5.0, 5.0, 1.0); sim.save('a.sav')", 2, "study.py:5: save: particles and blocks that are not"),
+    "two states": ("sim.ball(5.0, 5.0, 1.0); sim.save('a.sav')", 2, "study.py:5: save: particles and blocks that are"),
     "functions that nobody calls": ("sim.every(5, print); sim.step(3)", 2, "study.py:5: step: functions of every"),
     "no blocks to couple": ("hpcdem.Simulation('b').couple()", 2, "study.py:5: couple: there are no blocks yet"),
     "checkpoint of both": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
-                           "sim.save('a.sav'); sim.coupling.end(); sim.restore('a.sav')", 2, "couple\\(\\) comes first"),
+                           "sim.save('a.sav'); sim.coupling.end(); sim.restore('a.sav')", 2,
+                           "couple\\(\\) comes first"),
     "no equilibrium": ("sim.option(dynamic=False); sim.nodes.force(fx=1e6); sim.solve(limit=100)", 3,
                        "study.py:5: solve: no equilibrium"),
-    "start of coupled ones": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); sim.start()",
+    "start of coupled ones": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
+                              "sim.start()",
                               2, "study.py:5: start: start would replace"),
     "step in a function": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple()\n"
-                           "sim.every(5, lambda s: s.step(1)); sim.step(10)", 2, "study.py:6: step: model step 1 cannot be used"),
+                           "sim.every(5, lambda s: s.step(1)); sim.step(10)", 2,
+                           "study.py:6: step: model step 1 cannot be used"),
     "file on a full disk": ("sim.charts.create('c'); sim.charts.add('c', values=[(0, 0)]); "
                             "sim.charts.export('c', 'none/c.png')", 1, "study.py:5: charts.export: .*none"),
     "kind of run": ("", 2, "--resume is for ZDEM and PCDC scripts"),
@@ -660,6 +671,27 @@ def test_several_models_and_their_folders(launch: Launcher, tmp_path: Path) -> N
     assert (tmp_path / "a" / "history_t.csv").read_text().count("\n") == 3
     assert (tmp_path / "b" / "blocks" / "history_t.csv").read_text().count("\n") == 4
     assert (tmp_path / "b" / "run.json").exists() and not (tmp_path / "data").exists()
+
+
+def test_the_example_comes_to_the_theory(launch: Launcher, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "examples" / "cantilever.py", tmp_path)
+    done = launch(1, "cantilever.py", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = re.findall(r"(\d+) elements .* by (\S+) um, theory (\S+) um", done.stdout)
+    away = [1.0 - float(end) / float(theory) for _, end, theory in rows]
+    assert len(away) == 3 and away[0] > away[1] > away[2] > 0.0 and away[2] < 0.01
+
+
+def test_the_programs_of_the_documentation_run(launch: Launcher, tmp_path: Path) -> None:
+    """The section on blocks of docs/python.md, its programs one after the other."""
+    text = (ROOT / "docs" / "python.md").read_text().split("## Blocks\n")[1].split("\n## ")[0]
+    programs = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(programs) == 2
+    for k, program in enumerate(programs):
+        assert "sim.step(20000)" in program
+        (tmp_path / f"study{k}.py").write_text(program.replace("sim.step(20000)", "sim.step(50)"))
+        done = launch(1, f"study{k}.py", "--no-figure", f"--outdir=data{k}", cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_a_script_keeps_its_own_blocks(launch: Launcher, tmp_path: Path) -> None:
