@@ -35,9 +35,9 @@ MM = 1e-3
 def packings(curve):
     """One panel for each shape, all at one scale; returns the last specimen."""
     made = {
-        shape: make_specimen(
-            Request(curve.sizes, curve.percent, shape, GRAINS, slenderness=2.0, void_ratio=VOID_RATIO, **words)
-        )
+        shape: make_specimen(Request(
+            curve.sizes, curve.percent, shape, GRAINS, slenderness=2.0, void_ratio=VOID_RATIO, **words
+        ))
         for shape, words in SHAPES.items()
     }
     widths = [s.width / MM for s in made.values()]
@@ -48,7 +48,9 @@ def packings(curve):
     left = 0.1
     for (shape, s), width in zip(made.items(), widths):
         height = s.density.room[1] / MM
-        ax = figure.add_axes((left / across, 0.1 / (tall + 0.4), width * scale / across, tall / (tall + 0.4)))
+        ax = figure.add_axes(
+            (left / across, 0.1 / (tall + 0.4), width * scale / across, tall / (tall + 0.4))
+        )
         draw_grains(ax, s.outlines, s.class_of, len(curve.sizes), MM)
         ax.add_patch(Rectangle((0, 0), width, height, fill=False, lw=0.8))
         ax.set(xlim=(-0.2, width + 0.2), ylim=(-0.2, tallest + 0.2), aspect="equal")
