@@ -74,15 +74,16 @@ class Session:
         self.unfinished.append(sim)
         return sim
 
-    def project(self, outdir: Path | None = None) -> Project:
-        """Collective: an empty model of blocks; the first one waits for the kernels."""
+    def project(self, outdir: Path | None = None, quiet: bool = False) -> Project:
+        """Collective: an empty model of blocks; the first one waits for the kernels. quiet: without a log."""
         self.prepare("blocks")
         from hpcdem.commands.fdem import Project
         from hpcdem.physics.fdem.simulation import Blocks
 
         outdir = Path(self.outdir or self.directory / "data") if outdir is None else outdir
         run_folder.claim(outdir, self.comm, self.job)
-        blocks = Blocks(self.comm, self.threads, outdir, self.log, self.stop, balance_on=self.balance)
+        log = None if quiet else self.log
+        blocks = Blocks(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
         project = Project(blocks, self.directory, outdir)
         project.job, project.keep = self.job, self.keep
         self.projects.append(project)

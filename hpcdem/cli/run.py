@@ -130,8 +130,9 @@ def run_python(session: Session, options: Options, source: bytes) -> None:
 
 def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     """Collective: read a script of PCDC commands and Python, and run it on every rank."""
+    from hpcdem.commands import fdem
     from hpcdem.lang.pcdc import check
-    from hpcdem.lang.pcdc.execute import Commands, Interpreter
+    from hpcdem.lang.pcdc.execute import Interpreter
     from hpcdem.lang.pcdc.source import decode
 
     name, log = str(options.script), session.log
@@ -156,7 +157,7 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
         project = session.project()
         interpreter = session.interpreter = Interpreter(project)
         enter_session(session)
-        past = Commands().checkpoints.take_up(project) if options.resume else None
+        past = fdem.checkpoints.take_up(project) if options.resume else None
         log.script_started(name, 0)
         sys.argv = [name, *options.arguments]
         sys.path.insert(0, str(options.script.resolve().parent))

@@ -8,10 +8,12 @@ import inspect
 
 import pytest
 
+from hpcdem.commands import dem
 from hpcdem.core.errors import CommandError, PhysicsError, ScriptError, UsageError
 from hpcdem.core.selection import Group, Interval
+from hpcdem.lang.zdem import execute
 from hpcdem.lang.zdem import table as t
-from hpcdem.lang.zdem.execute import Commands, Interpreter, refuse_unexecuted
+from hpcdem.lang.zdem.execute import refuse_unexecuted
 from hpcdem.lang.zdem.parser import parse_text, read_script
 from hpcdem.lang.zdem.plan import expected_steps
 
@@ -63,8 +65,14 @@ class _Module:
 
 def run(text, file="/models/a.py", fail=None, **how):
     recorder, sim = Recorder(fail), Sim()
-    Interpreter(parse_text(text, file), recorder).run(sim, **how)
+    carry_out(parse_text(text, file), recorder, sim, **how)
     return recorder, sim
+
+
+def carry_out(script, recorder, sim, **how):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(execute, "dem", recorder)
+        execute.Interpreter(script).run(sim, **how)
 
 
 def calls_of(*lines):
@@ -73,7 +81,7 @@ def calls_of(*lines):
               "HIST id 2 interval 9 step"]  # fmt: skip
     recorder, _ = run("\n".join([*before, *lines, "STOP"]))
     assert recorder.calls[0] == ("particles.start", (), {})
-    assert recorder.calls[-1] == ("running.stop", (), {})
+    assert recorder.calls[-1] == ("cycles.stop", (), {})
     return recorder.calls[len(before) : -1]
 
 
@@ -124,11 +132,11 @@ A = Group("a")
          [("settings.set_option", (name, value), {}) for name, value in
           [("dt", 1.0), ("gravity", (0.0, -9.8)), ("disk", "off"), ("lsm", 4.0), ("save", 7),
            ("outdir", "/models/out")]]),
-        ("CYC 5000", [("running.cycle", (5000,), {})]),
+        ("CYC 5000", [("cycles.cycle", (5000,), {})]),
         ("IMPLE wall id 1 xmove 100 save 20 print 10 ps 5 vtk 2",
-         [("running.imple", (1,), {"xmove": 100.0, "save": 20.0, "print": 10.0, "ps": 5.0, "vtk": 2.0})]),
-        ("IMPLE wall id 1 ymove -5", [("running.imple", (1,), {"ymove": -5.0})]),
-        ("SAV b.sav", [("saving.save", ("/models/b.sav",), {})]),
+         [("cycles.imple", (1,), {"xmove": 100.0, "save": 20.0, "print": 10.0, "ps": 5.0, "vtk": 2.0})]),
+        ("IMPLE wall id 1 ymove -5", [("cycles.imple", (1,), {"ymove": -5.0})]),
+        ("SAV b.sav", [("checkpoints.save", ("/models/b.sav",), {})]),
         ("HIST id 5 interval 10 step", [("history.hist", (5, 10, "step"), {})]),
         ("PLOT hist 2 1", [("history.plot_hist", (), {"x": 2, "y": 1})]),
         ("DRAW interval 200 bfill wall", [("history.draw", (200, ["bfill", "wall"], []), {})]),
@@ -146,25 +154,25 @@ def test_the_simulation_knows_where_it_is():
 
 
 def test_the_end_of_the_script_is_a_stop():
-    assert run("START")[0].calls == [("particles.start", (), {}), ("running.stop", (), {})]
-    assert run("START\nSTOP\nCYC 1")[0].calls == [("particles.start", (), {}), ("running.stop", (), {})]
+    assert run("START")[0].calls == [("particles.start", (), {}), ("cycles.stop", (), {})]
+    assert run("START\nSTOP\nCYC 1")[0].calls == [("particles.start", (), {}), ("cycles.stop", (), {})]
 
 
 def test_starting_in_the_middle():
     recorder, _ = run("START\nSET DT 1\nCYC 5\nCYC 6", start_at=2)
-    assert [name for name, *_ in recorder.calls] == ["running.cycle", "running.cycle", "running.stop"]
+    assert [name for name, *_ in recorder.calls] == ["cycles.cycle", "cycles.cycle", "cycles.stop"]
 
 
 def test_errors_of_commands_leave_with_file_and_line():
     with pytest.raises(ScriptError) as caught:
-        run("START\nSET DT 1\n\nCYC 5", fail={"running.cycle": CommandError("3 particles have no density")})
+        run("START\nSET DT 1\n\nCYC 5", fail={"cycles.cycle": CommandError("3 particles have no density")})
     assert str(caught.value) == "/models/a.py:4: CYC: 3 particles have no density"
     assert isinstance(caught.value.__cause__, CommandError)
 
 
 def test_errors_of_the_physics_are_left_alone():
     with pytest.raises(PhysicsError, match="particle 7"):
-        run("START\nSET DT 1\nCYC 5", fail={"running.cycle": PhysicsError("particle 7 is not finite")})
+        run("START\nSET DT 1\nCYC 5", fail={"cycles.cycle": PhysicsError("particle 7 is not finite")})
 
 
 def test_errors_of_expressions_leave_with_file_and_line():
@@ -177,7 +185,7 @@ def test_errors_of_expressions_leave_with_file_and_line():
 
 
 @pytest.mark.parametrize("folder", ["", "data"])
-@pytest.mark.parametrize(("line", "command"), [("RES 1.sav", "saving.restore"), ("LOAD 1.sav", "particles.load")])
+@pytest.mark.parametrize(("line", "command"), [("RES 1.sav", "checkpoints.restore"), ("LOAD 1.sav", "particles.load")])
 def test_files_are_looked_for_beside_the_script_then_in_data(tmp_path, folder, line, command):
     place = tmp_path / folder
     place.mkdir(exist_ok=True)
@@ -210,8 +218,8 @@ def test_rank_0_looks_for_files(tmp_path):
 
     sim, recorder = Sim(), Recorder()
     sim.comm = Comm()
-    Interpreter(parse_text("RES 1.sav", str(tmp_path / "a.py")), recorder).run(sim)
-    assert recorder.calls[0] == ("saving.restore", ("/from/rank/0",), {})
+    carry_out(parse_text("RES 1.sav", str(tmp_path / "a.py")), recorder, sim)
+    assert recorder.calls[0] == ("checkpoints.restore", ("/from/rank/0",), {})
 
 
 # ---- going on after a checkpoint
@@ -222,10 +230,10 @@ SCRIPT = "START\nSET DT 1\nCYC 5\nDEL RANGE y 0 1\nCYC 6\nSAV b.sav\nCYC 7\n"
 @pytest.mark.parametrize(
     ("position", "names"),
     [
-        (2, ["running.resume", "particles.delete", "running.cycle", "saving.save", "running.cycle", "running.stop"]),
-        (4, ["running.resume", "saving.save", "running.cycle", "running.stop"]),
-        (5, ["running.cycle", "running.stop"]),  # the checkpoint was written by SAV itself
-        (6, ["running.resume", "running.stop"]),
+        (2, ["cycles.resume", "particles.delete", "cycles.cycle", "checkpoints.save", "cycles.cycle", "cycles.stop"]),
+        (4, ["cycles.resume", "checkpoints.save", "cycles.cycle", "cycles.stop"]),
+        (5, ["cycles.cycle", "cycles.stop"]),  # the checkpoint was written by SAV itself
+        (6, ["cycles.resume", "cycles.stop"]),
     ],
 )
 def test_resuming(position, names):
@@ -236,7 +244,7 @@ def test_resuming(position, names):
 
 def test_errors_while_resuming_leave_with_file_and_line():
     with pytest.raises(ScriptError, match=r"a\.py:5: CYC: no"):
-        run(SCRIPT, resume=4, fail={"running.resume": CommandError("no")})
+        run(SCRIPT, resume=4, fail={"cycles.resume": CommandError("no")})
 
 
 def test_lines_still_to_come_may_be_changed_before_resuming():
@@ -264,7 +272,7 @@ def test_what_is_not_carried_out_is_refused_before_anything_runs():
     script = parse_text(text, "a.py", dataclasses.replace(t.ZDEM, commands=commands))
     recorder = Recorder()
     with pytest.raises(ScriptError) as caught:
-        Interpreter(script, recorder).run(Sim())
+        carry_out(script, recorder, Sim())
     assert str(caught.value) == "a.py:4: hpcdem does not carry out DRAW yet"
     assert recorder.calls == []
 
@@ -288,12 +296,12 @@ def test_manual_scripts_reach_their_commands(manual_scripts, tmp_path, name):
     script = parse_text(text, str(tmp_path / "script.py"))
     refuse_unexecuted(script.statements)
     recorder = Recorder()
-    Interpreter(script, recorder).run(Sim())
+    carry_out(script, recorder, Sim())
     assert {position for position, _ in recorder.positions} == set(range(len(script.statements)))
 
 
 def test_the_real_commands_are_found_by_name():
-    assert Commands().particles is importlib.import_module("hpcdem.commands.dem.particles")
+    assert dem.particles is importlib.import_module("hpcdem.commands.dem.particles")
 
 
 def test_reading_and_running_agree_on_the_steps(tmp_path):

@@ -1,1 +1,34 @@
-"""The commands of ZDEM, one function each."""
+"""The commands of ZDEM, one function each.
+
+Modules are imported when they are first used, as most bring kernels, which must come after their cache is settled
+(runtime/kernels.py).
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hpcdem.commands.dem import (
+        bonds,
+        checkpoints,
+        clumps,
+        cycles,
+        history,
+        particles,
+        physics,
+        properties,
+        settings,
+        walls,
+    )
+
+__all__ = [
+    "bonds", "checkpoints", "clumps", "cycles", "history", "particles", "physics", "properties", "settings", "walls",
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    if name in __all__:
+        return import_module(f"hpcdem.commands.dem.{name}")
+    raise AttributeError(f"module {__name__} has no attribute {name}")

@@ -75,29 +75,53 @@ def take_up(project: Project) -> list[Any] | None:
     """Take the state of the newest whole checkpoint in the folder of the results, which a run of the same script wrote;
     returns its journal (lang.pcdc.journal), None if there is no checkpoint. Collective. A damaged file is named in the
     log and the one before it is tried. UsageError if the script cannot be brought back to where it was written."""
+    found = _newest(project)
+    if found is None:
+        return None
+    path, run = found
+    journal = run.get("journal") if isinstance(run, dict) else None
+    if not isinstance(run, dict) or not isinstance(journal, list):
+        raise UsageError(
+            f"{path} does not tell how the script came to where it was; go on with a script of your own that "
+            f"begins with pcdc model restore '{path}'"
+        )
+    project.progress, project.resumed = run.get("progress"), True
+    project.asleep, project.calls_lost = run.get("particles"), "particles" not in run
+    return journal
+
+
+def restore_newest(project: Project) -> bool:
+    """The same for a Python program, which is not run again; False if there is no checkpoint. CommandError for that of
+    a script. Then `steps.resume` finishes the command in which it was written. Collective."""
+    found = _newest(project)
+    if found is None:
+        return False
+    path, run = found
+    if not isinstance(run, dict) or "script" in run:
+        raise CommandError(f"{path} was written by a PCDC script, which goes on from it by hpcdem SCRIPT --resume")
+    project.progress, project.resumed = run.get("progress"), True
+    return True
+
+
+def _newest(project: Project) -> tuple[Path, Any] | None:
+    """Take the state of the newest whole checkpoint; its path, and what it says of the run that wrote it."""
     folder, comm, log = project.outdir, project.comm, project.log
     found, damaged = checkpoints.newest_first([folder]) if comm.rank == 0 else ([], [])
-    for error in damaged:
+    for error in damaged if log is not None else []:
         log.warn(f"{error}; it is passed over")
     for path in comm.bcast(found):
         try:
             extra = _restored(project, path, begins=True)
         except CommandError as error:
-            log.warn(f"{error}; trying the checkpoint before it")
+            if log is not None:
+                log.warn(f"{error}; trying the checkpoint before it")
             project.clear()
             continue
-        log.info(f"going on from {path}, step {project.step}")
-        run = extra.get("run")
-        journal = run.get("journal") if isinstance(run, dict) else None
-        if not isinstance(run, dict) or not isinstance(journal, list):
-            raise UsageError(
-                f"{path} does not tell how the script came to where it was; go on with a script of your own that "
-                f"begins with pcdc model restore '{path}'"
-            )
-        project.progress, project.resumed = run.get("progress"), True
-        project.asleep, project.calls_lost = run.get("particles"), "particles" not in run
-        return journal
-    log.info(f"no checkpoint in {folder}: starting at the beginning")
+        if log is not None:
+            log.info(f"going on from {path}, step {project.step}")
+        return path, extra.get("run")
+    if log is not None:
+        log.info(f"no checkpoint in {folder}: starting at the beginning")
     return None
 
 

@@ -40,7 +40,8 @@ class Project:
     blocks; continues: the checkpoint from which they go on, asleep: the number of these particles, which are empty
     until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint knows nothing
     of methods of particles; stepping: the name of that command, "" if there is none; inputs: files that the script
-    reads, by their real paths, in words; made: files that were written by name.
+    reads, by their real paths, in words; made: files that were written by name; goes_on_with: what takes up a
+    checkpoint of a run without a script, "": model restore.
     """
 
     def __init__(self, blocks: Blocks, directory: Path | str = ".", outdir: Path | str = "data") -> None:
@@ -65,6 +66,7 @@ class Project:
         self.calls_lost = False
         self.due: Due | None = None
         self.stepping = ""
+        self.goes_on_with = ""
         self._forget()
 
     @property

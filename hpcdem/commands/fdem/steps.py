@@ -6,7 +6,7 @@ import math
 import time as clocks
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, histories
 from hpcdem.commands.fdem.project import Project
@@ -34,7 +34,19 @@ QUIET_SECONDS = 10.0
 
 def step(project: Project, steps: int) -> None:
     """So many steps."""
-    _run(project, f"step {steps}", steps, None, None)
+    _run(project, f"step {steps}", steps, None, None, command=("step", {"steps": steps}))
+
+
+def resume(project: Project) -> None:
+    """Finish the command in which the checkpoint was written that was just taken (checkpoints.restore_newest)."""
+    command = (project.progress or {}).get("command")
+    if command is None:
+        raise CommandError("the checkpoint does not tell which command it was written in")
+    name, given = command
+    if name == "step":
+        step(project, **given)
+    else:
+        solve(project, **given)
 
 
 def solve(
@@ -52,6 +64,8 @@ def solve(
     window, limit [steps]: when a run towards a ratio has failed, see `convergence.watch`; it ends the script with an
     EquilibriumError, or, with on_failure CONTINUE, with a warning. project.solved says how it ended.
     """
+    command = "solve", {"ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit,
+                        "on_failure": on_failure}  # fmt: skip
     words = [f"{name} {value:g}" for name, value in (("ratio", ratio), ("cycles", cycles), ("time", time)) if value]
     if ratio is None and cycles is None and time is None:
         ratio = RATIO
@@ -61,7 +75,7 @@ def solve(
     first = project.step if project.progress is None else project.progress["first"]
     text = ""
     try:
-        reason, found, watch = _run(project, "solve " + " ".join(words), cycles, ratio, time, window, limit)
+        reason, found, watch = _run(project, "solve " + " ".join(words), cycles, ratio, time, window, limit, command)
         if reason in FAILED:
             text = _no_equilibrium(project, watch, reason, ratio or RATIO, found)
     except EquilibriumError as error:
@@ -96,10 +110,11 @@ def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None,
 
 def _run(
     project: Project, name: str, steps: int | None, ratio: float | None, time: float | None,
-    window: int | None = None, limit: int | None = None,
+    window: int | None = None, limit: int | None = None, command: tuple[str, dict[str, Any]] | None = None,
 ) -> tuple[str, float, Watch]:  # fmt: skip
     """Step, and write what is due. Returns why it ended, "ratio", "cycles", "time", "function" (one of the particles
-    wanted it to) or one of FAILED, the last ratio that was looked at (NaN: none), and who looked."""
+    wanted it to) or one of FAILED, the last ratio that was looked at (NaN: none), and who looked. command: what
+    `resume` is to call to finish it."""
     project.refuse_inside(f"model {name}")
     coupling.take_up(project)
     clock = project.ready().clock
@@ -107,7 +122,8 @@ def _run(
     if time is not None and project.progress is None and time <= 0.5 * clock.dt and project.log is not None:
         project.log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
-        project.progress = {"first": clock.step, "end": None if time is None else clock.time + time}
+        end = None if time is None else clock.time + time
+        project.progress = {"first": clock.step, "end": end, "command": command}
         if ratio is not None:
             ends = steps is not None or time is not None
             project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
@@ -251,7 +267,9 @@ def _answer(project: Project, request: int) -> None:
 
 def _onwards(project: Project, path: Path) -> str:
     place = project.place()
-    return "--resume" if place is not None and place["journal"] is not None else f"pcdc model restore '{path}'"
+    if place is not None and place["journal"] is not None:
+        return "--resume"
+    return project.goes_on_with or f"pcdc model restore '{path}'"
 
 
 class _Report:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from hpcdem.commands import fdem
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
+
+if TYPE_CHECKING:
+    from hpcdem.commands.fdem import Project
 
 Terms = tuple[tuple[str, Any], ...]
 
@@ -18,10 +22,10 @@ class Call:
     restore_names: puts the names and functions of a checkpoint (of this file) into the script."""
 
     def __init__(
-        self, project: Any, commands: Any, arguments: Mapping[str, Any], terms: Terms | None,
+        self, project: Project, arguments: Mapping[str, Any], terms: Terms | None,
         restore_names: Callable[[Mapping[str, Any], str], None],
     ) -> None:  # fmt: skip
-        self.project, self.commands, self.arguments = project, commands, arguments
+        self.project, self.arguments = project, arguments
         self.restore_names = restore_names
         self.where: g.Range | None = where(terms)
 
@@ -40,7 +44,7 @@ class Call:
         """Those of a model, tables by their name."""
         return {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
 
-    def group(self) -> dict[str, str]:
+    def group(self) -> dict[str, Any]:
         """`group 'g' set 's'` of a mesh."""
         given = self.arguments.get("group")
         if given is None:
@@ -75,7 +79,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
 
 
 def _restore(call: Call) -> None:
-    found = call.commands.checkpoints.restore(call.project, call["file"])
+    found = fdem.checkpoints.restore(call.project, call["file"])
     call.restore_names(found, call["file"])
 
 
@@ -84,13 +88,13 @@ def _restore(call: Call) -> None:
 
 def _shape(kind: str, *names: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        call.commands.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
+        fdem.geometry.create(call.project, kind, call["as-layer"], *(call[name] for name in names))
 
     return carry_out
 
 
 def _fractures(call: Call) -> None:
-    call.commands.meshes.fracture_network(
+    fdem.meshes.fracture_network(
         call.project, call["as-layer"], call["inside"], **trial.fracture_words(call.arguments), seed=call["seed"],
         holes=call.get("hole", []), least=call.get("shortest", 0.0),
     )  # fmt: skip
@@ -98,7 +102,7 @@ def _fractures(call: Call) -> None:
 
 def _mesh_create(call: Call) -> None:
     group = call.group()
-    call.commands.meshes.create(
+    fdem.meshes.create(
         call.project, call["from-layer"], call["size"], call.get("type", "tri"), **group,
         refine=[(r["value"], r["size"], r.get("distance")) for r in call.get("refine-layer", [])],
         holes=call.get("hole", []),
@@ -110,7 +114,7 @@ def _mesh_create(call: Call) -> None:
 
 def _mesh_structured(call: Call) -> None:
     options = {"ratio": call["ratio"]} if "ratio" in call.arguments else {}
-    call.commands.meshes.rectangle(
+    fdem.meshes.rectangle(
         call.project, call["first"], call["second"], call["cells"], call.get("type", "tri"),
         call.get("diagonal", "alternate"), **call.group(), **options,
     )  # fmt: skip
@@ -118,7 +122,7 @@ def _mesh_structured(call: Call) -> None:
 
 def _mesh_glue(call: Call) -> None:
     groups = call.get("between", {})
-    call.commands.meshes.glue(
+    fdem.meshes.glue(
         call.project, call.get("tolerance"), groups.get("value"), groups.get("set", g.DEFAULT)
     )  # fmt: skip
 
@@ -128,26 +132,26 @@ def _mesh_glue(call: Call) -> None:
 
 def _group(kind: str) -> Callable[[Call], None]:
     def carry_out(call: Call) -> None:
-        call.commands.assignments.group(call.project, kind, call["group"], call.get("set", g.DEFAULT), call.where)
+        fdem.assignments.group(call.project, kind, call["group"], call.get("set", g.DEFAULT), call.where)
 
     return carry_out
 
 
 def _element_model(call: Call) -> None:
     if call["model"] == "null":
-        call.commands.assignments.null(call.project, **call.properties(), where=call.where)
+        fdem.assignments.null(call.project, **call.properties(), where=call.where)
     else:
         name = trial.MODELS[call["model"]].name
-        call.commands.assignments.element_model(call.project, name, call.properties(), call.where)
+        fdem.assignments.element_model(call.project, name, call.properties(), call.where)
 
 
 def _face_model(call: Call) -> None:
-    call.commands.assignments.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
+    fdem.assignments.face_model(call.project, trial.MODELS[call["model"]].name, call.properties(), call.where)
 
 
 def _joint_model(call: Call) -> None:
     properties = {name: value for name, value in call.properties().items() if name != "np"}
-    call.commands.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
+    fdem.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
 
 
 def _initial_stress(call: Call) -> None:
@@ -155,18 +159,19 @@ def _initial_stress(call: Call) -> None:
     gradient = {
         name.removeprefix("stress-"): given["gradient"] for name, given in call.arguments.items() if "gradient" in given
     }
-    call.commands.assignments.initial_stress(call.project, stress, gradient, call.where)
+    fdem.assignments.initial_stress(call.project, stress, gradient, call.where)
 
 
 def _node_condition(call: Call) -> None:
-    given, commands = call.properties(), call.commands.assignments
+    given, commands = call.properties(), fdem.assignments
     match call["model"]:
         case "mechanical-velocity-boundary-condition":
             commands.velocity(call.project, **_short(given), where=call.where)
         case "mechanical-force-boundary-condition":
             commands.force(call.project, **_short(given), where=call.where)
         case "mechanical-move-boundary-constraint":
-            commands.move(call.project, *given["type"], where=call.where)
+            kind, *along = given["type"]
+            commands.move(call.project, kind, along[0] if along else (0.0, 0.0), call.where)
 
 
 def _short(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -176,7 +181,7 @@ def _short(given: Mapping[str, Any]) -> dict[str, Any]:
 
 def _face_condition(call: Call) -> None:
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
-    call.commands.assignments.stress(call.project, **given, where=call.where)
+    fdem.assignments.stress(call.project, **given, where=call.where)
 
 
 # ---- records -------------------------------------------------------------------------------------------------------
@@ -189,7 +194,7 @@ def _field(call: Call) -> None:
         about["correlation"] = call["correlation"]["value"]
         about["covariance"] = call["correlation"].get("covariance", "exponential")
     first, second = call[distribution]
-    call.commands.assignments.random_field(
+    fdem.assignments.random_field(
         call.project, call["name"], distribution=distribution, first=first, second=second, seed=call["seed"], **about
     )
 
@@ -197,7 +202,7 @@ def _field(call: Call) -> None:
 def _history(call: Call) -> None:
     how = next((word for word in ("sum", "mean", "minimum", "maximum") if word in call.arguments), "")
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
-    call.commands.histories.create(
+    fdem.histories.create(
         call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
         call.get("every", 1), call.where,
     )  # fmt: skip
@@ -205,26 +210,26 @@ def _history(call: Call) -> None:
 
 def _solve(call: Call) -> None:
     if "elastic" in call.arguments:
-        call.commands.steps.solve_elastic(call.project, **call.given("elastic"))
+        fdem.steps.solve_elastic(call.project, **call.given("elastic"))
     else:
-        call.commands.steps.solve(call.project, **call.given())
+        fdem.steps.solve(call.project, **call.given())
 
 
 def _output(call: Call) -> None:
     if "off" in call.arguments:
-        call.commands.frames.stop(call.project, call["file"])
+        fdem.frames.stop(call.project, call["file"])
     else:
-        call.commands.frames.vtk(call.project, call["file"], call.get("every"))
+        fdem.frames.vtk(call.project, call["file"], call.get("every"))
 
 
 BINDINGS: dict[str, Callable[[Call], None]] = {
-    "model new": lambda c: c.commands.settings.new(c.project),
-    "model save": lambda c: c.commands.checkpoints.save(c.project, c["file"]),
+    "model new": lambda c: fdem.settings.new(c.project),
+    "model save": lambda c: fdem.checkpoints.save(c.project, c["file"]),
     "model restore": _restore,
-    "model gravity": lambda c: c.commands.settings.gravity(c.project, c["gravity"]),
-    "model option": lambda c: c.commands.settings.option(c.project, **c.given()),
-    "model time-step": lambda c: c.commands.settings.time_step(c.project, **c.given()),
-    "model step": lambda c: c.commands.steps.step(c.project, c["steps"]),
+    "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
+    "model option": lambda c: fdem.settings.option(c.project, **c.given()),
+    "model time-step": lambda c: fdem.settings.time_step(c.project, **c.given()),
+    "model step": lambda c: fdem.steps.step(c.project, c["steps"]),
     "model solve": _solve,
     "geometry create polyline": _shape("polyline", "points"),
     "geometry create polygon": _shape("polygon", "points"),
@@ -233,52 +238,48 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
     "geometry create point": _shape("point", "points"),
     "geometry create fractures": _fractures,
-    "geometry import": lambda c: c.commands.geometry.import_file(
-        c.project, c["as-layer"], c["file"], c.get("dxf-layer")
-    ),
-    "geometry transform": lambda c: c.commands.geometry.transform(c.project, **c.given()),
-    "geometry delete": lambda c: c.commands.geometry.delete(c.project, c["layer"]),
+    "geometry import": lambda c: fdem.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
+    "geometry transform": lambda c: fdem.geometry.transform(c.project, **c.given()),
+    "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layer"]),
     "mesh create": _mesh_create,
     "mesh structured": _mesh_structured,
-    "mesh equilateral": lambda c: c.commands.meshes.equilateral(
-        c.project, c["first"], c["second"], c["size"], **c.group()
-    ),
-    "mesh import": lambda c: c.commands.meshes.import_file(
+    "mesh equilateral": lambda c: fdem.meshes.equilateral(c.project, c["first"], c["second"], c["size"], **c.group()),
+    "mesh import": lambda c: fdem.meshes.import_file(
         c.project, c["file"], **c.group(), **{n: c[n] for n in ("merge", "scale") if n in c.arguments}
     ),
-    "mesh intersect": lambda c: c.commands.meshes.intersect(c.project, c["layer"], c.get("follow", False)),
+    "mesh intersect": lambda c: fdem.meshes.intersect(c.project, c["layer"], c.get("follow", False)),
     "mesh glue": _mesh_glue,
-    "mesh quality": lambda c: c.commands.meshes.tell_quality(c.project),
+    "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
-    "element property": lambda c: c.commands.assignments.element_property(c.project, c.given(), c.where),
+    "element property": lambda c: fdem.assignments.element_property(c.project, c.given(), c.where),
     "element initial": _initial_stress,
-    "element reset state": lambda c: c.commands.settings.reset_elements(c.project, c.where),
+    "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),
     "element-face group": _group(g.FACE),
     "element-face c-model": _face_model,
-    "element-face property": lambda c: c.commands.assignments.face_property(c.project, c.given(), c.where),
+    "element-face property": lambda c: fdem.assignments.face_property(c.project, c.given(), c.where),
     "element-face boundary": _face_condition,
-    "element-face boundary remove": lambda c: c.commands.assignments.remove_face_conditions(c.project, c.where),
+    "element-face boundary remove": lambda c: fdem.assignments.remove_face_conditions(c.project, c.where),
     "face-joint group": _group(g.JOINT),
     "face-joint c-model": _joint_model,
-    "face-joint property": lambda c: c.commands.assignments.joint_property(c.project, c.given(), c.where),
-    "face-joint reset state": lambda c: c.commands.settings.reset_joints(c.project, c.where),
+    "face-joint property": lambda c: fdem.assignments.joint_property(c.project, c.given(), c.where),
+    "face-joint reset state": lambda c: fdem.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
-    "node boundary remove": lambda c: c.commands.assignments.remove_node_conditions(c.project, c.where),
-    "node initial": lambda c: c.commands.assignments.initial_velocity(c.project, c["velocity"], c.where),
-    "node reset velocity": lambda c: c.commands.settings.reset_velocity(c.project),
-    "node reset displacement": lambda c: c.commands.settings.reset_displacement(c.project),
-    "table create": lambda c: c.commands.assignments.table(c.project, c["name"], c["values"]),
+    "node boundary remove": lambda c: fdem.assignments.remove_node_conditions(c.project, c.where),
+    "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
+    "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),
+    "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
+    "table create": lambda c: fdem.assignments.table(c.project, c["name"], c["values"]),
     "field create": _field,
-    "field delete": lambda c: c.commands.assignments.remove_field(c.project, c["name"]),
-    "table delete": lambda c: c.commands.assignments.remove_table(c.project, c["name"]),
+    "field delete": lambda c: fdem.assignments.remove_field(c.project, c["name"]),
+    "table delete": lambda c: fdem.assignments.remove_table(c.project, c["name"]),
     "history create": _history,
-    "history delete": lambda c: c.commands.histories.delete(c.project, c["name"]),
-    "history export": lambda c: c.commands.histories.export(c.project, c["file"], c.get("names", ())),
-    "chart create": lambda c: c.commands.charts.create(c.project, **c.given()),
-    "chart add": lambda c: c.commands.charts.add(c.project, **c.given()),
-    "chart export": lambda c: c.commands.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
+    "history delete": lambda c: fdem.histories.delete(c.project, c["name"]),
+    "history export": lambda c: fdem.histories.export(c.project, c["file"], c.get("names", ())),
+    "chart create": lambda c: fdem.charts.create(c.project, **c.given()),
+    "chart add": lambda c: fdem.charts.add(c.project, **c.given()),
+    "chart export": lambda c: fdem.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
     "output vtk": _output,
 }
 

@@ -6,7 +6,6 @@ what they were told, so that a rank that took another way is found at once.
 
 from __future__ import annotations
 
-import importlib
 import linecache
 import math
 import os.path
@@ -21,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import names, source
 from hpcdem.lang.pcdc.bindings import BINDINGS, PASSED_OVER, Call
@@ -34,29 +34,21 @@ SEED = 0
 """Of the random numbers of Python and numpy, so that all ranks draw the same."""
 
 
-class Commands:
-    """The modules of `hpcdem.commands.fdem` by name, each imported when it is first needed."""
-
-    def __getattr__(self, name: str) -> Any:
-        return importlib.import_module(f"hpcdem.commands.fdem.{name}")
-
-
 class Interpreter:
     """Runs scripts and single lines in one namespace, on a project (hpcdem.commands.fdem).
 
-    namespace: the global names of the script. `commands` replaces hpcdem.commands.fdem in tests. journal: of a script
-    that runs, None in a conversation.
+    namespace: the global names of the script. journal: of a script that runs, None in a
+    conversation.
     """
 
-    def __init__(self, project: Any, commands: Any = None) -> None:
+    def __init__(self, project: Any) -> None:
         self.project: Any = project
-        self.commands = commands if commands is not None else Commands()
         self.sources: dict[str, Source] = {}
         self.statements: list[Statement] = []
         self.journal: Journal | None = None
         self._own_names: dict[str, Any] = {
             "__name__": "__main__", "__builtins__": __builtins__, "math": math, "Vector": Vector, "print": self._print,
-            "pcdc": Model(project, self.commands, self.look), CALL: self._carry_out,
+            "pcdc": Model(project, self.look), CALL: self._carry_out,
         }  # fmt: skip
         self.namespace = dict(self._own_names)
         self._included_at: int | None = None
@@ -180,9 +172,9 @@ class Interpreter:
         if self._passed_over(statement, arguments, told):
             return
         if asked and self.journal is not None:
-            self.commands.steps.stop_here(self.project, asked)
+            fdem.steps.stop_here(self.project, asked)
         try:
-            BINDINGS[statement.command.name](Call(self.project, self.commands, arguments, terms, self.restore_names))
+            BINDINGS[statement.command.name](Call(self.project, arguments, terms, self.restore_names))
         except HpcdemError as error:
             known = self._told_with_line(error, statement)
             if self.journal is not None:

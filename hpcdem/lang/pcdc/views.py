@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.physics.fdem import groups as g
@@ -21,8 +22,8 @@ _VECTORS = {"position": "position", "displacement": "displacement", "velocity": 
 class Model:
     """`pcdc.time`, `pcdc.node(3).velocity`, `pcdc.values('element', 'stress-yy', group='rock')`."""
 
-    def __init__(self, project: Any, commands: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
-        self._project, self._commands, self._look = project, commands, look
+    def __init__(self, project: Any, look: Callable[[Callable[[], Any]], Any]) -> None:
+        self._project, self._look = project, look
 
     @property
     def time(self) -> float:
@@ -48,12 +49,12 @@ class Model:
     @property
     def energies(self) -> dict[str, float]:
         """The energy budget [J per m of thickness]."""
-        return self._look(lambda: self._commands.queries.energies(self._project))
+        return self._look(lambda: fdem.queries.energies(self._project))
 
     @property
     def ratio(self) -> float:
         """Unbalanced over all forces of the nodes."""
-        return self._look(lambda: float(self._commands.queries.ratio(self._project)))
+        return self._look(lambda: float(fdem.queries.ratio(self._project)))
 
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
@@ -71,21 +72,21 @@ class Model:
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
         """Numbers of the elements, nodes, joints or faces that are there: of a group (group=, set=), of a layer
         (geometry=), or x=(from, to), y= in the mesh; with present=True by where they are now."""
-        return self._look(lambda: self._commands.queries.numbers(self._project, _kind(kind), _range(where)))
+        return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:
         """A quantity by name, in the order of numbers."""
-        return self._look(lambda: self._commands.queries.values(self._project, _kind(kind), _name(name), _range(where)))
+        return self._look(lambda: fdem.queries.values(self._project, _kind(kind), _name(name), _range(where)))
 
     def total(self, kind: str, name: str, **where: Any) -> float:
         """Exact sum of a quantity."""
-        return self._look(lambda: self._commands.queries.total(self._project, _kind(kind), _name(name), _range(where)))
+        return self._look(lambda: fdem.queries.total(self._project, _kind(kind), _name(name), _range(where)))
 
     def history(self, name: str) -> np.ndarray:
         """(n, 3) step, time and value of what a history has recorded."""
 
         def rows() -> np.ndarray:
-            return np.array(self._commands.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
+            return np.array(fdem.histories.find(self._project, name).rows, np.float64).reshape(-1, 3)
 
         return self._look(rows)
 

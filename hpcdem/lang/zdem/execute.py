@@ -5,24 +5,17 @@ The commands know nothing of lines and files; an error of theirs leaves here wit
 
 from __future__ import annotations
 
-import importlib
 import os.path
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from hpcdem.commands import dem
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.core.selection import Selection, has_expressions, number
 from hpcdem.lang.zdem.parser import Script, parse_text
 from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, recorded
 from hpcdem.lang.zdem.statement import Statement, find
-
-
-class Commands:
-    """The modules of `hpcdem.commands` by name, each imported when it is first needed."""
-
-    def __getattr__(self, name: str) -> Any:
-        return importlib.import_module(f"hpcdem.commands.dem.{name}")
 
 
 def refuse_unexecuted(statements: Sequence[Statement]) -> None:
@@ -107,12 +100,10 @@ class Interpreter:
     `sim` is handed to the commands. What a checkpoint and the log must know is set here: ``sim.script`` (the text),
     ``sim.position`` (index of the statement being carried out) and ``sim.line`` (its line). Asked are only
     ``sim.extents()`` and, where there are ranks, ``sim.comm``.
-    `commands` replaces the modules of hpcdem.commands in tests.
     """
 
-    def __init__(self, script: Script, commands: Any = None) -> None:
+    def __init__(self, script: Script) -> None:
         self.script = script
-        self.commands = commands if commands is not None else Commands()
 
     def run(self, sim: Any, start_at: int = 0, resume: int | None = None, saved_script: str = "") -> None:
         """Carry out the statements from index `start_at` to the end, or go on after a checkpoint.
@@ -133,7 +124,7 @@ class Interpreter:
         for index in range(start_at, len(self.script.statements)):
             self.carry_out(sim, index)
         if self.script.statements[-1].command != "STOP":
-            self.commands.cycles.stop(sim)
+            dem.cycles.stop(sim)
 
     def _refuse_lost_files(self, sim: Any) -> None:
         """Rank 0 looks, so that all ranks agree."""
@@ -156,7 +147,7 @@ class Interpreter:
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
         if statement.command in ("CYC", "IMPLE"):
-            self._guarded(statement, lambda: self.commands.cycles.resume(sim))
+            self._guarded(statement, lambda: dem.cycles.resume(sim))
 
     def carry_out(self, sim: Any, index: int) -> None:
         statement = self.script.statements[index]
@@ -194,7 +185,7 @@ class _Call:
     """One statement on its way to a command: its arguments with expressions resolved and file names made complete."""
 
     def __init__(self, interpreter: Interpreter, sim: Any, statement: Statement) -> None:
-        self.sim, self.commands, self.statement = sim, interpreter.commands, statement
+        self.sim, self.statement = sim, statement
         self.directory = interpreter.script.directory
         self.arguments = dict(statement.arguments)
         self.where: Selection | None = statement.selection
@@ -231,61 +222,61 @@ class _Call:
 
 
 def _start(call: _Call) -> None:
-    call.commands.particles.start(call.sim)
+    dem.particles.start(call.sim)
 
 
 def _restore(call: _Call) -> None:
-    call.commands.checkpoints.restore(call.sim, call.existing())
+    dem.checkpoints.restore(call.sim, call.existing())
 
 
 def _load(call: _Call) -> None:
-    call.commands.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
+    dem.particles.load(call.sim, call.existing(), **call.given("scale", "x", "y"))
 
 
 def _stop(call: _Call) -> None:
-    call.commands.cycles.stop(call.sim)
+    dem.cycles.stop(call.sim)
 
 
 def _box(call: _Call) -> None:
-    call.commands.walls.box(call.sim, **call.given())
+    dem.walls.box(call.sim, **call.given())
 
 
 def _wall(call: _Call) -> None:
-    call.commands.walls.wall(call.sim, **call.given())
+    dem.walls.wall(call.sim, **call.given())
 
 
 def _ball(call: _Call) -> None:
     arguments = call.given()
-    call.commands.particles.ball(call.sim, arguments.pop("id"), **arguments)
+    dem.particles.ball(call.sim, arguments.pop("id"), **arguments)
 
 
 def _gen(call: _Call) -> None:
     arguments = call.given()
     radii = arguments.pop("rad")
     if arguments.pop("grid", False):
-        call.commands.particles.gen_grid(call.sim, radii, **arguments)
+        dem.particles.gen_grid(call.sim, radii, **arguments)
     else:
-        call.commands.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
+        dem.particles.gen(call.sim, arguments.pop("num"), radii, **arguments)
 
 
 def _gline(call: _Call) -> None:
-    call.commands.particles.gline(call.sim, **call.given())
+    dem.particles.gline(call.sim, **call.given())
 
 
 def _clump(call: _Call) -> None:
     arguments = call.given()
     if arguments.pop("file", None) is not None:
-        call.commands.clumps.clump(call.sim, call.existing(), **arguments)
+        dem.clumps.clump(call.sim, call.existing(), **arguments)
     else:
-        call.commands.clumps.join(call.sim, call.where, **arguments)
+        dem.clumps.join(call.sim, call.where, **arguments)
 
 
 def _del(call: _Call) -> None:
-    call.commands.particles.delete(call.sim, call.where)
+    dem.particles.delete(call.sim, call.where)
 
 
 def _exp(call: _Call) -> None:
-    call.commands.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
+    dem.particles.export(call.sim, call.path(), with_group="group" in call.arguments, where=call.where)
 
 
 def _prop(call: _Call) -> None:
@@ -294,23 +285,23 @@ def _prop(call: _Call) -> None:
         # Bonds are made with the new properties, but before the particles leave the group that RANGE may name.
         group = {"group": properties.pop("group")} if "group" in properties else {}
         if properties:
-            call.commands.properties.prop(call.sim, call.where, **properties)
-        call.commands.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
+            dem.properties.prop(call.sim, call.where, **properties)
+        dem.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
         properties = group
     if properties:
-        call.commands.properties.prop(call.sim, call.where, **properties)
+        dem.properties.prop(call.sim, call.where, **properties)
 
 
 def _bond(call: _Call) -> None:
-    call.commands.bonds.break_bonds(call.sim, call.where)
+    dem.bonds.break_bonds(call.sim, call.where)
 
 
 def _fix(call: _Call) -> None:
-    call.commands.properties.fix(call.sim, tuple(call.arguments), where=call.where)
+    dem.properties.fix(call.sim, tuple(call.arguments), where=call.where)
 
 
 def _free(call: _Call) -> None:
-    call.commands.properties.free(call.sim, tuple(call.arguments), where=call.where)
+    dem.properties.free(call.sim, tuple(call.arguments), where=call.where)
 
 
 def _set(call: _Call) -> None:
@@ -319,35 +310,35 @@ def _set(call: _Call) -> None:
             name = "lsm"
         elif name == "outdir":
             value = str(call.directory / value)
-        call.commands.settings.set_option(call.sim, name, value)
+        dem.settings.set_option(call.sim, name, value)
 
 
 def _cyc(call: _Call) -> None:
-    call.commands.cycles.cycle(call.sim, call.arguments["steps"])
+    dem.cycles.cycle(call.sim, call.arguments["steps"])
 
 
 def _imple(call: _Call) -> None:
     arguments = call.given()
-    call.commands.cycles.imple(call.sim, arguments.pop("id"), **arguments)
+    dem.cycles.imple(call.sim, arguments.pop("id"), **arguments)
 
 
 def _sav(call: _Call) -> None:
-    call.commands.checkpoints.save(call.sim, call.path())
+    dem.checkpoints.save(call.sim, call.path())
 
 
 def _hist(call: _Call) -> None:
     what = recorded(call.statement)
-    call.commands.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
+    dem.history.hist(call.sim, call.arguments["id"], call.arguments["interval"], what)
 
 
 def _plot(call: _Call) -> None:
-    call.commands.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
+    dem.history.plot_hist(call.sim, y=call.arguments["y"], x=call.arguments["x"])
 
 
 def _draw(call: _Call) -> None:
     words = {name: on for name, on in call.arguments.items() if name != "interval"}
     what, off = ([name for name, on in words.items() if on is wanted] for wanted in (True, False))
-    call.commands.history.draw(call.sim, call.arguments.get("interval"), what, off)
+    dem.history.draw(call.sim, call.arguments.get("interval"), what, off)
 
 
 def _log(call: _Call) -> None:

@@ -1,44 +1,40 @@
-"""The Python interface: the commands of the ZDEM language as methods, the state as numpy arrays.
-
-Everything ends in the functions of `hpcdem.commands`, as a script does, so both give the same results to the last
-bit. Under mpiexec or srun every rank runs the same program, and every method is collective: call it on all ranks.
-"""
+"""A simulation in a Python program: particles here, blocks in `blocks`, and both together."""
 
 from __future__ import annotations
 
 import functools
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from hpcdem import session
-from hpcdem.core.errors import CommandError, ScriptError, UsageError
+from hpcdem.api.blocks import BlockCommands
+from hpcdem.api.program import carried_out
+from hpcdem.api.program import place as _place
+from hpcdem.commands import dem, fdem
+from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.core.fields import FIELDS, FIX_BITS
 from hpcdem.core.selection import Selection
-from hpcdem.lang.zdem.execute import Commands, Interpreter, find, tell_warnings
+from hpcdem.io import checkpoint
+from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
 from hpcdem.physics.dem.materials import MATERIAL
+from hpcdem.runtime.checkpoints import newest_first
 
-PACKAGE = str(Path(__file__).resolve().parent)
+if TYPE_CHECKING:
+    from hpcdem.commands.fdem import Project
+    from hpcdem.physics.dem.simulation import Simulation as Engine
+
 SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
 """Fields that a program may write."""
 MATERIAL_FIELDS = MATERIAL.names or ()
 Point = tuple[float, float]
 Where = str | Selection | None
 Method = TypeVar("Method", bound=Callable[..., Any])
-
-
-def _place() -> tuple[str, int]:
-    """File and line of the user's program that is being carried out."""
-    frame: Any = sys._getframe(1)
-    while frame is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        frame = frame.f_back
-    return (frame.f_code.co_filename, frame.f_lineno) if frame is not None else ("python", 0)
 
 
 def _command(method: Method, edits: bool = True) -> Method:
@@ -48,21 +44,16 @@ def _command(method: Method, edits: bool = True) -> Method:
     @functools.wraps(method)
     def call(self: Simulation, *values: Any, **options: Any) -> Any:
         place = _place()
-        self.engine.line = place[1]
+        if self._engine is not None:
+            self._engine.line = place[1]
 
-        def carried_out() -> Any:
-            try:
-                value = method(self, *values, **options)
-            except CommandError as error:
-                raise ScriptError(*place, f"{method.__name__}: {error}") from error
-            except (TypeError, ValueError) as error:
-                if _raised_by_the_user(error):
-                    raise
-                raise ScriptError(*place, f"{method.__name__}: {error}; see help(hpcdem.Simulation)") from error
-            self.engine.edited |= edits
+        def done() -> Any:
+            value = carried_out(place, method.__name__, lambda: method(self, *values, **options))
+            if self._engine is not None:
+                self._engine.edited |= edits
             return value
 
-        return self._asked((method.__name__, values, options), carried_out)
+        return self._asked((method.__name__, values, options), done)
 
     return call  # type: ignore[return-value]
 
@@ -70,17 +61,6 @@ def _command(method: Method, edits: bool = True) -> Method:
 def _look(method: Method) -> Method:
     """A command that changes nothing."""
     return _command(method, edits=False)
-
-
-def _raised_by_the_user(error: BaseException) -> bool:
-    """Whether a function of the program, called by us, raised it: then it is the program's affair."""
-    trace, inside = error.__traceback__, False
-    while trace is not None:
-        ours = trace.tb_frame.f_code.co_filename.startswith(PACKAGE)
-        if inside and not ours and "site-packages" not in trace.tb_frame.f_code.co_filename:
-            return True
-        inside, trace = inside or ours, trace.tb_next
-    return False
 
 
 @dataclass(frozen=True)
@@ -111,8 +91,13 @@ class Call:
         self._sim._asked(("cancel", self._watcher.every), remove, again=True)
 
 
-class Simulation:
-    """A model and its run. Born empty, as after START.
+class Simulation(BlockCommands):
+    """A model and its run: particles, blocks, or both. Born empty, as after START.
+
+    Particles are made by the methods of this class, blocks by those of `mesh`, `elements`, `faces`, `joints`, `nodes`,
+    `geometry`, `tables`, `fields`, `histories`, `charts` and `output`, and are stepped by `step` and `solve`. `couple`
+    lets the two touch. Whichever comes second writes into a folder of its own below that of the results, `particles` or
+    `blocks`.
 
     outdir: folder of the results (default: ``data`` beside the program); threads: per rank (default: what ``-j`` or
     ``srun -c`` gives, else 1); log: print progress and the table of stages. Relative file names, here and in all
@@ -126,13 +111,61 @@ class Simulation:
     def __init__(self, outdir: str | Path | None = None, threads: int | None = None, log: bool = True) -> None:
         self._session = session.current(threads)
         self.directory = self._session.directory.resolve()
-        folder = None if outdir is None else self.directory / outdir
-        self.engine = self._session.simulation(folder, self._session.log if log else None)
-        self.engine.outdir = self.engine.outdir.resolve()
-        self.engine.goes_on_with = "Simulation.resume()"
-        self._do = Commands()
+        usual = Path(self._session.outdir or self.directory / "data") if outdir is None else self.directory / outdir
+        self._folder = usual.resolve()
+        self._log = self._session.log if log else None
+        self._engine: Engine | None = None
+        self._project: Project | None = None
+        self.coupling: Coupling | None = None
+        self._begin_blocks(self._made_project)
         self._seen_alone = ""
-        self._asked(("Simulation", outdir, log), lambda: None, again=True)
+        if self._session.interpreter is not None:  # its journal knows particles by their numbers
+            self._asked(("Simulation", outdir, log), lambda: None, again=True)
+
+    @property
+    def engine(self) -> Engine:
+        """The particles, of `hpcdem.physics.dem`; made when they are first used."""
+        if self._engine is None:
+            folder = self._folder if self._project is None else self._folder / "particles"
+            self._engine = self._session.simulation(folder, self._log)
+            self._engine.goes_on_with = "Simulation.resume()"
+            self._engine.line = _place()[1]
+        return self._engine
+
+    def _made_project(self) -> Project:
+        """The blocks, made when they are first used."""
+        if self._project is None:
+            running = self._session.interpreter
+            if running is not None and running.journal is not None:
+                raise CommandError("the blocks of a PCDC script are those of its pcdc lines")
+            if self._session.reproduction is not None:
+                raise CommandError(
+                    "--check-reproducible is for models of particles; of blocks compare what save writes"
+                )
+            folder = self._folder
+            if self._engine is not None and self._engine.outdir == folder:
+                if self._untouched(self._engine):  # as after every(...)
+                    self._engine.outdir = folder / "particles"
+                else:
+                    folder = folder / "blocks"
+            self._project = self._session.project(folder, quiet=self._log is None)
+            self._project.goes_on_with = "Simulation.resume()"
+        return self._project
+
+    @staticmethod
+    def _untouched(engine: Engine) -> bool:
+        """There is nothing of particles yet. Collective."""
+        return engine.clock.step == 0 and len(engine.walls) == 0 and engine.count(len(engine.particles)) == 0
+
+    @property
+    def _only_blocks(self) -> bool:
+        """There are blocks and no particles. Collective."""
+        return self._project is not None and (self._engine is None or self._untouched(self._engine))
+
+    @property
+    def _clock(self) -> Any:
+        """Of the particles; of the blocks where there are no particles. Collective."""
+        return self._project.blocks.clock if self._project is not None and self._only_blocks else self.engine.clock
 
     def __enter__(self) -> Simulation:
         return self
@@ -145,9 +178,12 @@ class Simulation:
 
     @_command
     def start(self) -> None:
-        """START: forget everything and begin a new, empty model."""
+        """START, model new: forget everything and begin a new, empty model."""
         self._refuse_coupled("start")
-        self._do.particles.start(self.engine)
+        if self._project is not None:
+            fdem.settings.new(self._project)
+        if self._project is None or self._engine is not None:
+            dem.particles.start(self.engine)
 
     @_command
     def box(
@@ -161,7 +197,7 @@ class Simulation:
         fric: float = 0.0,
     ) -> None:
         """BOX: four walls around the space of the model; particles that leave it are deleted."""
-        self._do.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
+        dem.walls.box(self.engine, left, right, bottom, height, kn, ks, fric)
 
     @_command
     def wall(
@@ -177,20 +213,20 @@ class Simulation:
         yv: float | None = None,
     ) -> None:
         """WALL: make a wall from node to node, or change the one with this id."""
-        self._do.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
+        dem.walls.wall(self.engine, id, nodes, kn, ks, fric, _color(color), xv, yv)
 
     @_command
     def ball(
         self, x: float, y: float, rad: float, id: int | None = None, color: str | int = 0, group: str = "***"
     ) -> None:
         """BALL: one particle; without an id it gets the next free one."""
-        self._do.particles.ball(self.engine, id, x, y, rad, _color(color), group)
+        dem.particles.ball(self.engine, id, x, y, rad, _color(color), group)
 
     @_command
     def gen(self, num: int, rad: Iterable[float], x: Point, y: Point, color: str | int = 0, group: str = "***") -> int:
         """GEN num: random insertion without overlap into the rectangle x, y, radii drawn from `rad`; how many fitted
         in."""
-        return self._do.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
+        return dem.particles.gen(self.engine, int(num), _radii(rad), x, y, _color(color), group)
 
     @_command
     def gen_grid(
@@ -203,7 +239,7 @@ class Simulation:
         group: str = "***",
     ) -> int:
         """GEN grid: a particle at each node of a square lattice of spacing 2 max(rad); how many were made."""
-        return self._do.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
+        return dem.particles.gen_grid(self.engine, _radii(rad), x, y, idmin, _color(color), group)
 
     @_command
     def gline(
@@ -220,14 +256,14 @@ class Simulation:
         group: str = "***",
     ) -> int:
         """GLINE: a row of particles from p1 towards p2, their distance over the sum of radii is `cratio`; how many."""
-        return self._do.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
+        return dem.particles.gline(self.engine, p1, p2, rad, cratio, kn, ks, fric, _color(color), group)
 
     @_command
     def load(self, file: str | Path, scale: float = 1.0, x: Point | None = None, y: Point | None = None) -> int:
         """LOAD: a new model from rows ``x y r [group]``, or from a frame all_<step>.dat; x, y: window in the numbers of
         the file; how many."""
         self._refuse_coupled("load")
-        return self._do.particles.load(self.engine, self._existing(file), scale, x, y)
+        return dem.particles.load(self.engine, self._existing(file), scale, x, y)
 
     @_command
     def clump(
@@ -242,22 +278,22 @@ class Simulation:
     ) -> int:
         """CLUMP file: rigid bodies of discs from a clump file, scaled, turned by `angle` [rad] about its origin, moved
         by (x, y); how many bodies."""
-        return self._do.clumps.clump(self.engine, self._existing(file), x, y, angle, scale, _color(color), group)
+        return dem.clumps.clump(self.engine, self._existing(file), x, y, angle, scale, _color(color), group)
 
     @_command
     def join(self, where: Where, group: str | None = None, color: str | int | None = None) -> int:
         """CLUMP RANGE: make one rigid clump of the chosen particles; of how many."""
-        return self._do.clumps.join(self.engine, _selection(where), group, _color(color))
+        return dem.clumps.join(self.engine, _selection(where), group, _color(color))
 
     @_command
     def delete(self, where: Where = None) -> int:
         """DEL: remove particles with their contacts and bonds; how many went. Their ids are not used again."""
-        return self._do.particles.delete(self.engine, _selection(where))
+        return dem.particles.delete(self.engine, _selection(where))
 
     @_look
     def export(self, file: str | Path, group: bool = False, where: Where = None) -> None:
         """EXP: rows ``x y r [group]`` in the order of ids."""
-        self._do.particles.export(self.engine, self.directory / file, group, _selection(where))
+        dem.particles.export(self.engine, self.directory / file, group, _selection(where))
 
     # ---- what it is made of ----------------------------------------------------------------------------------------
 
@@ -283,7 +319,7 @@ class Simulation:
         yp: float | None = None,
     ) -> None:
         """PROP: properties, velocities, colour and group of particles; what is left out stays."""
-        self._do.properties.prop(
+        dem.properties.prop(
             self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
             hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
         )  # fmt: skip
@@ -305,7 +341,7 @@ class Simulation:
         rubber: bool = False,
     ) -> int:
         """PROP with bond keys: bond the pairs that touch, renew the bonds that are there; how many are new."""
-        return self._do.bonds.bond(
+        return dem.bonds.bond(
             self.engine, _selection(where), ebmod=ebmod, gbmod=gbmod, tstrength=tstrength, sstrength=sstrength,
             n_bond=n_bond, s_bond=s_bond, tolerate=tolerate, rext=rext, fric=fric, rubber=rubber,
         )  # fmt: skip
@@ -313,24 +349,24 @@ class Simulation:
     @_command
     def break_bonds(self, where: Where = None) -> int:
         """BOND break: remove the bonds with both ends in `where`; how many."""
-        return self._do.bonds.break_bonds(self.engine, _selection(where))
+        return dem.bonds.break_bonds(self.engine, _selection(where))
 
     @_command
     def fix(self, *dofs: str, where: Where = None) -> None:
         """FIX: these of "x", "y", "spin" keep the velocity they have."""
-        self._do.properties.fix(self.engine, _degrees(dofs), where=_selection(where))
+        dem.properties.fix(self.engine, _degrees(dofs), where=_selection(where))
 
     @_command
     def free(self, *dofs: str, where: Where = None) -> None:
         """FREE: undo `fix`."""
-        self._do.properties.free(self.engine, _degrees(dofs), where=_selection(where))
+        dem.properties.free(self.engine, _degrees(dofs), where=_selection(where))
 
     @_command
     def add_physics(self, name: str, **parameters: float) -> None:
         """Physics on the particles beside their motion, from the next step on. There is "diffusion": heat through
         contacts; conductance of each [W/K], capacity [J/(kg K)]; fields temperature [K], heat_source [W], heat_given
         [J]; HIST follows heat and heat_given [J], which are columns of energy.csv."""
-        self._do.physics.add(self.engine, name, **parameters)
+        dem.physics.add(self.engine, name, **parameters)
 
     @_command
     def set(self, **options: Any) -> None:
@@ -340,14 +376,15 @@ class Simulation:
             if name == "outdir":
                 self._write_into(value)
             else:
-                self._do.settings.set_option(self.engine, name, value)
+                dem.settings.set_option(self.engine, name, value)
 
     # ---- running ---------------------------------------------------------------------------------------------------
 
     @_command
     def cycle(self, n: int) -> None:
         """CYC: n steps, with output at the SET intervals."""
-        self._do.cycles.cycle(self.engine, int(n))
+        self._refuse_only_blocks()
+        dem.cycles.cycle(self.engine, int(n))
 
     @_command
     def imple(
@@ -362,7 +399,8 @@ class Simulation:
         vtk: float | None = None,
     ) -> None:
         """IMPLE: step until the wall has gone this far [m]; outputs at these ways of the wall [m]."""
-        self._do.cycles.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
+        self._refuse_only_blocks()
+        dem.cycles.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
         """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
@@ -386,39 +424,91 @@ class Simulation:
 
     @_look
     def save(self, file: str | Path) -> None:
-        """SAV: the whole state to a checkpoint."""
-        self._do.checkpoints.save(self.engine, self.directory / file)
+        """SAV, model save: the whole state to a checkpoint, of particles, of blocks, or of both if they are coupled."""
+        if self._project is None:
+            dem.checkpoints.save(self.engine, self.directory / file)
+            return
+        if self._project.coupled is None and not self._only_blocks:
+            raise CommandError("particles and blocks that are not coupled are two states; couple() makes them one")
+        fdem.checkpoints.save(self._project, str(file))
 
     @_command
     def restore(self, file: str | Path) -> None:
-        """RES: the whole state of a checkpoint, written on any number of ranks."""
-        self._refuse_coupled("restore")
-        self._do.checkpoints.restore(self.engine, self._existing(file))
+        """RES, model restore: the whole state of a checkpoint, written on any number of ranks: of particles or of
+        blocks, which then replace those that are there; of both for particles and blocks that are coupled."""
+        path = self._existing(file)
+        kind = self._kind(path)
+        if not kind:
+            self._refuse_coupled("restore")
+            dem.checkpoints.restore(self.engine, path)
+            return
+        if kind == checkpoint.BOTH and (self._project is None or self._project.coupled is None):
+            raise CommandError(f"{file} holds particles and blocks that are coupled: couple() comes first, or resume()")
+        names = fdem.checkpoints.restore(self._made_project(), path)
+        if names and self._log is not None:
+            self._log.info(f"{file} holds names of a script, which programs do not take: {', '.join(names)}")
 
     @_command
     def resume(self) -> bool:
-        """Take up the newest whole checkpoint of `outdir` and finish the cycle in which it was written; False if there
-        is none. Functions of `every` must have been given before."""
+        """Take up the newest whole checkpoint of `outdir` and finish the command in which it was written, `cycle`,
+        `imple`, `step` or `solve`; False if there is none. Functions of `every` must have been given before. Particles
+        that were coupled to blocks made before them come with these: `coupling` is there then."""
+        self._refuse_coupled("resume")
+        found = self._newest(self._folder)
+        if found is None or not self._kind(found):
+            beside = self._newest(self._folder / "blocks")
+            if beside is not None:
+                raise CommandError(
+                    f"{beside} is of blocks that were made after particles: whether it is newer than those of the "
+                    "particles alone cannot be told. Make the blocks first in programs that are to go on; or build "
+                    "both again, couple() and restore(...)"
+                )
+            return self._resume_particles()
+        project = self._made_project()
+        if not fdem.checkpoints.restore_newest(project):
+            return False
+        if project.continues is not None:
+            project.asleep = self.engine.number
+            self._couple(project, None, 0.0)
+        fdem.steps.resume(project)
+        return True
+
+    def _resume_particles(self) -> bool:
         from hpcdem.physics.dem import saved_state
 
-        self._refuse_coupled("resume")
         found = saved_state.restore_newest(self.engine, [self.engine.outdir])
         if found is None:
             return False
         self.engine.progress = found["progress"]
-        self._do.cycles.resume(self.engine)
+        dem.cycles.resume(self.engine)
         return True
+
+    def _newest(self, folder: Path) -> str | None:
+        """The newest checkpoint of a folder; looked for by rank 0."""
+        comm = self._session.comm
+        found = newest_first([folder])[0] if comm.rank == 0 else []
+        return comm.bcast(str(found[0]) if found else None)
+
+    def _kind(self, path: str) -> str:
+        """Of a checkpoint: "" of particles, or what is none; looked at by rank 0."""
+        comm, kind = self._session.comm, ""
+        if comm.rank == 0:
+            try:
+                kind = str(checkpoint.read_state(path).get("kind", ""))
+            except HpcdemError:  # the command that reads it says what is wrong
+                pass
+        return comm.bcast(kind)
 
     @_look
     def hist(self, id: int, interval: int, what: str) -> None:
         """HIST: record kinetic, step, time, unbalanced, contacts, bonds or energy, or "gstress group a", "gstrain group
         a|b", "xstress wall 3", "ystrain wall 0|3", every `interval` steps in hist_id_<id>.dat and hist_<id>.csv."""
-        self._do.history.hist(self.engine, id, interval, what)
+        dem.history.hist(self.engine, id, interval, what)
 
     @_look
     def plot(self, y: int, x: int) -> None:
         """PLOT: at `finish`, write history y against history x."""
-        self._do.history.plot_hist(self.engine, y, x)
+        dem.history.plot_hist(self.engine, y, x)
 
     @_command
     def command(self, text: str) -> None:
@@ -427,7 +517,7 @@ class Simulation:
         name, line = _place()
         try:
             script = parse_text(text if begins else "RES model\n" + text, str(self.directory / "command"))
-            interpreter = Interpreter(script, self._do)
+            interpreter = Interpreter(script)
             tell_warnings(script, self.engine)
             for index in range(0 if begins else 1, len(script.statements)):
                 interpreter.carry_out(self.engine, index)
@@ -440,8 +530,11 @@ class Simulation:
     def finish(self) -> None:
         """The end: histories closed, the table of stages printed, the last frame drawn. Without it, all this happens
         when the program ends."""
-        self._do.cycles.stop(self.engine)
-        self._session.finish(self.engine)
+        if self._project is not None and self._project in self._session.projects:
+            self._session.leave(self._project)
+        if self._engine is not None:
+            dem.cycles.stop(self._engine)
+            self._session.finish(self._engine)
 
     # ---- output of one moment --------------------------------------------------------------------------------------
 
@@ -550,33 +643,34 @@ class Simulation:
 
     @property
     def steps(self) -> int:
-        """Number of the present step."""
-        return self._asked(("steps",), lambda: int(self.engine.clock.step))
+        """Number of the present step, of the particles; of the blocks where there are no particles."""
+        return self._asked(("steps",), lambda: int(self._clock.step))
 
     @property
     def time(self) -> float:
-        """Model time [s]."""
-        return self._asked(("time",), lambda: float(self.engine.clock.time))
+        """Model time [s] of the same."""
+        return self._asked(("time",), lambda: float(self._clock.time))
 
     @property
     def dt(self) -> float:
-        """Time step of the last cycle [s]; 0 before the first."""
-        return self._asked(("dt",), lambda: float(self.engine.clock.dt))
+        """Time step of the same [s]; 0 before the first step."""
+        return self._asked(("dt",), lambda: float(self._clock.dt))
 
     @property
     def rank(self) -> int:
         """Which of the ranks this is."""
-        return self.engine.comm.rank
+        return self._session.comm.rank
 
     @property
     def ranks(self) -> int:
         """Number of ranks."""
-        return self.engine.comm.size
+        return self._session.comm.size
 
     @property
     def outdir(self) -> Path:
-        """Folder of the results."""
-        return self.engine.outdir
+        """Folder of the results; of the blocks where there are no particles."""
+        first = self._engine or self._project
+        return self._folder if first is None else first.outdir
 
     @property
     def walls(self) -> dict[int, Wall]:
@@ -629,6 +723,8 @@ class Simulation:
         """The energy budget since the first cycle after ``set(energy=n)`` [J]: the columns of energy.csv by name."""
         import dataclasses
 
+        if self._only_blocks:
+            raise CommandError("there are no particles; energies is the budget of blocks")
         if self.engine.energy is None or self.engine.energy.start is None:
             raise CommandError("there is no account yet: set(energy=n) comes first, then a cycle")
         return dataclasses.asdict(self.engine.energy.look(self.engine))
@@ -672,6 +768,26 @@ class Simulation:
     def bonds_broken(self) -> tuple[int, int]:
         """Bonds broken so far, in tension and in shear."""
         return self._asked(("bonds_broken",), self.engine.broken)
+
+    # ---- with blocks -----------------------------------------------------------------------------------------------
+
+    def couple(self, friction: float | None = None, dt: float = 0.0) -> Coupling:
+        """Let the particles touch the blocks, see `hpcdem.couple`: `step` and `solve` step both from here on."""
+
+        def coupled() -> Coupling:
+            if self._project is None:
+                raise CommandError("there are no blocks yet: mesh.create(...) and elements.model(...) come first")
+            return self._couple(self._project, friction, dt)
+
+        made: Coupling = carried_out(_place(), "couple", coupled)
+        return made
+
+    def _couple(self, project: Project, friction: float | None, dt: float) -> Coupling:
+        from hpcdem.commands.fdem import coupling
+
+        self._session.prepare("coupled")
+        self.coupling = Coupling(project, coupling.couple(project, self.engine, friction, dt))
+        return self.coupling
 
     # ---- ours ------------------------------------------------------------------------------------------------------
 
@@ -734,11 +850,21 @@ class Simulation:
             )
 
     def _write_into(self, folder: str | Path) -> None:
-        self._do.settings.set_option(self.engine, "outdir", self.directory / folder)
+        dem.settings.set_option(self.engine, "outdir", self.directory / folder)
 
     def _refuse_coupled(self, what: str) -> None:
-        if self.engine.coupled:
+        if self._engine is not None and self._engine.coupled:
             raise CommandError(f"{what} would replace particles that touch blocks: part them first, Coupling.end()")
+
+    def _refuse_only_blocks(self) -> None:
+        if self._only_blocks:
+            raise CommandError("there are no particles; blocks are stepped by step and solve")
+
+    def _before_steps(self) -> None:
+        if self._engine is not None and self._engine.watchers and self._only_blocks:
+            raise CommandError(
+                "functions of every(...) are called at steps of particles, and there are none: cancel them"
+            )
 
     def _table(self, name: str) -> dict[str, np.ndarray]:
         from hpcdem.physics.dem import diagnostics
@@ -761,7 +887,7 @@ class Simulation:
 
     def _existing(self, file: str | Path) -> str:
         """A file to read: in `directory`, then in data below it; looked for by rank 0."""
-        comm = self.engine.comm
+        comm = self._session.comm
         found = comm.bcast(find(self.directory, str(file)) if comm.rank == 0 else None)
         if found is None:
             raise CommandError(f"there is no file {self.directory / file}")
@@ -826,19 +952,16 @@ def couple(particles: Simulation, friction: float | None = None, dt: float = 0.0
     and that of the particle counts. dt [s]: the time step; left out, that of `set(dt=...)` or `pcdc model time-step`,
     else the smaller of the stable ones.
     """
-    from hpcdem.commands.fdem import coupling
-
     place = _place()
     try:
         if not isinstance(particles, Simulation):
             raise CommandError(f"expected an hpcdem.Simulation, got {particles!r}")
         running, projects = session.current().interpreter, session.current().projects
         if not projects:
-            raise CommandError("there are no blocks: it belongs into a PCDC script")
-        session.current().prepare("coupled")
+            raise CommandError("there are no blocks: it belongs into a PCDC script; programs have Simulation.couple")
 
         def both() -> Coupling:
-            return Coupling(projects[-1], coupling.couple(projects[-1], particles.engine, friction, dt))
+            return particles._couple(projects[-1], friction, dt)
 
         if running is None or not running.keeps_calls:
             return both()

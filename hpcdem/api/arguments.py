@@ -1,0 +1,185 @@
+"""Values of Python as arguments of a PCDC command: the same names, kinds and rules as a line of a script."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, ScriptError
+from hpcdem.lang.pcdc import bindings, parser, rules, trial
+from hpcdem.lang.pcdc.keywords import matching
+from hpcdem.lang.pcdc.kinds import Kind, TableName
+from hpcdem.lang.pcdc.lexer import short
+from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
+from hpcdem.lang.zdem.nearest import hint
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.tables import Drawn, Over
+
+Where = str | g.Term | tuple[g.Term, ...] | None
+"""The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
+_WORDS = {g.ELEMENT: "element", g.NODE: "node", g.FACE: "element-face", g.JOINT: "face-joint"}
+
+
+def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False) -> dict[str, Any]:
+    """Those of a command without models, by the names of Python; what is None is left out. ranged: it has a range.
+    ValueError names the one that is wrong, CommandError a value that no model could make right."""
+    options = (*command.leading, *command.options)
+    found = _read(options, given, command.name)
+    if command.needs_option and not any(option.name in found for option in command.options):
+        raise ValueError(f"needs at least one of {_listed(command.options)}")
+    rules.check(command, found, () if ranged else None)
+    trial.check(command, _known(found), None)
+    return found
+
+
+def model_arguments(command: Command, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The same of a command that names a constitutive model or condition."""
+    model = _model(command, name)
+    properties = _read(model.options, given, f"model {model.keyword}")
+    if model.any_of and not properties:
+        raise ValueError(f"needs at least one of {_listed(model.options)}")
+    if model.one_of and not any(all(word in properties for word in words) for words in model.one_of):
+        sets = " or ".join(" and ".join(map(trial.python, words)) for words in model.one_of)
+        raise ValueError(f"model {model.keyword} needs {sets}")
+    found = {"model": model.keyword.name, "properties": properties}
+    trial.check(command, {**found, "properties": _known(properties)}, None)
+    return found
+
+
+def _known(given: dict[str, Any]) -> dict[str, Any]:
+    """Without arrays, whose values were looked at one by one."""
+    return {name: value for name, value in given.items() if not isinstance(value, np.ndarray)}
+
+
+def _model(command: Command, name: str) -> Model:
+    if not isinstance(name, str):
+        raise ValueError(f"expected the name of a model, got {name!r}")
+    typed = name.replace("_", "-")
+    found = matching(typed, command.models)
+    if len(found) != 1:
+        names = [model.keyword.name for model in command.models if not model.later]
+        raise ValueError(f"there is no model '{name}'; there is {', '.join(names)}{hint(typed, names)}")
+    if found[0].later:
+        raise ValueError(f"model {found[0].keyword} is not there yet: {found[0].later}")
+    return found[0]
+
+
+def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str) -> dict[str, Any]:
+    """Values by the names of the table, as the parser hands them over."""
+    found = {}
+    for name, value in given.items():
+        if value is None:
+            continue
+        option = _option(options, name, of)
+        if option.later:
+            raise ValueError(f"{name} is not there yet: {option.later}")
+        if not option.values:
+            if not isinstance(value, (bool, np.bool_)):
+                raise ValueError(f"{name}: expected True or False, got {_shown(value)}")
+            if not value:
+                continue
+        if option.repeated:
+            found[option.name] = [_values(option, one, name) for one in _items(value, name)]
+        else:
+            found[option.name] = _values(option, value, name)
+    missing = [option for option in options if option.required and option.name not in found]
+    if missing:
+        raise ValueError(f"{of} needs {_listed(missing)}")
+    return {option.name: found[option.name] for option in options if option.name in found}
+
+
+def _option(options: tuple[Option, ...], name: str, of: str) -> Option:
+    typed = name.replace("_", "-")
+    for option in options:
+        if option.keyword.is_exactly(typed):
+            return option
+    names = [trial.python(option.name) for option in options if not option.later]
+    raise ValueError(f"{of} has no {name}; it has {', '.join(names)}{hint(name, names)}")
+
+
+def _values(option: Option, given: Any, name: str) -> Any:
+    """What follows a keyword in a script: one value, a tuple of several, or a dict where more words may follow."""
+    if option.more:
+        parts = given if isinstance(given, dict) and "value" in given else {"value": given}
+        more = {word: value for word, value in parts.items() if word != "value"}
+        return {"value": _plain(option, parts["value"], name), **_read(option.more, more, name)}
+    return _plain(option, given, name)
+
+
+def _plain(option: Option, given: Any, name: str) -> Any:
+    kinds = option.values
+    if not kinds:
+        return True
+    if len(kinds) == 1 and not kinds[0].many:
+        return _one(kinds[0], given, name)
+    items = _items(given, name)
+    if len(kinds) == 1:
+        if not items:
+            raise ValueError(f"{name}: expected {kinds[0].meaning}, got none")
+        return [_one(kinds[0], item, name) for item in items]
+    if not len([kind for kind in kinds if not kind.optional]) <= len(items) <= len(kinds):
+        raise ValueError(f"{name}: expected {len(kinds)} values, got {_shown(given)}")
+    return tuple(_one(kind, item, name) for kind, item in zip(kinds, items))
+
+
+def _items(given: Any, name: str) -> list[Any]:
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise ValueError(f"{name}: expected a list of values, got {_shown(given)}")
+    return list(given)
+
+
+def _one(kind: Kind, value: Any, name: str) -> Any:
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    if kind.varied and isinstance(value, (Over, Drawn)):
+        return value
+    if kind.varied and isinstance(value, np.ndarray) and value.ndim == 1:
+        return np.array([_one(kind, item, name) for item in value.tolist()], np.float64)
+    if kind.tabled and isinstance(value, str):
+        return TableName(value)
+    try:
+        return kind.check(value)
+    except (TypeError, ValueError, OverflowError):
+        meaning = "True or False" if kind.pattern == "on|off" else kind.meaning
+        raise ValueError(f"{name}: expected {meaning.rstrip(',')}, got {_shown(value)}") from None
+
+
+def _listed(options: Iterable[Option]) -> str:
+    return ", ".join(trial.python(option.name) for option in options if not option.later)
+
+
+def _shown(value: Any) -> str:
+    return short(repr(value))
+
+
+# ---- ranges --------------------------------------------------------------------------------------------------------
+
+
+def chosen_by(where: Where, kind: str) -> g.Range | None:
+    """A range of objects of a kind, see `Where`. CommandError for what is none."""
+    if where is None:
+        return None
+    if isinstance(where, str):
+        return _parsed(where, kind)
+    terms = where if isinstance(where, tuple) else (where,)
+    if not terms or not all(isinstance(term, get_args(g.Term)) for term in terms):
+        raise CommandError(f"where: expected the text of a RANGE or terms of it, got {_shown(where)}")
+    return terms
+
+
+@functools.lru_cache(maxsize=256)
+def _parsed(text: str, kind: str) -> g.Range | None:
+    line = f"{_WORDS[kind]} group 'x' range {text}"
+    try:
+        if "\n" in text:
+            raise CommandError(f"where: expected one line, got {_shown(text)}")
+        statement = parser.parse(line, "where", 0, "", PCDC)
+    except ScriptError as error:
+        raise CommandError(f"where '{short(text)}': {error.message.removeprefix(': ')}") from None
+    if statement.expressions:
+        raise CommandError(f"where '{short(text)}': square brackets are for scripts; in Python an f-string does it")
+    return bindings.where(statement.range)

@@ -1,0 +1,731 @@
+"""Blocks in a Python program: the commands of the PCDC language as methods, what is there as arrays.
+
+A method has the words of the command. Its values are checked against the table of the language and handed to the
+binding of the command, as those of a line of a script are, so both do the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
+from hpcdem.api.program import HELP, carried_out, place
+from hpcdem.commands import fdem
+from hpcdem.lang.pcdc.bindings import BINDINGS, Call
+from hpcdem.lang.pcdc.table import PCDC
+from hpcdem.physics.fdem import groups as g
+from hpcdem.physics.fdem.tables import Drawn, Over
+
+if TYPE_CHECKING:
+    from hpcdem.commands.fdem import Project
+
+Point = tuple[float, float]
+File = str | Path
+Number = float | str
+"""Of a condition: a number, or the name of a table of time."""
+Value = float | Over | Drawn | np.ndarray
+"""Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT}
+"""What histories call them."""
+
+
+Kind = TypeVar("Kind", bound=type)
+
+
+def commands(cls: Kind) -> Kind:
+    """Errors in public methods of the class leave with file and line of the program, and the name of the method."""
+    for name, found in list(vars(cls).items()):
+        if inspect.isfunction(found) and (name == "__getitem__" or not name.startswith("_")):
+            setattr(cls, name, _told(found))
+        elif isinstance(found, property) and not name.startswith("_") and found.fget is not None:
+            setattr(cls, name, property(_told(found.fget)))
+    return cls
+
+
+def _told(method: Callable[..., Any]) -> Callable[..., Any]:
+    name = method.__name__
+
+    @functools.wraps(method)
+    def call(self: Any, *values: Any, **options: Any) -> Any:
+        word = self._word
+        full = (f"{word}[...]" if name == "__getitem__" else f"{word}.{name}") if word else name
+        advice = f"see help(sim.{word})" if word else HELP
+        return carried_out(place(), full, lambda: method(self, *values, **options), advice)
+
+    return call
+
+
+class Orders:
+    """The way from a method to the function of its command. project: gives the blocks, made on the first call."""
+
+    def __init__(self, project: Callable[[], Project]) -> None:
+        self.project = project
+
+    def __call__(
+        self, command: str, given: Mapping[str, Any], where: Where = None, kind: str = "", model: str | None = None
+    ) -> None:
+        """Carry out a command. kind: of the objects that `where` chooses; model: the constitutive model, or the
+        condition, whose properties are given."""
+        row = PCDC.command(command)
+        chosen = chosen_by(where, kind)
+        if model is None:
+            found = arguments(row, given, chosen is not None)
+        else:
+            found = model_arguments(row, model, given)
+        project = self.project()
+        project.line = place()[1]
+        call = Call(project, found, None, lambda names, file: None)
+        call.where = chosen
+        BINDINGS[command](call)
+
+
+class Words:
+    """Methods of one kind. _word: what they are called in a program, ``sim.<word>``."""
+
+    _word = ""
+
+    def __init__(self, do: Orders) -> None:
+        self._do = do
+
+
+@commands
+class Geometry(Words):
+    """Shapes in layers, of which meshes are made; lengths in metres, angles in degrees counter-clockwise."""
+
+    _word = "geometry"
+
+    def polyline(self, points: Sequence[Point], as_layer: str) -> None:
+        """Straight lines from point to point."""
+        self._shape("polyline", as_layer, points=points)
+
+    def polygon(self, points: Sequence[Point], as_layer: str) -> None:
+        """A closed line."""
+        self._shape("polygon", as_layer, points=points)
+
+    def rectangle(self, first: Point, second: Point, as_layer: str) -> None:
+        """A rectangle along the axes, from corner to corner."""
+        self._shape("rectangle", as_layer, first=first, second=second)
+
+    def circle(self, centre: Point, radius: float, as_layer: str) -> None:
+        """A circle."""
+        self._shape("circle", as_layer, centre=centre, radius=radius)
+
+    def arc(self, centre: Point, radius: float, begin: float, end: float, as_layer: str) -> None:
+        """A part of a circle from angle to angle."""
+        self._shape("arc", as_layer, centre=centre, radius=radius, begin=begin, end=end)
+
+    def point(self, points: Sequence[Point], as_layer: str) -> None:
+        """Single points, which become points of the mesh."""
+        self._shape("point", as_layer, points=points)
+
+    def fractures(
+        self,
+        as_layer: str,
+        inside: str,
+        *,
+        orientation: tuple[str, float],
+        length: tuple[str, float],
+        seed: int,
+        orientation_spread: float | None = None,
+        length_spread: float | None = None,
+        length_least: float | None = None,
+        length_greatest: float | None = None,
+        p10: float | None = None,
+        p20: float | None = None,
+        p21: float | None = None,
+        scan_line: float | None = None,
+        reached: bool = False,
+        ends_at: float | None = None,
+        hole: Sequence[str] = (),
+        shortest: float | None = None,
+    ) -> None:
+        """A set of fractures with given statistics, as straight lines inside of a layer. orientation: ("fixed",
+        "uniform", "normal" or "fisher", mean); length: ("fixed", "exponential", "lognormal" or "power", value); one of
+        the densities p10, p20 and p21 [1/m, 1/m2, 1/m]; docs/pcdc_reference.md has the rest."""
+        given = {
+            "orientation": {"value": orientation, "spread": orientation_spread},
+            "length": {"value": length, "spread": length_spread, "least": length_least, "greatest": length_greatest},
+            "p10": p10, "p20": p20, "p21": p21, "scan_line": scan_line, "reached": reached, "ends_at": ends_at,
+            "inside": inside, "hole": hole or None, "shortest": shortest, "seed": seed, "as_layer": as_layer,
+        }  # fmt: skip
+        self._do("geometry create fractures", given)
+
+    def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None) -> None:
+        """Lines of a DXF file, or of one of its layers."""
+        given = {"file": file, "as_layer": as_layer, "dxf_layer": dxf_layer}
+        self._do("geometry import", given)
+
+    def transform(
+        self,
+        layer: str,
+        *,
+        scale: float | None = None,
+        rotate: float | None = None,
+        about: Point | None = None,
+        move: Point | None = None,
+    ) -> None:
+        """Scale, then turn about a point, then move a layer."""
+        given = {"layer": layer, "scale": scale, "rotate": rotate, "about": about, "move": move}
+        self._do("geometry transform", given)
+
+    def delete(self, layer: str) -> None:
+        """Forget a layer; meshes that were made from it keep its edges."""
+        self._do("geometry delete", {"layer": layer})
+
+    def _shape(self, kind: str, as_layer: str, **given: Any) -> None:
+        self._do(f"geometry create {kind}", {**given, "as_layer": as_layer})
+
+
+@commands
+class Mesh(Words):
+    """Meshes: each call makes one more body of the model. Its elements go into a group of a set."""
+
+    _word = "mesh"
+
+    def create(
+        self,
+        from_layer: str,
+        size: float,
+        type: str | None = None,
+        *,
+        refine_layer: Iterable[tuple[Any, ...]] = (),
+        hole: Sequence[str] = (),
+        region: Iterable[str | tuple[str, str]] = (),
+        embed: Sequence[str] = (),
+        crack: Sequence[str] = (),
+        irregular: bool = False,
+        smooth: bool = False,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """The inside of a layer, by Gmsh; size: of edges [m]; type: "tri" or "quad". refine_layer: (layer, size) or
+        (layer, size, distance); hole, embed, crack: layers; region: layers, or (layer, name of the group)."""
+        given = {
+            "from_layer": from_layer, "size": size, "type": type, "irregular": irregular, "smooth": smooth,
+            "refine_layer": [_named(one, "value", "size", "distance") for one in refine_layer] or None,
+            "hole": hole or None, "embed": embed or None, "crack": crack or None,
+            "region": [_named(one, "value", "group") for one in region] or None, "group": _group(group, set),
+        }  # fmt: skip
+        self._do("mesh create", given)
+
+    def structured(
+        self,
+        first: Point,
+        second: Point,
+        cells: tuple[int, int],
+        type: str | None = None,
+        diagonal: str | None = None,
+        *,
+        ratio: tuple[float, float] | None = None,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """A regular mesh of the rectangle between two corners [m], cells along x and y. diagonal: "right", "left",
+        "alternate" or "both"; ratio: along x and y each cell is so many times as large as the one before."""
+        given = {
+            "first": first, "second": second, "cells": cells, "type": type, "diagonal": diagonal, "ratio": ratio,
+            "group": _group(group, set),
+        }  # fmt: skip
+        self._do("mesh structured", given)
+
+    def equilateral(
+        self, first: Point, second: Point, size: float, *, group: str | None = None, set: str | None = None
+    ) -> None:
+        """Nearly equilateral triangles in a rectangle, with edges of about `size` [m]."""
+        given = {"first": first, "second": second, "size": size, "group": _group(group, set)}
+        self._do("mesh equilateral", given)
+
+    def import_file(
+        self,
+        file: File,
+        *,
+        group: str | None = None,
+        set: str | None = None,
+        merge: float | None = None,
+        scale: float | None = None,
+    ) -> None:
+        """A mesh of another program; merge: points nearer than this are one [m]; scale: metres in a unit of the
+        file."""
+        given = {"file": file, "group": _group(group, set), "merge": merge, "scale": scale}
+        self._do("mesh import", given)
+
+    def intersect(self, layer: str, follow: bool = False) -> None:
+        """Joints on a layer become cracks; follow: its lines are no edges of the mesh, the nearest edges are taken."""
+        self._do("mesh intersect", {"layer": layer, "follow": follow})
+
+    def glue(
+        self, tolerance: float | None = None, between: tuple[str, str] | None = None, *, set: str | None = None
+    ) -> None:
+        """Bodies hang together where their faces coincide; tolerance [m]; between: only elements of these two
+        groups."""
+        if between is None and set is not None:
+            raise TypeError("set goes with between")
+        pair = None if between is None else {"value": between, "set": set}
+        self._do("mesh glue", {"tolerance": tolerance, "between": pair})
+
+    def quality(self) -> None:
+        """Angles and sizes, in the log."""
+        self._do("mesh quality", {})
+
+
+@commands
+class Objects(Words):
+    """Elements, faces, joints or nodes: `sim.elements["stress-xx"]` is a quantity of all of them.
+
+    where: text of a RANGE (``"group 'platen' set 'bc'"``, ``"x 0 1 present"``) or terms of
+    `hpcdem.physics.fdem.groups`; left out, all.
+    """
+
+    kind: str
+    pcdc: str
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A quantity of all of them (n,), in the order of numbers, on every rank; names as in histories. Collective."""
+        return self.values(name)
+
+    def numbers(self, where: Where = None) -> np.ndarray:
+        """Numbers of those that are there, ascending. Collective."""
+        return fdem.queries.numbers(self._do.project(), self.kind, chosen_by(where, self.kind))
+
+    def values(self, name: str, where: Where = None) -> np.ndarray:
+        """A quantity by name, in the order of `numbers`; NaN where there is none. Collective."""
+        chosen = chosen_by(where, self.kind)
+        return fdem.queries.values(self._do.project(), self.kind, _quantity(name), chosen)
+
+    def total(self, name: str, where: Where = None) -> float:
+        """Exact sum of a quantity. Collective."""
+        chosen = chosen_by(where, self.kind)
+        return fdem.queries.total(self._do.project(), self.kind, _quantity(name), chosen)
+
+    def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
+        """Put them into a group; each is in one group of a set at most."""
+        self._carry_out("group", {"group": group, "set": set}, where)
+
+    def _carry_out(self, command: str, given: Mapping[str, Any], where: Where, model: str | None = None) -> None:
+        self._do(f"{self.pcdc} {command}", given, where, self.kind, model)
+
+
+@commands
+class _Modelled(Objects):
+    """With a constitutive model."""
+
+    def model(self, name: str, *, where: Where = None, **properties: Value) -> None:
+        """The constitutive model, with its properties: docs/pcdc_reference.md lists them; `young`, `poisson_ratio`."""
+        self._carry_out("c-model", properties, where, name)
+
+    def property(self, *, where: Where = None, **properties: Value) -> None:
+        """Change properties of the model; the others stay."""
+        self._carry_out("property", properties, where)
+
+
+@commands
+class Elements(_Modelled):
+    """Elements: `sim.elements["stress-xx"]`, see `Objects`."""
+
+    _word, kind, pcdc = "elements", g.ELEMENT, "element"
+
+    def null(self, *, relax: float | None = None, where: Where = None) -> None:
+        """Take elements out; relax: time [s] (static runs: steps) over which their forces on the others die down."""
+        self._carry_out("c-model", {"relax": relax}, where, "null")
+
+    def initial_stress(
+        self,
+        *,
+        xx: float | None = None,
+        yy: float | None = None,
+        xy: float | None = None,
+        zz: float | None = None,
+        gradient: Mapping[str, Point] | None = None,
+        where: Where = None,
+    ) -> None:
+        """Stress [Pa] from the beginning, tension positive; gradient: by component, per metre in x and y [Pa/m],
+        ``{"yy": (0.0, 25e3)}``."""
+        stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz}
+        slopes = dict(gradient or {})
+        for name in slopes:
+            if stress.get(name) is None:
+                raise ValueError(f"gradient: there is no stress {name!r} that it could be added to")
+        given = {
+            f"stress_{name}": None if value is None else {"value": value, "gradient": slopes.get(name)}
+            for name, value in stress.items()
+        }
+        self._carry_out("initial", given, where)
+
+    def reset_state(self, *, where: Where = None) -> None:
+        """Plastic states are forgotten."""
+        self._carry_out("reset state", {}, where)
+
+
+@commands
+class Faces(_Modelled):
+    """Faces of elements: contact, and stress on surfaces; see `Objects`."""
+
+    _word, kind, pcdc = "faces", g.FACE, "element-face"
+
+    def stress(
+        self,
+        *,
+        xx: Number | None = None,
+        yy: Number | None = None,
+        normal: Number | None = None,
+        quiet: bool | None = None,
+        where: Where = None,
+    ) -> None:
+        """Traction on surfaces [Pa], tension positive; normal turns with the surface. Numbers or names of tables of
+        time. quiet: waves leave through them in dynamic runs. Without a range: the whole surface of the model."""
+        given = {"stress_xx": xx, "stress_yy": yy, "stress_normal": normal, "quiet": quiet}
+        self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
+
+    def remove_boundary(self, *, where: Where = None) -> None:
+        """Take boundary conditions back."""
+        self._carry_out("boundary remove", {}, where)
+
+
+@commands
+class Joints(_Modelled):
+    """Joints between elements; see `Objects`."""
+
+    _word, kind, pcdc = "joints", g.JOINT, "face-joint"
+
+    def reset_state(self, *, where: Where = None) -> None:
+        """Damage of joints that are not broken is forgotten."""
+        self._carry_out("reset state", {}, where)
+
+
+@commands
+class Nodes(Objects):
+    """Nodes; see `Objects`. Conditions are numbers or names of tables of time."""
+
+    _word, kind, pcdc = "nodes", g.NODE, "node"
+
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        ax: Number | None = None,
+        ay: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Velocity [m/s] or acceleration [m/s2] that nodes have from now on; components left out stay free."""
+        given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
+        self._carry_out("boundary", given, where, "mechanical-velocity-boundary-condition")
+
+    def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
+        """Force on each node [N per m of thickness]."""
+        given = {"force_x": fx, "force_y": fy}
+        self._carry_out("boundary", given, where, "mechanical-force-boundary-condition")
+
+    def move(self, type: int, along: Point | None = None, *, where: Where = None) -> None:
+        """Freedom of nodes: 0 free, 1 held, 2 along a vector only."""
+        given = {"type": (type,) if along is None else (type, along)}
+        self._carry_out("boundary", given, where, "mechanical-move-boundary-constraint")
+
+    def remove_boundary(self, *, where: Where = None) -> None:
+        """Take boundary conditions back."""
+        self._carry_out("boundary remove", {}, where)
+
+    def initial_velocity(self, velocity: Point, *, where: Where = None) -> None:
+        """The velocity of nodes now [m/s]."""
+        self._carry_out("initial", {"velocity": velocity}, where)
+
+    def reset_velocity(self) -> None:
+        """All velocities become zero."""
+        self._carry_out("reset velocity", {}, None)
+
+    def reset_displacement(self) -> None:
+        """Displacements are counted from here."""
+        self._carry_out("reset displacement", {}, None)
+
+
+@commands
+class Tables(Words):
+    """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
+
+    _word = "tables"
+
+    def create(self, name: str, values: Sequence[Point]) -> None:
+        """(time [s] or coordinate [m], value), the first ascending."""
+        self._do("table create", {"name": name, "values": values})
+
+    def delete(self, name: str) -> None:
+        """Forget a table."""
+        self._do("table delete", {"name": name})
+
+    def over(self, name: str, axis: str) -> Over:
+        """For a property: the table over "x" or "y" in the mesh."""
+        if axis not in ("x", "y"):
+            raise ValueError(f"axis: expected 'x' or 'y', got {axis!r}")
+        return Over(name, "xy".index(axis))
+
+
+@commands
+class Fields(Words):
+    """Random fields: properties that differ from object to object."""
+
+    _word = "fields"
+
+    def create(
+        self,
+        name: str,
+        *,
+        seed: int,
+        weibull: tuple[float, float] | None = None,
+        normal: tuple[float, float] | None = None,
+        lognormal: tuple[float, float] | None = None,
+        correlation: float | None = None,
+        covariance: str | None = None,
+        least: float | None = None,
+        greatest: float | None = None,
+    ) -> None:
+        """One of weibull (scale, shape), normal and lognormal (mean, standard deviation); correlation: length [m] over
+        which neighbours are alike, covariance "exponential" or "gaussian"; cut below least and above greatest."""
+        if covariance is not None and correlation is None:
+            raise TypeError("covariance goes with correlation")
+        given = {
+            "name": name, "weibull": weibull, "normal": normal, "lognormal": lognormal, "seed": seed, "least": least,
+            "correlation": None if correlation is None else {"value": correlation, "covariance": covariance},
+            "greatest": greatest,
+        }  # fmt: skip
+        self._do("field create", given)
+
+    def delete(self, name: str) -> None:
+        """Forget a random field; what was drawn from it stays."""
+        self._do("field delete", {"name": name})
+
+    def drawn(self, name: str) -> Drawn:
+        """For a property: drawn from this field."""
+        return Drawn(name)
+
+
+@commands
+class Histories(Words):
+    """Numbers recorded during the run: `sim.histories["load"]` is (n, 3) step, time [s] and value so far."""
+
+    _word = "histories"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        rows = fdem.histories.find(self._do.project(), name).rows
+        return np.array(rows, np.float64).reshape(-1, 3)
+
+    def create(
+        self,
+        name: str,
+        object: str,
+        value: str,
+        *,
+        id: int | None = None,
+        nearest: Point | None = None,
+        how: str | None = None,
+        every: int | None = None,
+        where: Where = None,
+    ) -> None:
+        """Follow a value of a "node", "element", "joint" or of the "model": of one (id, or nearest to a point), or of
+        those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps."""
+        ways = ("sum", "mean", "minimum", "maximum")
+        words = None if value is None else _script_word(value)
+        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every}
+        if how is not None and how not in ways:
+            raise ValueError(f"how: expected one of {', '.join(ways)}, got {how!r}")
+        if how is not None:
+            given[how] = True
+        self._do("history create", given, where, OBJECTS.get(object, g.NODE))
+
+    def delete(self, name: str) -> None:
+        """Stop a history; its file stays."""
+        self._do("history delete", {"name": name})
+
+    def export(self, file: File, names: Sequence[str] | None = None) -> None:
+        """Write all histories, or some, side by side as CSV."""
+        self._do("history export", {"file": file, "names": names})
+
+
+@commands
+class Charts(Words):
+    """Diagrams of histories or points."""
+
+    _word = "charts"
+
+    def create(
+        self, name: str, *, title: str | None = None, x_label: str | None = None, y_label: str | None = None
+    ) -> None:
+        """An empty diagram."""
+        self._do("chart create", {"name": name, "title": title, "x_label": x_label, "y_label": y_label})
+
+    def add(
+        self,
+        name: str,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        scale_x: float | None = None,
+        scale_y: float | None = None,
+        values: Sequence[Point] | None = None,
+        label: str | None = None,
+        style: str | None = None,
+    ) -> None:
+        """A curve of history y against history x (or time), or of points; style: "line" or "points"."""
+        given = {
+            "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values, "label": label,
+            "style": style,
+        }  # fmt: skip
+        self._do("chart add", given)
+
+    def export(self, name: str, file: File, cracks: bool = False) -> None:
+        """Write a diagram as figure and CSV; cracks: beside it the model as it is now."""
+        self._do("chart export", {"name": name, "file": file, "cracks": cracks})
+
+
+@commands
+class Output(Words):
+    """Frames for ParaView."""
+
+    _word = "output"
+
+    def vtk(self, file: str, every: int | None = None, *, off: bool = False) -> None:
+        """Frames ``<file>_<step>.vtkhdf`` in the folder of the results: now, or every so many steps; off: no more."""
+        self._do("output vtk", {"file": file, "every": every, "off": off})
+
+
+@commands
+class BlockCommands:
+    """What a `Simulation` has of blocks. The model of blocks is made when it is first used."""
+
+    _word = ""
+
+    geometry: Geometry
+    mesh: Mesh
+    elements: Elements
+    faces: Faces
+    joints: Joints
+    nodes: Nodes
+    tables: Tables
+    fields: Fields
+    histories: Histories
+    charts: Charts
+    output: Output
+
+    def _begin_blocks(self, project: Callable[[], Project]) -> None:
+        self._blocks = do = Orders(project)
+        self.geometry, self.mesh = Geometry(do), Mesh(do)
+        self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
+        self.tables, self.fields = Tables(do), Fields(do)
+        self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)
+
+    def _before_steps(self) -> None:
+        """CommandError if the blocks cannot be stepped as things are."""
+
+    def gravity(self, gravity: Point) -> None:
+        """Gravity of the blocks from now on [m/s2]; that of particles is ``set(gravity=...)``."""
+        self._blocks("model gravity", {"gravity": gravity})
+
+    def option(
+        self,
+        *,
+        dynamic: bool | None = None,
+        collision: bool | None = None,
+        overlap: str | None = None,
+        large_strain: bool | None = None,
+        energy: bool | None = None,
+    ) -> None:
+        """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
+        "refuse", "relax" or "keep"; rotations of elements; keep the energy budget."""
+        given = {
+            "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
+            "energy": energy,
+        }  # fmt: skip
+        self._blocks("model option", given)
+
+    def time_step(
+        self,
+        *,
+        value: float | None = None,
+        auto: bool | None = None,
+        safety: float | None = None,
+        mass_scaling: float | None = None,
+    ) -> None:
+        """The time step of dynamic runs of blocks: given [s], estimated again and again, or reached by mass."""
+        given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling}
+        self._blocks("model time-step", given)
+
+    def step(self, n: int) -> None:
+        """So many steps of the blocks, and of the particles that are coupled to them."""
+        self._before_steps()
+        self._blocks("model step", {"steps": n})
+
+    def solve(
+        self,
+        *,
+        ratio: float | None = None,
+        cycles: int | None = None,
+        time: float | None = None,
+        window: int | None = None,
+        limit: int | None = None,
+        on_failure: str | None = None,
+        elastic: bool = False,
+        solver: str | None = None,
+    ) -> None:
+        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium.
+        A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
+        is "continue"; `solved` says how it ended."""
+        given = {
+            "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
+            "elastic": elastic, "solver": solver,
+        }  # fmt: skip
+        self._before_steps()
+        self._blocks("model solve", given)
+
+    @property
+    def solved(self) -> dict[str, Any]:
+        """How the last `solve` ended: reason, ratio (NaN if nobody looked), steps. Empty before the first."""
+        return dict(self._blocks.project().solved)
+
+    @property
+    def ratio(self) -> float:
+        """Unbalanced over all forces of the nodes. Collective."""
+        return fdem.queries.ratio(self._blocks.project())
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """The energy budget of the blocks [J per m of thickness], after ``option(energy=True)``. Collective."""
+        return fdem.queries.energies(self._blocks.project())
+
+    @property
+    def block_time(self) -> float:
+        """Model time of the blocks [s]."""
+        return float(self._blocks.project().blocks.clock.time)
+
+    @property
+    def block_steps(self) -> int:
+        """Steps of the blocks."""
+        return self._blocks.project().step
+
+
+def _named(given: Any, *names: str) -> dict[str, Any]:
+    """("hole", 0.05) as {"value": "hole", "size": 0.05}."""
+    parts = (given,) if isinstance(given, str) else tuple(given)
+    if not 1 <= len(parts) <= len(names):
+        raise TypeError(f"expected {', '.join(names[1:])} beside the name of the layer, got {given!r}")
+    return dict(zip(names, parts))
+
+
+def _group(group: str | None, set_name: str | None) -> dict[str, Any] | None:
+    if group is None and set_name is None:
+        return None
+    return {"value": g.DEFAULT if group is None else group, "set": set_name}
+
+
+def _script_word(name: str) -> Any:
+    return name.replace("_", "-") if isinstance(name, str) else name
+
+
+def _quantity(name: str) -> str:
+    if not isinstance(name, str):
+        raise TypeError(f"expected the name of a quantity, got {name!r}")
+    return name.replace("-", "_")

@@ -1,0 +1,700 @@
+"""Blocks in a Python program: the same files as the PCDC script, every command, errors, particles beside them, going
+on."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hpcdem.api import blocks as api
+from hpcdem.api import simulation
+from hpcdem.api.simulation import Simulation
+from hpcdem.core.errors import ScriptError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.io import checkpoint
+from hpcdem.lang.pcdc import bindings, execute
+from hpcdem.lang.pcdc.table import PCDC
+from hpcdem.physics.fdem import groups as g
+from hpcdem.runtime.run_folder import RECORD
+from tests.conftest import ROOT, Launcher
+from tests.pcdc.fake import Bench
+from tests.short_push import contents
+
+# ---- every command ---------------------------------------------------------------------------------------------------
+
+SAME: list[tuple[str, str]] = [
+    ("pcdc model new", "sim.start()"),
+    ("pcdc model save 'a.sav'", "sim.save('a.sav')"),
+    ("pcdc model restore 'a.sav'", "sim.restore('a.sav')"),
+    ("pcdc model gravity (0,-9.81)", "sim.gravity((0, -9.81))"),
+    ("pcdc model option dynamic off collision on overlap relax large-strain off energy on",
+     "sim.option(dynamic=False, collision=True, overlap='relax', large_strain=False, energy=True)"),
+    ("pcdc model time-step safety 0.5 mass-scaling 1e-6", "sim.time_step(safety=0.5, mass_scaling=1e-6)"),
+    ("pcdc model time-step value 1e-7 auto off", "sim.time_step(value=1e-7, auto=False)"),
+    ("pcdc model step 100", "sim.step(100)"),
+    ("pcdc model solve ratio 1e-6 window 10 limit 0 on-failure continue",
+     "sim.solve(ratio=1e-6, window=10, limit=0, on_failure='continue')"),
+    ("pcdc model solve cycles 5 time 0.5", "sim.solve(cycles=5, time=0.5)"),
+    ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
+    ("pcdc geometry create polyline (0,0) (1,2) as-layer 'l'", "sim.geometry.polyline([(0, 0), (1, 2)], 'l')"),
+    ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'l'",
+     "sim.geometry.polygon([(0, 0), (4, 0), (2, 3)], 'l')"),
+    ("pcdc geometry create rectangle (0,0) (4,2) as-layer 'l'", "sim.geometry.rectangle((0, 0), (4, 2), 'l')"),
+    ("pcdc geometry create circle (0,1) 2 as-layer 'l'", "sim.geometry.circle((0, 1), 2, 'l')"),
+    ("pcdc geometry create arc (0,1) 2 0 90 as-layer 'l'", "sim.geometry.arc((0, 1), 2, 0, 90, as_layer='l')"),
+    ("pcdc geometry create point (1,1) (2,2) as-layer 'l'", "sim.geometry.point(np.array([[1, 1], [2, 2]]), 'l')"),
+    ("pcdc geometry create fractures orientation fisher 30 spread 20 length exponential 2 p21 1.5 inside 'out' seed 7 "
+     "as-layer 's'",
+     "sim.geometry.fractures('s', 'out', orientation=('fisher', 30), orientation_spread=20, length=('exponential', 2), "
+     "p21=1.5, seed=7)"),
+    ("pcdc geometry create fractures orientation normal 3 length lognormal 2 spread 1 least 0.5 great 9 p10 2 "
+     "scan-line 45 ends-at 0.5 hole 'h' hole 'i' shortest 0.1 inside 'out' seed 7 as-layer 's'",
+     "sim.geometry.fractures('s', 'out', orientation=('normal', 3), length=('lognormal', 2), length_spread=1, "
+     "length_least=0.5, length_greatest=9, p10=2, scan_line=45, ends_at=0.5, hole=['h', 'i'], "
+     "shortest=0.1, seed=7)"),
+    ("pcdc geometry create fractures orientation fixed 3 length fixed 2 p20 2 reached inside 'out' seed 7 as-layer "
+     "'s'",
+     "sim.geometry.fractures('s', 'out', orientation=('fixed', 3), length=('fixed', 2), p20=2, reached=True, "
+     "seed=7)"),
+    ("pcdc geometry import 'a.dxf' as-layer 'l' dxf-layer 'k'",
+     "sim.geometry.import_file(Path('a.dxf'), 'l', dxf_layer='k')"),
+    ("pcdc geometry transform 'l' scale 2 rotate 30 about (0,1) move (1,0)",
+     "sim.geometry.transform('l', scale=2, rotate=30, about=(0, 1), move=(1, 0))"),
+    ("pcdc geometry delete 'l'", "sim.geometry.delete('l')"),
+    ("pcdc mesh create from-layer 'o' size 0.5 type quad refine-layer 'h' size 0.05 refine-layer 'i' size 0.1 distance "
+     "2 hole 'h' region 'r' region 'q' group 'w' embed 'e' crack 'c' irregular smooth group 'rock' set 'd'",
+     "sim.mesh.create('o', 0.5, 'quad', refine_layer=[('h', 0.05), ('i', 0.1, 2)], hole=['h'], region=['r', ('q', 'w')]"
+     ", embed=['e'], crack=['c'], irregular=True, smooth=True, group='rock', set='d')"),
+    ("pcdc mesh structured (0,0) (4,2) cells 4 2 type quad diagonal both ratio 1.5 1 group 'rock' set 'd'",
+     "sim.mesh.structured((0, 0), (4, 2), (4, 2), 'quad', 'both', ratio=(1.5, 1), group='rock', set='d')"),
+    ("pcdc mesh structured (0,0) (4,2) cells 4 2", "sim.mesh.structured((0, 0), (4, 2), (4, 2))"),
+    ("pcdc mesh equilateral (0,0) (4,2) size 0.5 group 'rock'",
+     "sim.mesh.equilateral((0, 0), (4, 2), 0.5, group='rock')"),
+    ("pcdc mesh import 'a.msh' group 'rock' set 'd' merge 1e-3 scale 0.5",
+     "sim.mesh.import_file('a.msh', group='rock', set='d', merge=1e-3, scale=0.5)"),
+    ("pcdc mesh intersect layer 'l' follow", "sim.mesh.intersect('l', follow=True)"),
+    ("pcdc mesh glue tolerance 1e-3 between 'a' 'b' set 'd'", "sim.mesh.glue(1e-3, ('a', 'b'), set='d')"),
+    ("pcdc mesh quality", "sim.mesh.quality()"),
+    ("pcdc element group 'a' set 's' range x 0 1 present", "sim.elements.group('a', 's', where='x 0 1 present')"),
+    ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25 range group 'a' set "
+     "'d'",
+     "sim.elements.model('mech-iso-elastic', density=2500, young=50e9, poisson_ratio=0.25, where=g.InGroup('a', 'd'))"),
+    ("pcdc element c-model null relax 0.5 range id 3 5", "sim.elements.null(relax=0.5, where=g.Ids(3, 5))"),
+    ("pcdc element property young table 'E' over y density field 'rho' range geometry 'hole'",
+     "sim.elements.property(young=sim.tables.over('E', 'y'), density=sim.fields.drawn('rho'), "
+     "where=\"geometry 'hole'\")"),
+    ("pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2 y 1 3",
+     "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
+     "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
+    ("pcdc element initial stress-xy 1 stress-zz 2", "sim.elements.initial_stress(xy=1, zz=2)"),
+    ("pcdc element reset state range set 'd'", "sim.elements.reset_state(where=g.InSet('d'))"),
+    ("pcdc element-face group 'a' set 's' range boundary", "sim.faces.group('a', 's', where='boundary')"),
+    ("pcdc element-face c-model contact-m-c property friction 30", "sim.faces.model('contact-m-c', friction=30)"),
+    ("pcdc element-face property friction 20 range geometry 'l'",
+     "sim.faces.property(friction=20, where=g.OnLayer('l'))"),
+    ("pcdc element-face boundary m-s-b-c stress-xx 1 stress-yy 2 stress-normal table 'blast' quiet on range face-of 'a' set 'd'",
+     "sim.faces.stress(xx=1, yy=2, normal='blast', quiet=True, where=g.OfElements('a', 'd'))"),
+    ("pcdc element-face boundary remove range boundary", "sim.faces.remove_boundary(where=g.OnBoundary())"),
+    ("pcdc face-joint group 'a' set 's'", "sim.joints.group('a', 's')"),
+    ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200 np 3",
+     "sim.joints.model('c-i-c-i', friction=30, cohesion=10e6, tensile_strength=2e6, gf1=20, gf2=200, np=3)"),
+    ("pcdc face-joint property tensile-strength 1e6 penalty-overlap 1e12 range between 'a' 'b' set 'd'",
+     "sim.joints.property(tensile_strength=1e6, penalty_overlap=1e12, where=\"between 'a' 'b' set 'd'\")"),
+    ("pcdc face-joint reset state range crack", "sim.joints.reset_state(where=g.OnCrack())"),
+    ("pcdc node group 'top' set 'bc' range y 2 2", "sim.nodes.group('top', 'bc', where='y 2 2')"),
+    ("pcdc node boundary mech-vel-b-c velocity-x 1 velocity-y table 'v' range id 1",
+     "sim.nodes.velocity(vx=1, vy='v', where='id 1')"),
+    ("pcdc node boundary mech-vel-b-c acceleration-x 1 acceleration-y -1", "sim.nodes.velocity(ax=1, ay=-1)"),
+    ("pcdc node boundary mech-f-b-c force-x 1 force-y table 'v'", "sim.nodes.force(fx=1, fy='v')"),
+    ("pcdc node boundary mech-m-b-c type 2 (1,1) range id 2", "sim.nodes.move(2, (1, 1), where='id 2')"),
+    ("pcdc node boundary mech-m-b-c type 1", "sim.nodes.move(1)"),
+    ("pcdc node boundary remove range id 0", "sim.nodes.remove_boundary(where='id 0')"),
+    ("pcdc node initial velocity (3,4) range id 7", "sim.nodes.initial_velocity((3, 4), where='id 7')"),
+    ("pcdc node reset velocity", "sim.nodes.reset_velocity()"),
+    ("pcdc node reset displacement", "sim.nodes.reset_displacement()"),
+    ("pcdc table create 'v' values (0,0) (1,2)", "sim.tables.create('v', [(0, 0), (1, 2)])"),
+    ("pcdc table delete 'v'", "sim.tables.delete('v')"),
+    ("pcdc field create 'f' weibull 5e6 4 seed 7 correlation 0.02 covariance gaussian least 1e6 greatest 9e6",
+     "sim.fields.create('f', weibull=(5e6, 4), seed=7, correlation=0.02, covariance='gaussian', least=1e6, "
+     "greatest=9e6)"),
+    ("pcdc field create 'f' normal 5 1 seed 7", "sim.fields.create('f', normal=(5, 1), seed=7)"),
+    ("pcdc field create 'f' lognormal 5 1 seed 7", "sim.fields.create('f', lognormal=(5, 1), seed=7)"),
+    ("pcdc field delete 'f'", "sim.fields.delete('f')"),
+    ("pcdc history create 'h' node value reaction-y sum every 100 range group 'p' set 'bc'",
+     "sim.histories.create('h', 'node', 'reaction-y', how='sum', every=100, where=\"group 'p' set 'bc'\")"),
+    ("pcdc history create 'h' joint value normal-stress-largest max range crack",
+     "sim.histories.create('h', 'joint', 'normal_stress_largest', how='maximum', where='crack')"),
+    ("pcdc history create 'h' element value stress-yy min",
+     "sim.histories.create('h', 'element', 'stress-yy', how='minimum')"),
+    ("pcdc history create 'h' node value velocity-x mean",
+     "sim.histories.create('h', 'node', 'velocity-x', how='mean')"),
+    ("pcdc history create 'h' element nearest (5,0) value stress-yy",
+     "sim.histories.create('h', 'element', 'stress-yy', nearest=(5, 0))"),
+    ("pcdc history create 'h' element id 3 value stress-yy", "sim.histories.create('h', 'element', 'stress-yy', id=3)"),
+    ("pcdc history create 'h' model value broken-joints", "sim.histories.create('h', 'model', 'broken-joints')"),
+    ("pcdc history delete 'h'", "sim.histories.delete('h')"),
+    ("pcdc history export 'h.csv' names 'a' 'b'", "sim.histories.export('h.csv', ['a', 'b'])"),
+    ("pcdc chart create 'c' title 't' x-label 'x' y-label 'y'",
+     "sim.charts.create('c', title='t', x_label='x', y_label='y')"),
+    ("pcdc chart add 'c' x 'a' scale-x 2 y 'b' scale-y 3 label 'l'",
+     "sim.charts.add('c', x='a', scale_x=2, y='b', scale_y=3, label='l')"),
+    ("pcdc chart add 'c' values (0,0) (1,1) style points",
+     "sim.charts.add('c', values=[(0, 0), (1, 1)], style='points')"),
+    ("pcdc chart export 'c' 'c.png' cracks", "sim.charts.export('c', 'c.png', cracks=True)"),
+    ("pcdc output vtk 'f' every 10", "sim.output.vtk('f', every=10)"),
+    ("pcdc output vtk 'f'", "sim.output.vtk('f')"),
+    ("pcdc output vtk 'f' off", "sim.output.vtk('f', off=True)"),
+]  # fmt: skip
+"""A line of a script, and the line of a program that does the same."""
+
+
+class Recorder:
+    """Stands for hpcdem.commands.fdem: notes every call with the arguments that the function gets, and its defaults."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[str, dict[str, Any]]] = []
+
+    def __getattr__(self, module: str) -> Any:
+        real = importlib.import_module(f"hpcdem.commands.fdem.{module}")
+
+        def function(name: str) -> Any:
+            def call(*values: Any, **named: Any) -> dict[str, Any]:
+                bound = inspect.signature(getattr(real, name)).bind(*values, **named)
+                bound.apply_defaults()
+                self.calls.append((f"{module}.{name}", {k: v for k, v in bound.arguments.items() if k != "project"}))
+                return {}
+
+            return call
+
+        return SimpleNamespace(**{name: function(name) for name, _ in inspect.getmembers(real, inspect.isfunction)})
+
+
+def program(bench: Bench) -> Simulation:
+    """A simulation whose blocks are those of the bench, without particles."""
+    sim = Simulation.__new__(Simulation)
+    sim._session = SimpleNamespace(interpreter=None, comm=SerialComm())
+    sim._engine, sim._project, sim._log, sim.directory = None, bench.project, None, bench.project.directory
+    sim._begin_blocks(lambda: bench.project)
+    return sim
+
+
+def carry_out(sim: Simulation, text: str) -> Any:
+    return eval(compile(text, "study.py", "eval"), {"sim": sim, "g": g, "np": np, "Path": Path})
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+@pytest.mark.parametrize(("line", "call"), SAME)
+def test_a_method_is_the_command(bench: Bench, tmp_path: Path, monkeypatch: Any, line: str, call: str) -> None:
+    recorders = Recorder(), Recorder()
+    for module in (bindings, execute, api, simulation):
+        monkeypatch.setattr(module, "fdem", recorders[0])
+    bench(line + "\n")
+    for module in (bindings, execute, api, simulation):
+        monkeypatch.setattr(module, "fdem", recorders[1])
+    monkeypatch.setattr(Simulation, "_kind", lambda self, path: checkpoint.BLOCKS)
+    monkeypatch.setattr(Simulation, "_existing", lambda self, file: str(file))
+    carry_out(program(bench), call)
+    assert recorders[0].calls == recorders[1].calls != []
+
+
+def test_every_command_has_a_method() -> None:
+    """SAME has every command that scripts have, with each of its options and models."""
+    said: dict[str, set[str]] = {}
+    for line, _ in SAME:
+        statement = Bench(Path()).interpreter.read(line, "a.sc").statements[0]
+        names = {name for name in statement.arguments if name not in ("model", "properties")}
+        if "model" in statement.arguments:
+            names |= {statement.arguments["model"], *statement.arguments["properties"]}
+        said.setdefault(statement.command.name, set()).update(names)
+    for command in PCDC.commands:
+        if command.later:
+            continue
+        assert command.name in said, command.name
+        of_models = {
+            "element property",
+            "element-face property",
+            "face-joint property",
+        }  # any property goes the same way
+        options = () if command.name in of_models else command.options
+        wanted = {option.name for option in options if not option.later}
+        for model in command.models:
+            wanted |= set() if model.later else {model.keyword.name}
+            if not model.later and model.of is None:  # those of a law go the same way, whatever their names
+                wanted |= {option.name for option in model.options if not option.later}
+        assert wanted - said[command.name] <= NOT_IN_PYTHON.get(command.name, set()), command.name
+
+
+NOT_IN_PYTHON = {"model new": {"dim"}}
+"""`dim` is 2 or refused."""
+
+
+def test_every_way_to_look(bench: Bench) -> None:
+    """What the object `pcdc` of a script answers, a program answers."""
+    sim = program(bench)
+    sim.mesh.structured((0, 0), (4, 2), (4, 2), diagonal="right")
+    sim.nodes.group("top", "bc", where="y 2 2")
+    sim.histories.create("v", "node", "velocity-y", id=3, every=10)
+    sim.step(50)
+    bench("a = pcdc.numbers('node', group='top', set='bc')\n"
+          "b = pcdc.total('node', 'reaction-y', group='top', set='bc')\n"
+          "c = pcdc.values('element', 'stress-xx', x=(0, 1))\nd = (pcdc.time, pcdc.cycle, pcdc.ratio, pcdc.solved)\n"
+          "e = pcdc.history('v')\n")  # fmt: skip
+    assert sim.nodes.numbers("group 'top' set 'bc'").tolist() == bench["a"].tolist() == [10, 11, 12, 13, 14]
+    assert sim.nodes.total("reaction-y", where=g.InGroup("top", "bc")) == bench["b"] == 10.0
+    assert np.array_equal(sim.elements.values("stress_xx", "x 0 1"), bench["c"]) and len(bench["c"]) == 4
+    assert (sim.block_time, sim.block_steps, sim.ratio, sim.solved) == bench["d"] == (0.5, 50, 1 / 50, {})
+    assert (sim.time, sim.steps) == (0.5, 50)
+    assert np.array_equal(sim.histories["v"], bench["e"]) and len(bench["e"]) == 5
+    assert len(sim.elements["stress-xx"]) == 16
+    sim.solve(cycles=3)
+    assert sim.solved["reason"] == "cycles" and sim.solved["steps"] == 3
+
+
+def test_a_property_for_each_object(bench: Bench) -> None:
+    sim = program(bench)
+    sim.mesh.structured((0, 0), (2, 1), (2, 1))
+    young = np.linspace(1e9, 4e9, 4)
+    sim.elements.model("mech-iso-elastic", density=2500, young=young, poisson_ratio=0.2)
+    (((_, _, given), _),) = bench.blocks.told("element_model")
+    assert given["young"].tolist() == young.tolist() and given["poisson_ratio"] == 0.2
+
+
+WRONG = {
+    "no such property": ("sim.elements.model('mech-iso-elastic', density=1, yuong=3, poisson_ratio=0.2)",
+                         "elements.model: model mechanical-iso-elastic has no yuong; it has density, young"),
+    "property of another model": ("sim.joints.property(young=3)", "joints.property: face-joint property has no young"),
+    "no such model": ("sim.elements.model('elastic', density=1)", "elements.model: there is no model 'elastic'"),
+    "model that is no text": ("sim.elements.model(3)", "elements.model: expected the name of a model, got 3"),
+    "model of later": ("sim.elements.model('mech-m-c', density=1)", "mechanical-mohr-coulomb is not there yet: plast"),
+    "incomplete model": ("sim.elements.model('mech-iso-elastic', density=1, young=3)",
+                         "needs young and poisson_ratio or shear and bulk"),
+    "missing property": ("sim.elements.model('mech-iso-elastic', young=3, poisson_ratio=0.2)", "needs density"),
+    "word for a number": ("sim.elements.property(young='stiff')", "young: expected a number above 0, got 'stiff'"),
+    "value out of range": ("sim.elements.property(poisson_ratio=0.5)", "poisson_ratio: expected a number"),
+    "not finite": ("sim.elements.property(young=float('inf'))", "young: expected a number above 0, got inf"),
+    "one of an array": ("sim.elements.property(young=np.array([1.0, -1.0]))", "young: expected a number above 0, got"),
+    "array of arrays": ("sim.elements.property(young=np.ones((2, 2)))", "young: expected a number above 0, got array"),
+    "truth value for a number": ("sim.step(True)", "step: steps: expected a whole number, not negative, got True"),
+    "part of a step": ("sim.step(2.5)", "step: steps: expected a whole number"),
+    "negative steps": ("sim.step(-1)", "step: steps: expected a whole number, not negative, got -1"),
+    "word for a switch": ("sim.option(dynamic='perhaps')", "option: dynamic: expected True or False, got 'perhaps'"),
+    "no switch at all": ("sim.option()", "option: needs at least one of dynamic, collision"),
+    "unknown switch": ("sim.option(damping=True)", "option: .*unexpected keyword argument 'damping'"),
+    "unknown word": ("sim.mesh.structured((0, 0), (1, 1), (1, 1), diagnal='both')", "mesh.structured: .*'diagnal'"),
+    "number for a flag": ("sim.mesh.intersect('l', follow=1)", "follow: expected True or False, got 1"),
+    "cells as one number": ("sim.mesh.structured((0, 0), (1, 1), 4)", "cells: expected a list of values, got 4"),
+    "three cells": ("sim.mesh.structured((0, 0), (1, 1), (4, 4, 4))", "cells: expected 2 values"),
+    "point in space": ("sim.geometry.circle((0, 0, 0), 1, 'l')", r"centre: expected a vector \(x,y\), got \(0, 0, 0\)"),
+    "text for a list": ("sim.mesh.create('o', 1.0, hole='abc')", "hole: expected a list of values, got 'abc'"),
+    "too much to refine": ("sim.mesh.create('o', 1.0, refine_layer=[('h', 1, 2, 3)])", "expected size, distance besi"),
+    "size left out": ("sim.mesh.create('o', 1.0, refine_layer=['h'])", "mesh.create: refine_layer needs size"),
+    "no points": ("sim.geometry.polygon([], 'l')", r"points: expected vectors \(x,y\), got none"),
+    "set without groups": ("sim.mesh.glue(set='d')", "mesh.glue: set goes with between"),
+    "two densities": ("sim.geometry.fractures('s', 'o', orientation=('fixed', 1), length=('fixed', 1), p10=1, p20=1, "
+                      "seed=1)", "fractures need one density"),
+    "two distributions": ("sim.fields.create('f', seed=1, normal=(1, 1), weibull=(1, 1))", "one distribution"),
+    "covariance of nothing": ("sim.fields.create('f', seed=1, normal=(1, 1), covariance='gaussian')",
+                              "covariance goes with correlation"),
+    "no axis": ("sim.tables.over('E', 'z')", "tables.over: axis: expected 'x' or 'y', got 'z'"),
+    "unsorted table": ("sim.tables.create('v', [(1, 0), (0, 0)])", "tables.create: table 'v': times must ascend"),
+    "no such table": ("sim.nodes.velocity(vx='v', where='id 0')", "nodes.velocity: there is no table 'v'"),
+    "gradient of nothing": ("sim.elements.initial_stress(xx=1, gradient={'yy': (0, 1)})", "there is no stress 'yy'"),
+    "nothing to do": ("sim.nodes.force()", "nodes.force: needs at least one of force_x, force_y"),
+    "both at once": ("sim.nodes.velocity(vx=1, ax=1)", "velocity-x and acceleration-x exclude each other"),
+    "freedom in space": ("sim.nodes.move(3)", "nodes.move: type: expected 0 free, 1 held or 2 along a vector"),
+    "no vector": ("sim.nodes.move(2)", "type 2 needs the vector"),
+    "two ways to choose": ("sim.histories.create('h', 'node', 'velocity-x', id=1, nearest=(0, 0))",
+                           "a history needs one of id, nearest and range"),
+    "no such how": ("sim.histories.create('h', 'node', 'velocity-x', how='median')", "how: expected one of sum, mean"),
+    "range without how": ("sim.histories.create('h', 'node', 'velocity-x', where='id 0 1')", "needs sum, mean, mini"),
+    "no such value": ("sim.histories.create('h', 'node', 'speed', id=1)", "value: expected one of position-x"),
+    "value of others": ("sim.histories.create('h', 'node', 'stress-xx', id=1)", "a history of node can follow"),
+    "no such object": ("sim.histories.create('h', 'nodes', 'velocity-x', id=1)", "object: expected one of node"),
+    "no such history": ("sim.histories['load']", r"histories\[...\]: there is no history 'load'"),
+    "both of solve": ("sim.solve(elastic=True, time=1.0)", "solve: elastic and time exclude each other"),
+    "two time steps": ("sim.time_step(value=1e-6, mass_scaling=1e-6)", "value and mass-scaling exclude each other"),
+    "curve of nothing": ("sim.charts.add('c')", "charts.add: a curve has either y"),
+    "figure of no kind": ("sim.charts.export('c', 'c.txt')", "a figure is a file"),
+    "frames every and off": ("sim.output.vtk('f', every=1, off=True)", "every and off exclude each other"),
+    "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "nodes.group: where 'z 0 1': .*not there yet"),
+    "RANGE of others": ("sim.elements.group('a', where='boundary')", "where 'boundary': .*read 'boundary'"),
+    "RANGE the wrong way": ("sim.nodes.group('a', where='x 1 0')", "where 'x 1 0': .*the first is above the second"),
+    "empty RANGE": ("sim.nodes.group('a', where='')", "where ''"),
+    "RANGE of two lines": ("sim.nodes.group('a', where='id 0\\npcdc model new')", "expected one line"),
+    "RANGE with brackets": ("sim.nodes.group('a', where='id [n]')", "in Python an f-string does it"),
+    "no RANGE at all": ("sim.nodes.group('a', where=3.0)", "where: expected the text of a RANGE or terms of it, got"),
+    "list of no terms": ("sim.nodes.group('a', where=('x', 0, 1))", "where: expected the text of a RANGE or terms"),
+    "no terms": ("sim.nodes.group('a', where=())", r"where: expected the text of a RANGE or terms of it, got \(\)"),
+    "group that is not there": ("sim.nodes.group('a', where=g.InGroup('b'))", "there is no set 'default' of nodes"),
+    "nothing chosen": ("sim.nodes.group('a', where='x 9 10')", "nodes.group: the range chooses no node"),
+    "quantity that is no text": ("sim.elements[3]", "elements.values: expected the name of a quantity, got 3"),
+    "cycle without particles": ("sim.cycle(10)", "cycle: there are no particles; blocks are stepped by step and solve"),
+    "budget of particles": ("sim.energy()", "energy: there are no particles; energies is the budget of blocks"),
+    "missing file": ("sim.restore('none.sav')", "restore: there is no file"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_mistake_is_named_with_its_line(bench: Bench, case: str) -> None:
+    text, expected = WRONG[case]
+    sim = program(bench)
+    sim.mesh.structured((0, 0), (4, 2), (4, 2))
+    with pytest.raises(ScriptError, match=expected) as caught:
+        carry_out(sim, text)
+    assert (caught.value.file, caught.value.line) == ("study.py", 1)
+
+
+# ---- whole programs --------------------------------------------------------------------------------------------------
+
+SCRIPT = """\
+pcdc model new
+pcdc mesh structured (0,0) (0.04,0.01) cells 12 3 diagonal alternate group 'bar' set 'domain'
+pcdc model option energy on
+pcdc field create 'strength' weibull 2.2e6 8 seed 5
+pcdc element c-model mech-iso-e property den 2700 y 30e9 p-r 0.25 d-f 0.1
+pcdc face-joint c-model c-i-c-i property f 30 c 20e6 t-s field 'strength' gf1 1 gf2 10
+pcdc node group 'left' set 'bc' range geometry 'left'
+pcdc node group 'right' set 'bc' range geometry 'right'
+pcdc table create 'pull' values (0,0) (2e-6,0.15)
+pcdc node boundary mech-vel-b-c velocity-x 0 range group 'left' set 'bc'
+pcdc node boundary mech-vel-b-c velocity-x table 'pull' range group 'right' set 'bc'
+pcdc history create 'load' node value reaction-x sum every 5 range group 'right' set 'bc'
+pcdc history create 'way' node value displacement-x mean every 5 range group 'right' set 'bc'
+pcdc history create 'broken' model value broken-joints every 5
+pcdc history create 'error' model value energy-error every 50
+pcdc output vtk 'bar' every 100
+pcdc model solve time 2e-5
+pcdc model save 'half.sav'
+pcdc model step 150
+pcdc model save 'end.sav'
+pcdc chart create 'pull' x-label 'displacement [[um]]' y-label 'stress [[MPa]]'
+pcdc chart add 'pull' x 'way' scale-x 1e6 y 'load' scale-y 1e-4 label 'model'
+pcdc chart export 'pull' 'pull.png'
+pcdc history export 'all.csv'
+"""
+
+PROGRAM = """\
+import sys
+import hpcdem
+
+sim = hpcdem.Simulation()
+sim.start()
+sim.mesh.structured((0, 0), (0.04, 0.01), cells=(12, 3), diagonal="alternate", group="bar", set="domain")
+sim.option(energy=True)
+sim.fields.create("strength", weibull=(2.2e6, 8), seed=5)
+sim.elements.model("mech-iso-elastic", density=2700, young=30e9, poisson_ratio=0.25, damp_factor=0.1)
+sim.joints.model("c-i-c-i", friction=30, cohesion=20e6, tensile_strength=sim.fields.drawn("strength"), gf1=1, gf2=10)
+for end in ("left", "right"):
+    sim.nodes.group(end, "bc", where=f"geometry '{end}'")
+sim.tables.create("pull", [(0, 0), (2e-6, 0.15)])
+sim.nodes.velocity(vx=0, where="group 'left' set 'bc'")
+sim.nodes.velocity(vx="pull", where="group 'right' set 'bc'")
+ends = "group 'right' set 'bc'"
+sim.histories.create("load", "node", "reaction-x", how="sum", every=5, where=ends)
+sim.histories.create("way", "node", "displacement-x", how="mean", every=5, where=ends)
+sim.histories.create("broken", "model", "broken-joints", every=5)
+sim.histories.create("error", "model", "energy-error", every=50)
+sim.output.vtk("bar", every=100)
+sim.solve(time=2e-5)
+sim.save("half.sav")
+if "again" in sys.argv:
+    sim.step(20)
+    sim.restore("half.sav")
+sim.step(150)
+sim.save("end.sav")
+sim.charts.create("pull", x_label="displacement [um]", y_label="stress [MPa]")
+sim.charts.add("pull", x="way", scale_x=1e6, y="load", scale_y=1e-4, label="model")
+sim.charts.export("pull", "pull.png")
+sim.histories.export("all.csv")
+assert sim.histories["broken"][-1, 2] > 0 and sim.steps == sim.block_steps == sim.histories["load"][-1, 0]
+assert sim.solved["reason"] == "time" and abs(sim.energies["relative"]) < 0.02
+assert sim.nodes.values("velocity-x", where="id 12")[0] == 0.15
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the run of the PCDC script on one rank."""
+    folder = tmp_path_factory.mktemp("pcdc")
+    (folder / "model.sc").write_text(SCRIPT)
+    done = Launcher()(1, "model.sc", cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def different(one: Path, other: Path, names: list[str]) -> list[str]:
+    """Files that are not the same, of checkpoints but for the journal of the script."""
+    found = []
+    for name in names:
+        a, b = one / name, other / name
+        if a.suffix in (".vtkhdf", ".sav"):
+            left, right = contents(a), contents(b)
+            keys = {key for key in left if key not in right or left[key].tobytes() != right[key].tobytes()}
+            found += [name] * (
+                not keys <= ({"@state", "@crc"} if a.suffix == ".sav" else set()) or left.keys() != right.keys()
+            )
+        elif name != f"data/{RECORD}" and a.read_bytes() != b.read_bytes():
+            found.append(name)
+    return found
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("ranks", "how", "word"),
+    [(1, "hpcdem", ""), (1, "hpcdem", "again"), (2, "python", ""),
+     pytest.param(4, "hpcdem", "again", marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_python_says_what_the_script_says(
+    script: Path, launch: Launcher, tmp_path: Path, ranks: int, how: str, word: str
+) -> None:
+    (tmp_path / "model.py").write_text(PROGRAM)
+    words = ("model.py", *(("--", word) if word and how == "hpcdem" else (word,) if word else ()))
+    done = (launch if how == "hpcdem" else launch.python)(ranks, *words, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    names = sorted(
+        path.relative_to(script).as_posix() for path in [*script.glob("*.sav"), *(script / "data").iterdir()]
+    )
+    assert {"end.sav", "data/history_load.csv", "data/all.csv", "data/pull.csv", "data/cracks.csv"} <= set(names)
+    assert sum(name.endswith(".vtkhdf") for name in names) > 1
+    assert sorted(p.name for p in (tmp_path / "data").iterdir()) == sorted(p.name for p in (script / "data").iterdir())
+    assert different(script, tmp_path, names) == []
+    assert "line 23: solve time 2e-05" in done.stdout and "energy budget" in done.stdout and "figure: " in done.stdout
+    assert "element-steps/s" in done.stdout
+
+
+# ---- with particles --------------------------------------------------------------------------------------------------
+
+BOTH = """\
+import os
+import signal
+import sys
+import hpcdem
+
+def build():
+    sim.mesh.structured((0, 0), (1.2, 0.6), (6, 3))
+    sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25, friction=30)
+    sim.nodes.move(1, where="y 0 0")
+    sim.gravity((0, -9.81))
+    sim.histories.create("top", "node", "velocity-y", nearest=(0.6, 0.6), every=20)
+    sim.set(gravity=(0.0, -9.81), print=100)
+    sim.ball(0.5, 0.6995, 0.1)
+    sim.ball(0.5, 0.8998, 0.1)
+    sim.prop(density=2000.0, kn=1e7, ks=1e7, fric=0.5, yv=-1.0, xv=0.3)
+    sim.couple(friction=0.4, dt=5e-6)
+
+sim = hpcdem.Simulation()
+seen = []
+sim.every(50, lambda s: seen.append(s.steps))
+if "stop" in sys.argv:
+    sim.every(130, lambda s: s.steps == 130 and os.kill(os.getpid(), signal.SIGTERM))
+if not sim.resume():
+    build()
+    sim.step(300)
+assert sim.coupling is not None and seen[-1] == 300
+both = sim.coupling
+values = [*sim.gather("x"), *sim.gather("y"), *sim.gather("spin"), *both.contacts()["fs"], *both.force()]
+values += [*sim.nodes["position-y"], both.energies()["lost"], sim.histories["top"][-1, 2]]
+assert len(both.contacts()["id"]) and sim.steps == sim.block_steps == 300
+open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in values))
+sim.save("both.sav")
+"""
+
+BOTH_AS_SCRIPT = """\
+import hpcdem
+pcdc mesh structured (0,0) (1.2,0.6) cells 6 3
+pcdc element c-model mech-iso-e property density 2700 young 1e9 poisson-ratio 0.25 friction 30
+pcdc node boundary mech-m-b-c type 1 range y 0 0
+pcdc model gravity (0,-9.81)
+sim = hpcdem.Simulation(outdir='data/particles')
+sim.set(gravity=(0.0, -9.81), print=100)
+sim.ball(0.5, 0.6995, 0.1)
+sim.ball(0.5, 0.8998, 0.1)
+sim.prop(density=2000.0, kn=1e7, ks=1e7, fric=0.5, yv=-1.0, xv=0.3)
+pcdc history create 'top' node value velocity-y nearest (0.6,0.6) every 20
+both = hpcdem.couple(sim, friction=0.4, dt=5e-6)
+pcdc model step 300
+values = [*sim.gather("x"), *sim.gather("y"), *sim.gather("spin"), *both.contacts()["fs"], *both.force()]
+values += [*pcdc.values('node', 'position-y'), both.energies()["lost"], pcdc.history('top')[-1, 2]]
+open("end_script.txt", "w").write(" ".join(float(v).hex() for v in values))
+"""
+
+
+@pytest.mark.mpi
+def test_particles_and_blocks_in_one_program(launch: Launcher, tmp_path: Path) -> None:
+    """The same bits as the script, on two ranks, and when it was stopped and taken up."""
+    (tmp_path / "script.sc").write_text(BOTH_AS_SCRIPT)
+    done = launch(1, "script.sc", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    expected = (tmp_path / "end_script.txt").read_text()
+    frames = {path.name for path in (tmp_path / "data" / "particles").glob("*.vtkhdf")}
+    for name, ranks in (("whole", 1), ("cut", 1)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "study.py").write_text(BOTH)
+        words = ("--", "stop") if name == "cut" else ()
+        done = launch(ranks, "study.py", "--no-figure", *words, cwd=tmp_path / name)
+        assert done.returncode == (85 if words else 0), done.stdout + done.stderr
+    assert "go on with Simulation.resume()" in done.stderr
+    done = launch(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
+    assert done.returncode == 0, done.stdout + done.stderr
+    ends = [path.read_text() for name in ("whole", "cut") for path in (tmp_path / name).glob("end_*.txt")]
+    assert ends == [expected] * 3
+    for name in ("whole", "cut"):
+        assert {path.name for path in (tmp_path / name / "data" / "particles").glob("*.vtkhdf")} >= frames
+        assert (tmp_path / name / "data" / "history_top.csv").read_bytes() == (
+            tmp_path / "data" / "history_top.csv").read_bytes()  # fmt: skip
+
+
+STOPPED = """\
+import os
+import signal
+import sys
+import threading
+import hpcdem
+
+sim = hpcdem.Simulation()
+if not sim.resume():
+    sim.mesh.structured((0, 0), (1, 1), (4, 4), group="rock")
+    sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25, damp_factor=0.2)
+    sim.nodes.move(1, where="y 0 0")
+    sim.nodes.force(fx=1e4, where="y 1 1")
+    sim.histories.create("top", "node", "displacement-x", nearest=(1, 1), every=100)
+    if "stop" in sys.argv:
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGTERM)).start()
+    sim.solve(ratio=1e-30, cycles=STEPS)
+assert sim.solved["reason"] == "cycles" and sim.steps == STEPS
+open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in sim.nodes["position-x"]))
+"""
+
+
+@pytest.mark.mpi
+def test_stopped_in_the_middle_and_taken_up(launch: Launcher, tmp_path: Path) -> None:
+    for name in ("whole", "cut"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "150000"))
+    done = launch(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
+    assert done.returncode == 0, done.stdout + done.stderr
+    cut = launch(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
+    assert cut.returncode == 85 and "go on with Simulation.resume()" in cut.stderr, cut.stdout + cut.stderr
+    rest = launch(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
+    assert rest.returncode == 0 and "going on from" in rest.stdout, rest.stdout + rest.stderr
+    ends = {name: [file.read_text() for file in (tmp_path / name).glob("end_*.txt")] for name in ("whole", "cut")}
+    assert ends["cut"] == ends["whole"] * 2
+    assert (tmp_path / "cut/data/history_top.csv").read_bytes() == (
+        tmp_path / "whole/data/history_top.csv"
+    ).read_bytes()
+
+
+HEAD = """\
+import hpcdem
+sim = hpcdem.Simulation()
+sim.mesh.structured((0, 0), (1, 1), (2, 2))
+sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25)
+"""
+REFUSED = {
+    "two states": ("sim.ball(5.0, 5.0, 1.0); sim.save('a.sav')", 2, "study.py:5: save: particles and blocks that are"),
+    "functions that nobody calls": ("sim.every(5, print); sim.step(3)", 2, "study.py:5: step: functions of every"),
+    "no blocks to couple": ("hpcdem.Simulation('b').couple()", 2, "study.py:5: couple: there are no blocks yet"),
+    "checkpoint of both": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
+                           "sim.save('a.sav'); sim.coupling.end(); sim.restore('a.sav')", 2,
+                           "couple\\(\\) comes first"),
+    "no equilibrium": ("sim.option(dynamic=False); sim.nodes.force(fx=1e6); sim.solve(limit=100)", 3,
+                       "study.py:5: solve: no equilibrium"),
+    "start of coupled ones": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple(); "
+                              "sim.start()",
+                              2, "study.py:5: start: start would replace"),
+    "step in a function": ("sim.ball(0.5, 2.0, 0.1); sim.prop(density=2e3, kn=1e6, ks=1e6); sim.couple()\n"
+                           "sim.every(5, lambda s: s.step(1)); sim.step(10)", 2,
+                           "study.py:6: step: model step 1 cannot be used"),
+    "file on a full disk": ("sim.charts.create('c'); sim.charts.add('c', values=[(0, 0)]); "
+                            "sim.charts.export('c', 'none/c.png')", 1, "study.py:5: charts.export: .*none"),
+    "kind of run": ("", 2, "--resume is for ZDEM and PCDC scripts"),
+    "fingerprints": ("", 2, "study.py:3: mesh.structured: --check-reproducible is for models of particles"),
+}  # fmt: skip
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_in_a_run(launch: Launcher, tmp_path: Path, case: str) -> None:
+    text, code, expected = REFUSED[case]
+    (tmp_path / "study.py").write_text(HEAD + text + "\n")
+    options = {"kind of run": ["--resume"], "fingerprints": ["--check-reproducible", "5"]}.get(case, [])
+    done = launch(1, "study.py", "--no-figure", *options, cwd=tmp_path)
+    assert done.returncode == code and re.search(expected, done.stderr), done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+
+
+QUIET = """\
+import hpcdem
+with hpcdem.Simulation("a", log=False) as sim:
+    sim.mesh.structured((0, 0), (1, 1), (2, 2))
+    sim.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25)
+    sim.histories.create("t", "model", "time", every=2)
+    sim.step(4)
+    assert sim.outdir.name == "a" and sim.time > 0.0 and sim.dt > 0.0
+with hpcdem.Simulation("b") as sand:
+    sand.ball(0.5, 2.0, 0.1)
+    sand.prop(density=2e3, kn=1e6, ks=1e6)
+    sand.set(dt=1e-5)
+    sand.cycle(3)
+    sand.mesh.structured((0, 0), (1, 1), (2, 2))
+    sand.elements.model("mech-iso-elastic", density=2700, young=1e9, poisson_ratio=0.25)
+    sand.histories.create("t", "model", "time", every=2)
+    sand.step(4)
+    assert sand.steps == 3 and sand.block_steps == 4 and sand.outdir.name == "b"
+    sand.couple()
+    sand.step(2)
+    assert sand.steps == 5 and sand.block_steps == 6 and sand.coupling.dt == sand.dt
+    sand.coupling.end()
+    sand.start()
+    assert sand.count == sand.steps == sand.block_steps == 0
+"""
+
+
+def test_several_models_and_their_folders(launch: Launcher, tmp_path: Path) -> None:
+    (tmp_path / "study.py").write_text(QUIET)
+    done = launch(1, "study.py", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    first = done.stdout.partition("mesh:")[0]
+    assert "step 4" not in first and done.stdout.count("mesh: ") == 1  # the first one is quiet
+    assert (tmp_path / "a" / "history_t.csv").read_text().count("\n") == 3
+    assert (tmp_path / "b" / "blocks" / "history_t.csv").read_text().count("\n") == 4
+    assert (tmp_path / "b" / "run.json").exists() and not (tmp_path / "data").exists()
+
+
+def test_the_example_comes_to_the_theory(launch: Launcher, tmp_path: Path) -> None:
+    shutil.copy(ROOT / "examples" / "cantilever.py", tmp_path)
+    done = launch(1, "cantilever.py", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    rows = re.findall(r"(\d+) elements .* by (\S+) um, theory (\S+) um", done.stdout)
+    away = [1.0 - float(end) / float(theory) for _, end, theory in rows]
+    assert len(away) == 3 and away[0] > away[1] > away[2] > 0.0 and away[2] < 0.01
+
+
+def test_the_programs_of_the_documentation_run(launch: Launcher, tmp_path: Path) -> None:
+    """The section on blocks of docs/python.md, its programs one after the other."""
+    text = (ROOT / "docs" / "python.md").read_text().split("## Blocks\n")[1].split("\n## ")[0]
+    programs = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(programs) == 2
+    for k, program in enumerate(programs):
+        assert "sim.step(20000)" in program
+        (tmp_path / f"study{k}.py").write_text(program.replace("sim.step(20000)", "sim.step(50)"))
+        done = launch(1, f"study{k}.py", "--no-figure", f"--outdir=data{k}", cwd=tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_script_keeps_its_own_blocks(launch: Launcher, tmp_path: Path) -> None:
+    (tmp_path / "a.sc").write_text("import hpcdem\nsim = hpcdem.Simulation('b')\npcdc model new\nsim.mesh.quality()\n")
+    done = launch(1, "a.sc", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 2 and "a.sc:4: mesh.quality: the blocks of a PCDC script are those" in done.stderr
