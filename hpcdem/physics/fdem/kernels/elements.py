@@ -6,7 +6,8 @@ sent to a neighbour, so neither threads nor ranks meet. Triangles go through in 
 
 1. rows of triangle and partners' edges are turned into lanes (numerics/lanes.py);
 2. stress and joints before their peak are plain loops over lanes, which become vector instructions;
-3. joints behind their peak, of which each block has a list, overwrite their lanes one by one;
+3. joints behind their peak, of which each block has a list, go through lanes of their own (softening.py) and overwrite
+   what step 2 found for them;
 4. contact forces are added, and corners that move by themselves are kicked: v += f dt / m. For the others the forces
    are stored; nodes.py adds them up.
 
@@ -20,7 +21,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joints, laws, softening
 from hpcdem.physics.fdem.kernels.joints import HISTORY, INTACT, KINETIC, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
 
 BLOCK = 64
@@ -230,7 +231,10 @@ def _kinetic(e, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _slow_joints(b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally):
+def _slow_joints(
+    b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, room,
+    tally,
+):  # fmt: skip
     """Joints behind their peak: those on the list of block b, and those that get there now."""
     if _any_past_peak(n, lanes) < 0:
         for e in range(n):
@@ -243,24 +247,26 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, history, head, follo
                         history[slot, m] = 0.0
                     history[slot, PEAK_STEP], history[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
                     tally[NEW_YIELDED] += 1
+    soft, slots, edges = room
+    width = U(12 if wide else 8)
+    m = 0
     slot = head[b]
     while slot >= 0:
-        e, k = slot // 3 - first, slot % 3
-        xa = (X1, X2, X3)[k] + U(e)
-        xb = (X2, X3, X1)[k] + U(e)
-        out = (A0, A1, A2)[k] + U(e)
-        p = partner[slot]
-        row = kind[slot]
-        fax, fay, fbx, fby, now = joints.yielded_edge(
-            lanes[xa], lanes[xa + _NEXT], lanes[xb], lanes[xb + _NEXT], x[p], x[p + 1], x[p + 2], x[p + 3],
-            table, beyond, row, history, slot, state[slot],
-        )  # fmt: skip
-        lanes[out], lanes[out + _NEXT], lanes[out + _B], lanes[out + _B + _NEXT] = fax, fay, fbx, fby
-        if now != state[slot]:
-            state[slot] = now
-            history[slot, STEP], history[slot, KINETIC] = step, _kinetic(e, lanes)
-            tally[NEW_BROKEN] += 1
+        slots[m], edges[m] = slot, U(rows[slot // 3]) * width + U(2 * (slot % 3))
+        m += 1
         slot = follow[slot]
+    broken = softening.yielded_edges(
+        m, slots, edges, x, partner, kind, state, table, beyond, history.reshape(history.size), soft
+    )
+    for q in range(m):
+        e, k = slots[q] // 3 - first, slots[q] % 3
+        out, q = (A0, A1, A2)[k] + U(e), U(q)
+        lanes[out], lanes[out + _NEXT] = soft[softening.FAX + q], soft[softening.FAY + q]
+        lanes[out + _B], lanes[out + _B + _NEXT] = soft[softening.FBX + q], soft[softening.FBY + q]
+    for q in range(broken):
+        slot = edges[q]
+        history[slot, STEP], history[slot, KINETIC] = step, _kinetic(slot // 3 - first, lanes)
+        tally[NEW_BROKEN] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -300,7 +306,8 @@ def _triangles(
 ):  # fmt: skip
     lanes = np.zeros(LANES * CAPACITY)
     x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table = table.reshape(table.size)
+    flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
+    room = softening.lanes_and_lists()
     blocks = len(head)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
         first = b * BLOCK
@@ -315,8 +322,9 @@ def _triangles(
         _edge_loop_2(n, lanes)
         if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
             _slow_joints(
-                b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally[t]
-            )
+                b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, flat_table, flat_beyond,
+                step, lanes, room, tally[t],
+            )  # fmt: skip
         if keep_joints:
             _store_joints(n, first, rows, of_joints, lanes)
         _sum(n, gx, gy, lanes)

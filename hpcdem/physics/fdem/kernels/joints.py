@@ -51,6 +51,12 @@ def end_forces(tx, ty, s0, s1, s2, t0, t1, t2):
     return na * ty + ta * tx, ta * ty - na * tx, nb * ty + tb * tx, tb * ty - nb * tx
 
 
+@njit(cache=True, error_model="numpy")
+def mode(opened2, slid2):
+    """How a joint broke, from the largest squares of both parts of its damage: from 1 (opened) to 2 (slid)."""
+    return 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
+
+
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state):
     """Stresses at the points of a joint that has passed its peak, which remembers more by it.
@@ -87,8 +93,7 @@ def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, 
     gone = (d0 >= 1.0) + (d1 >= 1.0) + (d2 >= 1.0)
     if state == YIELDED and gone >= 2:
         state = BROKEN
-        opened2, slid2 = max(f0, f1, f2), max(g0, g1, g2)
-        history[slot, MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
+        history[slot, MODE] = mode(max(f0, f1, f2), max(g0, g1, g2))
         d0 = d1 = d2 = 1.0
     history[slot, OPENED], history[slot, OPENED + 1], history[slot, OPENED + 2] = o0, o1, o2
     history[slot, SLIPPED], history[slot, SLIPPED + 1], history[slot, SLIPPED + 2] = u0, u1, u2
