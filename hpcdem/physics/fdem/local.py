@@ -376,8 +376,8 @@ class Local:
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_kind, self.slot_state,
-            self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_law, self.slot_kind,
+            self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
