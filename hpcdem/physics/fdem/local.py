@@ -570,8 +570,8 @@ class Local:
         sim = self.sim
         out = np.zeros((len(slots), 14))
         build.edges_now(
-            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_history, sim.where,
-            sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, out,
+            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_history, sim.where, sim.the_mesh().cells,
+            sim.x, self.joint_table, self.joint_beyond, out,
         )  # fmt: skip
         return out
 

@@ -733,8 +733,8 @@ def quads_threaded(
     """The same on several threads."""
     for t in prange(threads):
         _quads(
-            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-            slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
         )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
-"""Joints behind their peak, many at once: `joints.yielded_edge` as loops over lanes (numerics/lanes.py).
+"""Joints behind their peak: the law `laws.yielded_point` as loops over lanes (numerics/lanes.py), and how they break.
 
 Each loop has no jumps and no calls, so it becomes vector instructions; only the exponential of the softening curve is
-computed one by one, in a loop of its own. All results are those of `joints.yielded_edge`, bit for bit.
+computed one by one, in a loop of its own.
 """
 
 from __future__ import annotations
@@ -140,11 +140,13 @@ def _forces(n, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def yielded_edges(n, slot, edge, x, partner, kind, state, table, beyond, history, lanes):
-    """`joints.yielded_edge` of n joints: forces on a and b into the lanes FAX to FBY; histories move on.
+    """Forces of n joints on their ends a and b [N/m] into the lanes FAX to FBY; histories and states move on.
 
     slot, edge (CAPACITY,) i8: the first n are slots and where their own edges begin in x; the next up to three are
-    filled up here. x, table, beyond, history: flat. Returns how many of the joints break now: their slots are then in
-    front in `edge`, which is used up, and they have their mode; the caller sets their state.
+    filled up here. partner, kind, state: by slot, see `elements.triangles`; x, table, beyond, history: flat.
+
+    A joint is BROKEN when two of its three points have no strength left; its MODE then says how, from 1 (opened) to 2
+    (slid). Returns how many break now: their slots are then the first in `edge`, which is used up.
     """
     whole = (n + 3) // 4 * 4
     for m in range(n, whole):
@@ -159,7 +161,8 @@ def yielded_edges(n, slot, edge, x, partner, kind, state, table, beyond, history
     for m in range(n):
         if lanes[GONE + U(m)] >= 2.0 and state[slot[m]] == YIELDED:
             at = slot[m] * HISTORY
-            history[at + MODE] = joints.mode(lanes[OPENED + U(m)], lanes[SLIPPED + U(m)])
+            opened2, slid2 = lanes[OPENED + U(m)], lanes[SLIPPED + U(m)]
+            history[at + MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
             for g in range(3):
                 history[at + DAMAGE + g] = 1.0
             state[slot[m]] = BROKEN
