@@ -170,9 +170,9 @@ def test_joints(kind: str, large: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", ["quad", "mixed"])
-def test_blocks_of_elements_change_no_bit(kind: str) -> None:
-    """Forces and histories where the elements go through in one part and in seven, other ones side by side in the lanes;
-    a third of them have no joints."""
+def test_the_place_of_a_quad_in_the_lanes_changes_no_bit(kind: str) -> None:
+    """Forces and histories where quads go through in one part and in seven, others side by side in the lanes; a third
+    of them have no joints."""
     mesh = shaken(rectangle(20, 9, 2.0, 0.9, kind=kind), 0.2)
     sim = model(mesh)
     sim.option(collision=False)
