@@ -16,7 +16,7 @@ from numba import njit
 
 A, B, C = 0.63, 1.8, 6.0
 """Shape of the softening curve (Munjiza 2004, fitted to concrete of Evans & Marathe 1968)."""
-DECAY = (A + C * B) / ((A + B) * (1.0 - A - B))
+RISE, FALL = A + C * B, (A + B) * (1.0 - A - B)
 SOFTENING_AREA = 0.386307294743943
 """Integral of `softening` from 0 to 1: G_f = SOFTENING_AREA * strength * critical opening."""
 TINY = 1e-300
@@ -51,12 +51,12 @@ def turned(s11, s22, s12, cs, sn):
 @njit(cache=True, error_model="numpy")
 def softening(d):
     """Strength that is left, over the full one, at damage d from 0 to 1 (C = 6 as two factors)."""
-    return softening_curve(d, math.exp(d * DECAY))
+    return softening_curve(d, math.exp(d * RISE / FALL))
 
 
 @njit(cache=True, error_model="numpy")
 def softening_curve(d, e):
-    """The same, where e is exp(d * DECAY)."""
+    """The same, where e is exp(d RISE / FALL)."""
     rest = 1.0 - d
     cube = rest * rest * rest
     left = max((1.0 - (A + B - 1.0) / (A + B) * e) * (A * rest + B * (cube * cube)), 0.0)

@@ -111,9 +111,9 @@ def _damage(n, lanes):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _exponentials(n, lanes):
     for e in range(U(n)):
-        lanes[E0 + e] = math.exp(lanes[D0 + e] * laws.DECAY)
-        lanes[E1 + e] = math.exp(lanes[D1 + e] * laws.DECAY)
-        lanes[E2 + e] = math.exp(lanes[D2 + e] * laws.DECAY)
+        lanes[E0 + e] = math.exp(lanes[D0 + e] * laws.RISE / laws.FALL)
+        lanes[E1 + e] = math.exp(lanes[D1 + e] * laws.RISE / laws.FALL)
+        lanes[E2 + e] = math.exp(lanes[D2 + e] * laws.RISE / laws.FALL)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
