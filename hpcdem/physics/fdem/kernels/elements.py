@@ -418,11 +418,21 @@ def _part_stretch(p, xy, c, small):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_rate(vx1, vy1, vx2, vy2, vx3, vy3, a, b, c, d, cs, sn):
+def _rate(vx1, vy1, vx2, vy2, vx3, vy3, a, b, c, d, cs, sn):
     """Strain rate of a triangle of a quad in its turned frame."""
     ux, uy, wx, wy = vx2 - vx1, vy2 - vy1, vx3 - vx1, vy3 - vy1
     g11, g12, g21, g22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
     return cs * g11 + sn * g21, cs * g22 - sn * g12, 0.5 * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_rate(p, vel, c, cs, sn):
+    """The same of triangle p of a quad with the velocities vel (8,) and the row c (32,) of the table."""
+    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+    return _rate(
+        vel[i], vel[i + 1], vel[j], vel[j + 1], vel[k], vel[k + 1], c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3],
+        cs, sn,
+    )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -468,8 +478,8 @@ def _overlay_loop(overlay):
             s12, t12 = z12 + two_mu * a12, z12 + two_mu * b12
             x1, y1, x2, y2 = lanes[vi + e], lanes[vi + _NEXT + e], lanes[vj + e], lanes[vj + _NEXT + e]
             x3, y3, x4, y4 = lanes[vk + e], lanes[vk + _NEXT + e], lanes[vl + e], lanes[vl + _NEXT + e]
-            a11, a22, a12 = _part_rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
-            b11, b22, b12 = _part_rate(x1, y1, x3, y3, x4, y4, f, g, h, m, cs2, sn2)
+            a11, a22, a12 = _rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
+            b11, b22, b12 = _rate(x1, y1, x3, y3, x4, y4, f, g, h, m, cs2, sn2)
             rate = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
             shift = 0.5 * (rate - (a11 + a22))
             s11, s22, s12 = s11 + eta * (a11 + shift), s22 + eta * (a22 + shift), s12 + eta * a12
