@@ -99,7 +99,7 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
-    gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles: a tenth of its time
+    gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles
     filled: set[Path] = set()
     _write_in_turn(job, filled)
     faulthandler.dump_traceback_later(job.patience, exit=True)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.numerics.lanes import CAPACITY, U
+from hpcdem.physics.fdem.kernels import elements, joints, laws, softening
 from hpcdem.physics.fdem.local import joint_tables
 from hpcdem.physics.fdem.properties import COHESIVE, Rows
 
@@ -19,9 +20,38 @@ VALUES = {
 
 
 def edge(*args) -> tuple[float, float, float, float, int]:
-    """`joints.yielded_edge` with rows instead of tables: corners, law, beyond, history (12,), state."""
+    """Forces and state of a joint behind its peak, as the step computes them: corners, law, beyond, history, state."""
     *corners, table, beyond, history, state = args
-    return joints.yielded_edge(*corners, table[None], beyond[None], 0, history[None], 0, state)
+    forces, states = edges(np.array([corners]), table, beyond, history[None], np.array([state], np.uint8))
+    return (*forces[0].tolist(), int(states[0]))
+
+
+def edges(corners, table, beyond, histories, states) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (n, 4) and states of joints between the corners (n, 8), which remember more."""
+    n = len(corners)
+    lanes, slot, own = softening.lanes_and_lists()
+    slot[:n], own[:n] = np.arange(n), 8 * np.arange(n)
+    kind, flat = np.zeros(n, np.int32), histories.reshape(-1)
+    partner = (8 * np.arange(n) + 4).astype(np.int32)
+    before = states.copy()
+    broken = softening.yielded_edges(
+        n, slot, own, corners.reshape(-1), partner, kind, states, table, beyond, flat, lanes
+    )  # fmt: skip
+    assert sorted(own[:broken]) == np.flatnonzero(states != before).tolist()
+    lines = lanes.reshape(softening.LANES, CAPACITY)[softening.FAX // U(CAPACITY) :, :n]
+    return lines[:4].T.copy(), states
+
+
+def intact_edge(*args) -> tuple[float, float, float, float, float]:
+    """Forces of a joint before its peak, and how much is left to it, as the step computes them: corners, law."""
+    *corners, table = args
+    lanes = np.zeros(elements.LANES * CAPACITY)
+    firsts = (elements.X1, elements.Y1, elements.X2, elements.Y2, elements.PX, elements.PY, elements.QX, elements.QY)
+    lanes[list(firsts)] = corners
+    lanes[[int(elements.KOP) + k * CAPACITY for k in range(8)]] = table
+    elements._edge_loop_0(1, lanes)
+    out = [lanes[int(elements.A0) + k * CAPACITY] for k in range(4)]
+    return (*out, lanes[elements.LEFT0])
 
 
 def law(**changes: float) -> tuple[np.ndarray, np.ndarray]:
@@ -40,13 +70,11 @@ def pull(path: np.ndarray, **changes: float) -> tuple[np.ndarray, np.ndarray, np
     for i, (o, s) in enumerate(path.tolist()):
         # This side's edge runs from a = (0, 0) to b = (H, 0); p of the other side faces b, q faces a.
         corners = (0.0, 0.0, H, 0.0, H + s, -o, s, -o)
-        if state == joints.INTACT and joints.past_peak(*corners, table) < 0.0:
-            state = joints.YIELDED
-        fax, fay, fbx, fby, after = edge(*corners, table, beyond, history, state)
         if state == joints.INTACT:
-            history[:] = 0.0
-        else:
-            state = after
+            fax, fay, fbx, fby, left = intact_edge(*corners, table)
+            state = joints.YIELDED if left < 0.0 else joints.INTACT
+        if state != joints.INTACT:
+            fax, fay, fbx, fby, state = edge(*corners, table, beyond, history, state)
         out[i] = -(fay + fby) / H, (fax + fbx) / H, state
     return out.T
 
@@ -122,25 +150,59 @@ def test_the_mode_is_that_of_the_parts_of_damage():
         assert state == joints.BROKEN and history[joints.MODE] == mode
 
 
+def random_joints(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (n, 8) and histories of joints that open or overlap, and slip, about as far as they have been; the one
+    before the last has never yielded, the last breaks."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, n, 2))
+    widths = 10.0 ** rng.uniform(-8.0, -4.0, (2, n, 1))
+    q, p = a + widths[0] * rng.normal(size=(n, 2)), b + widths[1] * rng.normal(size=(n, 2))
+    histories = np.zeros((n, joints.HISTORY))
+    histories[:, :6] = np.abs(rng.normal(size=(n, 6))) * np.repeat(widths[..., 0].T, 3, axis=1)
+    histories[rng.random((n, joints.HISTORY)) < 0.3] = 0.0
+    histories[:, 6:9] = np.clip(rng.uniform(-0.3, 0.9, (n, 3)), 0.0, 1.0)
+    histories[:, joints.PEAK_STEP] = 17.0
+    histories[-2, :9], q[-2:], p[-2:] = 0.0, a[-2:], b[-2:]
+    normal = (b[-1] - a[-1])[::-1] * (1.0, -1.0) / np.hypot(*(b[-1] - a[-1]))
+    q[-1] += 1e-3 * normal
+    p[-1] += 1e-3 * normal
+    return np.column_stack([a, b, p, q]), histories
+
+
 def test_both_sides_get_opposite_forces_bit_for_bit():
     """Random positions of two edges: the partner's forces are the same numbers with the other sign."""
     table, beyond = law()
-    rng = np.random.default_rng(3)
-    for state in (joints.INTACT, joints.YIELDED):
-        for _ in range(300):
-            a, b = rng.normal(size=2), rng.normal(size=2)
-            q, p = a + 1e-6 * rng.normal(size=2), b + 1e-6 * rng.normal(size=2)
-            mine = np.abs(rng.normal(size=12)) * 1e-6
-            mine[6:9] = rng.uniform(0.0, 0.9, 3)
-            mine[9:] = 0.0
-            hers = mine.copy()
-            for first in (0, 3, 6):
-                hers[first : first + 3] = mine[first : first + 3][::-1]
-            if state == joints.INTACT:
-                mine, hers = np.zeros(12), np.zeros(12)
-            here = edge(*a, *b, *p, *q, table, beyond, mine, state)
-            there = edge(*p, *q, *a, *b, table, beyond, hers, state)
-            assert here[0:2] == (-there[2], -there[3]) and here[2:4] == (-there[0], -there[1])
-            assert joints.past_peak(*a, *b, *p, *q, table) == joints.past_peak(*p, *q, *a, *b, table)
-            for first in (0, 3, 6):
-                assert (mine[first : first + 3] == hers[first : first + 3][::-1]).all()
+    corners, here = random_joints(150, 3)
+    there = here.copy()
+    for first in (0, 3, 6):
+        there[:, first : first + 3] = here[:, first : first + 3][:, ::-1]
+    states = np.full((2, len(here)), joints.YIELDED, np.uint8)
+    mine, _ = edges(corners, table, beyond, here, states[0])
+    theirs, _ = edges(corners[:, [4, 5, 6, 7, 0, 1, 2, 3]].copy(), table, beyond, there, states[1])
+    assert (
+        (mine[:, :2] == -theirs[:, 2:]).all() and (mine[:, 2:] == -theirs[:, :2]).all() and mine.any(axis=1).sum() > 100
+    )
+    assert (states[0] == states[1]).all() and states[0, -1] == joints.BROKEN
+    for first in (0, 3, 6):
+        assert (here[:, first : first + 3] == there[:, first : first + 3][:, ::-1]).all()
+    assert (here[:, 9:] == there[:, 9:]).all()
+    for one in corners:
+        mine, theirs = intact_edge(*one, table), intact_edge(*one[4:], *one[:4], table)
+        assert mine[:2] == (-theirs[2], -theirs[3]) and mine[2:4] == (-theirs[0], -theirs[1]) and mine[4] == theirs[4]
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 41, 200])
+def test_the_place_in_the_lanes_changes_no_bit(n):
+    """Joints together and one by one; and what is looked at afterwards (`joints.points_now`) is what the step had."""
+    table, beyond = law()
+    corners, together = random_joints(n, n)
+    single, before = together.copy(), together.copy()
+    states = np.full(n, joints.YIELDED, np.uint8)
+    forces, states = edges(corners, table, beyond, together, states)
+    for i in range(n):
+        *found, state = edge(*corners[i], table, beyond, single[i], joints.YIELDED)
+        assert found == forces[i].tolist() and state == states[i]
+        assert joints.end_forces(*joints.points_now(*corners[i], table, beyond, before[i])) == tuple(found)
+    assert (single == together).all() and (together[:, joints.PEAK_STEP] == 17.0).all()
+    assert (together[:, :9] >= before[:, :9]).all() and (together[:, :9] > before[:, :9]).any()
+    assert states[-2] == joints.YIELDED and states[-1] == joints.BROKEN and together[-1, joints.MODE] == 1.0

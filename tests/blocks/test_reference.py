@@ -167,3 +167,33 @@ def test_joints(kind: str, large: bool) -> None:
             np.ones(sim.local.count, bool), np.ones(len(sim.local.head), bool), *rooms, False
         )  # remember
     assert (seen > 20).all()
+
+
+@pytest.mark.parametrize("kind", ["quad", "mixed"])
+def test_the_place_of_a_quad_in_the_lanes_changes_no_bit(kind: str) -> None:
+    """Forces and histories where quads go through in one part and in seven, others side by side in the lanes; a third
+    of them have no joints."""
+    mesh = shaken(rectangle(20, 9, 2.0, 0.9, kind=kind), 0.2)
+    sim = model(mesh)
+    sim.option(collision=False)
+    edges = mesh.edges()
+    some = edges.inner & (mesh.points[edges.points, 0].max(axis=1) < 1.3)
+    sim.joint_model(edges.faces[some, 0], "classic_intrinsic_cohesive_interface", JOINT)
+    sim.close_model()
+    disturb(sim, True, 5)
+    local = sim.local
+    start = [table.copy() for table in (local.slot_law, local.slot_state, local.slot_history, local.head, local.follow)]
+    found = []
+    for parts in (1, 7):
+        tables = [table.copy() for table in start]
+        out = [np.zeros((len(sim.number), elements.FORCE)) for _ in range(2)]
+        for _ in range(2):
+            args = list(local._quad_args)
+            args[0] = parts
+            args[11], args[13], args[14] = tables[0], tables[1], tables[2]
+            tally = np.zeros((parts, elements.TALLY), np.int64)
+            elements.quads(*args, *out, True, 1.0, -9.81, 3, tally)
+        found.append([*out, tables[0], tables[1], tables[2]])
+    assert all((a == b).all() for a, b in zip(*found))
+    assert np.bincount(found[0][3], minlength=4).tolist()[:3] > [40, 40, 40]
+    assert (found[0][1] != 0.0).any() and len(local.quad_rows) > elements.QUAD_BLOCK

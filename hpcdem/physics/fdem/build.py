@@ -275,12 +275,11 @@ def longest_link(middle, slots, face, partner, where, state):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def edges_now(slots, face, at, kind, state, history, where, cells, x, table, beyond, out):
+def edges_now(slots, face, at, kind, history, where, cells, x, table, beyond, out):
     """Forces on the ends of joints (4), mean opening and slip [m], mean normal and shear stress [Pa], normal (3) and
     shear (3) stress at the points along the edge, into out (n, 14); histories stay as they are. Shear as this side
     feels it along its edge."""
     flat = x.reshape(x.size)
-    own = np.empty((1, joints.HISTORY))
     for i in range(len(slots)):
         s = slots[i]
         f, p = face[s], at[s]
@@ -288,9 +287,8 @@ def edges_now(slots, face, at, kind, state, history, where, cells, x, table, bey
         k2 = (k + 1) % (4 if cells[f // 4, 3] >= 0 else 3)
         ax, ay, bx, by = x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1]
         px, py, qx, qy = flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
-        own[0] = history[s]
-        tx, ty, s0, s1, s2, t0, t1, t2, _ = joints.yielded_points(
-            ax, ay, bx, by, px, py, qx, qy, table, beyond, kind[s], own, 0, state[s]
+        tx, ty, s0, s1, s2, t0, t1, t2 = joints.points_now(
+            ax, ay, bx, by, px, py, qx, qy, table[kind[s]], beyond[kind[s]], history[s]
         )
         fax, fay, fbx, fby = joints.end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
         _, _, h2, oa, sa, ob, sb = joints.openings(ax, ay, bx, by, px, py, qx, qy)

@@ -428,8 +428,8 @@ class Local:
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_kind, self.slot_state,
-            self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_law, self.slot_kind,
+            self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -653,8 +653,8 @@ class Local:
         sim = self.sim
         out = np.zeros((len(slots), 14))
         build.edges_now(
-            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_state, self.slot_history, sim.where,
-            sim.the_mesh().cells, sim.x, self.joint_table, self.joint_beyond, out,
+            slots, self.slot_face, self.slot_at, self.slot_kind, self.slot_history, sim.where, sim.the_mesh().cells,
+            sim.x, self.joint_table, self.joint_beyond, out,
         )  # fmt: skip
         return out
 

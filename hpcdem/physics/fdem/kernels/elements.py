@@ -6,7 +6,8 @@ sent to a neighbour, so neither threads nor ranks meet. Triangles go through in 
 
 1. rows of triangle and partners' edges are turned into lanes (numerics/lanes.py);
 2. stress and joints before their peak are plain loops over lanes, which become vector instructions;
-3. joints behind their peak, of which each block has a list, overwrite their lanes one by one;
+3. joints behind their peak, of which each block has a list, go through lanes of their own (softening.py) and overwrite
+   what step 2 found for them;
 4. contact forces are added, and corners that move by themselves are kicked: v += f dt / m. For the others the forces
    are stored; nodes.py adds them up.
 
@@ -20,7 +21,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, put_two_columns, two_columns
-from hpcdem.physics.fdem.kernels import joints, laws
+from hpcdem.physics.fdem.kernels import joints, laws, softening
 from hpcdem.physics.fdem.kernels.joints import HISTORY, INTACT, KINETIC, NONE, PEAK_KINETIC, PEAK_STEP, STEP, YIELDED
 
 BLOCK = 64
@@ -52,9 +53,8 @@ EDGE_FORCE = 50
 """First lane of the joint forces: (fx, fy) on the first and the last corner of each of the three edges."""
 LEFT0, LEFT1, LEFT2 = (lane(62 + k) for k in range(3))
 LANES = 65
-_FAX = tuple(lane(EDGE_FORCE + 4 * k) for k in range(3))
-A0, A1, A2 = _FAX
-_1, _2, _3, _FOUR, _SIX, _EIGHT, _TWELVE = U(1), U(2), U(3), U(4), U(6), U(8), U(12)
+A0, A1, A2, A3 = (lane(EDGE_FORCE + 4 * k) for k in range(4))
+_1, _2, _3, _FOUR, _SIX, _EIGHT, _TWELVE, _QUAD = U(1), U(2), U(3), U(4), U(6), U(8), U(12), U(QUAD)
 _NEXT = lane(1)
 _B = lane(2)
 """From the force on the first corner of an edge to that on its last."""
@@ -123,10 +123,10 @@ def _stress(n, small, lanes):
         lanes[FX3 + e], lanes[FY3 + e] = -fx1 - fx2, -fy1 - fy2
 
 
-def _edge_loop(k):
-    """The loop over the joints on edge k. One function each: distances between lanes must be constants."""
-    xa, ya, xb, yb = ((X1, Y1, X2, Y2), (X2, Y2, X3, Y3), (X3, Y3, X1, Y1))[k]
-    out, left_of = _FAX[k], (LEFT0, LEFT1, LEFT2)[k]
+def _edge_loop(a, b, out, left_of):
+    """The loop over the joints on one edge, from the corner whose x is lane a to that of lane b; forces into `out` and
+    the three lanes behind it. One function each: distances between lanes must be constants."""
+    xa, ya, xb, yb = a, a + _NEXT, b, b + _NEXT
     near, far = joints.NEAR, joints.FAR
 
     @njit(cache=True, nogil=True, error_model="numpy")
@@ -158,7 +158,8 @@ def _edge_loop(k):
     return loop
 
 
-_edge_loop_0, _edge_loop_1, _edge_loop_2 = _edge_loop(0), _edge_loop(1), _edge_loop(2)
+_edge_loop_0, _edge_loop_1 = _edge_loop(X1, X2, A0, LEFT0), _edge_loop(X2, X3, A1, LEFT1)
+_edge_loop_2 = _edge_loop(X3, X1, A2, LEFT2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -168,6 +169,16 @@ def _any_past_peak(n, lanes):
     found = np.int64(0)
     for e in range(U(n)):
         found |= bits[LEFT0 + e] | bits[LEFT1 + e] | bits[LEFT2 + e]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _any_quad_past_peak(n, lanes):
+    """The same of quads."""
+    bits = lanes.view(np.int64)
+    found = np.int64(0)
+    for e in range(U(n)):
+        found |= bits[Q_LEFT0 + e] | bits[Q_LEFT1 + e] | bits[Q_LEFT2 + e] | bits[Q_LEFT3 + e]
     return found
 
 
@@ -230,7 +241,10 @@ def _kinetic(e, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _slow_joints(b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally):
+def _slow_joints(
+    b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, room,
+    tally,
+):  # fmt: skip
     """Joints behind their peak: those on the list of block b, and those that get there now."""
     if _any_past_peak(n, lanes) < 0:
         for e in range(n):
@@ -243,24 +257,26 @@ def _slow_joints(b, n, first, x, partner, law, kind, state, history, head, follo
                         history[slot, m] = 0.0
                     history[slot, PEAK_STEP], history[slot, PEAK_KINETIC] = step, _kinetic(e, lanes)
                     tally[NEW_YIELDED] += 1
+    soft, slots, edges = room
+    width = U(12 if wide else 8)
+    m = 0
     slot = head[b]
     while slot >= 0:
-        e, k = slot // 3 - first, slot % 3
-        xa = (X1, X2, X3)[k] + U(e)
-        xb = (X2, X3, X1)[k] + U(e)
-        out = (A0, A1, A2)[k] + U(e)
-        p = partner[slot]
-        row = kind[slot]
-        fax, fay, fbx, fby, now = joints.yielded_edge(
-            lanes[xa], lanes[xa + _NEXT], lanes[xb], lanes[xb + _NEXT], x[p], x[p + 1], x[p + 2], x[p + 3],
-            table, beyond, row, history, slot, state[slot],
-        )  # fmt: skip
-        lanes[out], lanes[out + _NEXT], lanes[out + _B], lanes[out + _B + _NEXT] = fax, fay, fbx, fby
-        if now != state[slot]:
-            state[slot] = now
-            history[slot, STEP], history[slot, KINETIC] = step, _kinetic(e, lanes)
-            tally[NEW_BROKEN] += 1
+        slots[m], edges[m] = slot, U(rows[slot // 3]) * width + U(2 * (slot % 3))
+        m += 1
         slot = follow[slot]
+    broken = softening.yielded_edges(
+        m, slots, edges, x, partner, kind, state, table, beyond, history.reshape(history.size), soft
+    )
+    for q in range(m):
+        e, k = slots[q] // 3 - first, slots[q] % 3
+        out, q = (A0, A1, A2)[k] + U(e), U(q)
+        lanes[out], lanes[out + _NEXT] = soft[softening.FAX + q], soft[softening.FAY + q]
+        lanes[out + _B], lanes[out + _B + _NEXT] = soft[softening.FBX + q], soft[softening.FBY + q]
+    for q in range(broken):
+        slot = edges[q]
+        history[slot, STEP], history[slot, KINETIC] = step, _kinetic(slot // 3 - first, lanes)
+        tally[NEW_BROKEN] += 1
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -300,7 +316,8 @@ def _triangles(
 ):  # fmt: skip
     lanes = np.zeros(LANES * CAPACITY)
     x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table = table.reshape(table.size)
+    flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
+    room = softening.lanes_and_lists()
     blocks = len(head)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
         first = b * BLOCK
@@ -315,8 +332,9 @@ def _triangles(
         _edge_loop_2(n, lanes)
         if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
             _slow_joints(
-                b, n, first, x, partner, law, kind, state, history, head, follow, table, beyond, step, lanes, tally[t]
-            )
+                b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, flat_table, flat_beyond,
+                step, lanes, room, tally[t],
+            )  # fmt: skip
         if keep_joints:
             _store_joints(n, first, rows, of_joints, lanes)
         _sum(n, gx, gy, lanes)
@@ -362,66 +380,129 @@ def triangles_threaded(
 # ---- quads ---------------------------------------------------------------------------------------------------------
 
 
+# Lanes of quads: corners and velocities as above and those of the fourth, then the joint and the forces as above.
+X4, Y4, VX4, VY4, FX4, FY4 = lane(6), lane(7), lane(14), lane(15), lane(46), lane(47)
+QUAD_ROW = 66
+"""First lane of the row of the table of quads, of which seven times four columns are needed."""
+Q_C, Q_LAM, Q_MU2, Q_VISC = (lane(QUAD_ROW + k) for k in (Q_INVERSE, Q_LAMBDA, Q_TWO_MU, Q_ETA))
+Q_M1, Q_M2, Q_M3, Q_M4 = (lane(QUAD_ROW + Q_WEIGHT + k) for k in range(4))
+Q_S11, Q_S22, Q_S12, _, Q_LEFT0, Q_LEFT1, Q_LEFT2, Q_LEFT3 = (lane(QUAD_ROW + 28 + k) for k in range(8))
+B1, B2, B3, B4 = (lane(QUAD_ROW + 36 + 2 * k) for k in range(4))
+"""Forces of joints on the corners."""
+QUAD_LANES = QUAD_ROW + 44
+QUAD_BLOCK = 48
+"""Quads worked on together; they have fewer joints than `CAPACITY`."""
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_stretch(p, xy, c, small):
-    """Deformation gradient, rotation and strain of triangle p of a quad with the corners xy (8,)."""
-    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
-    a, b, cc, d = c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3]
-    ux, uy, wx, wy = xy[j] - xy[i], xy[j + 1] - xy[i + 1], xy[k] - xy[i], xy[k + 1] - xy[i + 1]
-    f11, f12, f21, f22 = ux * a + wx * cc, ux * b + wx * d, uy * a + wy * cc, uy * b + wy * d
+def _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small):
+    """Sides, rotation and strain of a triangle of a quad; a, b, c, d: the inverse of its reference matrix."""
+    ux, uy, wx, wy = x2 - x1, y2 - y1, x3 - x1, y3 - y1
+    f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
     cs, sn = laws.rotation(f11, f12, f21, f22)
     if small:
         cs, sn = 1.0, 0.0
-        inverse = 1.0 / (a * d - b * cc)
-        ux, wx, uy, wy = d * inverse, -b * inverse, -cc * inverse, a * inverse
+        inverse = 1.0 / (a * d - b * c)
+        ux, wx, uy, wy = d * inverse, -b * inverse, -c * inverse, a * inverse
     e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
     return ux, uy, wx, wy, cs, sn, e11, e22, e12
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_part(p, ux, uy, wx, wy, cs, sn, s11, s22, s12, force):
-    """Add the forces of triangle p of a quad: half of those of its overlay, which are half of sigma n s each."""
-    xx, yy, xy_ = laws.turned(s11, s22, s12, cs, sn)
-    fx1, fy1 = 0.25 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.25 * (xy_ * (wy - uy) - yy * (wx - ux))
-    fx2, fy2 = 0.25 * (xy_ * wx - xx * wy), 0.25 * (yy * wx - xy_ * wy)
+def _part_stretch(p, xy, c, small):
+    """The same of triangle p of a quad with the corners xy (8,) and the row c (32,) of the table."""
     i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
-    force[i] += fx1
-    force[i + 1] += fy1
-    force[j] += fx2
-    force[j + 1] += fy2
-    force[k] -= fx1 + fx2
-    force[k + 1] -= fy1 + fy2
+    return _part(
+        xy[i], xy[i + 1], xy[j], xy[j + 1], xy[k], xy[k + 1], c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3], small
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def quad_forces(xy, vel, c, s0, small, force):
-    """Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
+def _rate(vx1, vy1, vx2, vy2, vx3, vy3, a, b, c, d, cs, sn):
+    """Strain rate of a triangle of a quad in its turned frame."""
+    ux, uy, wx, wy = vx2 - vx1, vy2 - vy1, vx3 - vx1, vy3 - vy1
+    g11, g12, g21, g22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
+    return cs * g11 + sn * g21, cs * g22 - sn * g12, 0.5 * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
 
-    xy, vel (8,): corners and their velocities; c (32,): row of the table of quads; s0 (4,) [Pa]. Adds to force (8,).
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_rate(p, vel, c, cs, sn):
+    """The same of triangle p of a quad with the velocities vel (8,) and the row c (32,) of the table."""
+    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
+    return _rate(
+        vel[i], vel[i + 1], vel[j], vel[j + 1], vel[k], vel[k + 1], c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3],
+        cs, sn,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _part_forces(ux, uy, wx, wy, cs, sn, s11, s22, s12):
+    """Forces of a triangle of a quad on its first two corners: half of those of its overlay, which are half of
+    sigma n s each."""
+    xx, yy, xy = laws.turned(s11, s22, s12, cs, sn)
+    fx1, fy1 = 0.25 * (xx * (wy - uy) - xy * (wx - ux)), 0.25 * (xy * (wy - uy) - yy * (wx - ux))
+    return fx1, fy1, 0.25 * (xy * wx - xx * wy), 0.25 * (yy * wx - xy * wy)
+
+
+def _overlay_loop(overlay):
+    """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l.
+
+    Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
     """
-    lame, two_mu, eta = c[Q_LAMBDA], c[Q_TWO_MU], c[Q_ETA]
-    for overlay in range(2):
-        p, q = 2 * overlay, 2 * overlay + 1
-        ux1, uy1, wx1, wy1, cs1, sn1, a11, a22, a12 = _part_stretch(p, xy, c, small)
-        ux2, uy2, wx2, wy2, cs2, sn2, b11, b22, b12 = _part_stretch(q, xy, c, small)
-        one, two = c[Q_AREA + p], c[Q_AREA + q]
-        mean = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
-        pressure = lame * mean
-        shift = 0.5 * (mean - (a11 + a22))
-        s11, s22 = s0[0] + (pressure + two_mu * (a11 + shift)), s0[1] + (pressure + two_mu * (a22 + shift))
-        shift = 0.5 * (mean - (b11 + b22))
-        t11, t22 = s0[0] + (pressure + two_mu * (b11 + shift)), s0[1] + (pressure + two_mu * (b22 + shift))
-        s12, t12 = s0[2] + two_mu * a12, s0[2] + two_mu * b12
-        if eta > 0.0:
-            a11, a22, a12 = _part_rate(p, vel, c, cs1, sn1)
-            b11, b22, b12 = _part_rate(q, vel, c, cs2, sn2)
+    p, q = PARTS[2 * overlay : 2 * overlay + 2].tolist()
+    (xi, xj, xk, xl), (vi, vj, vk, vl), (fi, fj, fk, fl) = (
+        tuple(lane(first + 2 * corner) for corner in (*p, q[2])) for first in (0, 8, 40)
+    )
+    c1, c2 = (Q_C + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
+    area1, area2 = (lane(QUAD_ROW + Q_AREA + part) for part in (2 * overlay, 2 * overlay + 1))
+    first = overlay == 0
+
+    @njit(cache=True, nogil=True, error_model="numpy")
+    def loop(n, small, lanes):
+        for e in range(U(n)):
+            x1, y1, x2, y2 = lanes[xi + e], lanes[xi + _NEXT + e], lanes[xj + e], lanes[xj + _NEXT + e]
+            x3, y3, x4, y4 = lanes[xk + e], lanes[xk + _NEXT + e], lanes[xl + e], lanes[xl + _NEXT + e]
+            a, b, c, d = lanes[c1 + e], lanes[c1 + _NEXT + e], lanes[c1 + _B + e], lanes[c1 + _B + _NEXT + e]
+            f, g, h, m = lanes[c2 + e], lanes[c2 + _NEXT + e], lanes[c2 + _B + e], lanes[c2 + _B + _NEXT + e]
+            ux1, uy1, wx1, wy1, cs1, sn1, a11, a22, a12 = _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small)
+            ux2, uy2, wx2, wy2, cs2, sn2, b11, b22, b12 = _part(x1, y1, x3, y3, x4, y4, f, g, h, m, small)
+            lame, two_mu, eta = lanes[Q_LAM + e], lanes[Q_MU2 + e], lanes[Q_VISC + e]
+            one, two = lanes[area1 + e], lanes[area2 + e]
+            mean = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
+            pressure = lame * mean
+            z11, z22, z12 = lanes[Q_S11 + e], lanes[Q_S22 + e], lanes[Q_S12 + e]
+            shift = 0.5 * (mean - (a11 + a22))
+            s11, s22 = z11 + (pressure + two_mu * (a11 + shift)), z22 + (pressure + two_mu * (a22 + shift))
+            shift = 0.5 * (mean - (b11 + b22))
+            t11, t22 = z11 + (pressure + two_mu * (b11 + shift)), z22 + (pressure + two_mu * (b22 + shift))
+            s12, t12 = z12 + two_mu * a12, z12 + two_mu * b12
+            x1, y1, x2, y2 = lanes[vi + e], lanes[vi + _NEXT + e], lanes[vj + e], lanes[vj + _NEXT + e]
+            x3, y3, x4, y4 = lanes[vk + e], lanes[vk + _NEXT + e], lanes[vl + e], lanes[vl + _NEXT + e]
+            a11, a22, a12 = _rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
+            b11, b22, b12 = _rate(x1, y1, x3, y3, x4, y4, f, g, h, m, cs2, sn2)
             rate = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
             shift = 0.5 * (rate - (a11 + a22))
             s11, s22, s12 = s11 + eta * (a11 + shift), s22 + eta * (a22 + shift), s12 + eta * a12
             shift = 0.5 * (rate - (b11 + b22))
             t11, t22, t12 = t11 + eta * (b11 + shift), t22 + eta * (b22 + shift), t12 + eta * b12
-        _add_part(p, ux1, uy1, wx1, wy1, cs1, sn1, s11, s22, s12, force)
-        _add_part(q, ux2, uy2, wx2, wy2, cs2, sn2, t11, t22, t12, force)
+            ax1, ay1, ax2, ay2 = _part_forces(ux1, uy1, wx1, wy1, cs1, sn1, s11, s22, s12)
+            bx1, by1, bx3, by3 = _part_forces(ux2, uy2, wx2, wy2, cs2, sn2, t11, t22, t12)
+            if first:
+                x1 = y1 = x2 = y2 = x3 = y3 = x4 = y4 = 0.0
+            else:
+                x1, y1, x2, y2 = lanes[fi + e], lanes[fi + _NEXT + e], lanes[fj + e], lanes[fj + _NEXT + e]
+                x3, y3, x4, y4 = lanes[fk + e], lanes[fk + _NEXT + e], lanes[fl + e], lanes[fl + _NEXT + e]
+            lanes[fi + e], lanes[fi + _NEXT + e] = (x1 + ax1) + bx1, (y1 + ay1) + by1
+            lanes[fj + e], lanes[fj + _NEXT + e] = x2 + ax2, y2 + ay2
+            lanes[fk + e], lanes[fk + _NEXT + e] = (x3 - (ax1 + ax2)) + bx3, (y3 - (ay1 + ay2)) + by3
+            lanes[fl + e], lanes[fl + _NEXT + e] = x4 - (bx1 + bx3), y4 - (by1 + by3)
+
+    return loop
+
+
+_overlay_loop_0, _overlay_loop_1 = _overlay_loop(0), _overlay_loop(1)
+_quad_edge_loop_0, _quad_edge_loop_1 = _edge_loop(X1, X2, A0, Q_LEFT0), _edge_loop(X2, X3, A1, Q_LEFT1)
+_quad_edge_loop_2, _quad_edge_loop_3 = _edge_loop(X3, X4, A2, Q_LEFT2), _edge_loop(X4, X1, A3, Q_LEFT3)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -481,16 +562,6 @@ def _energy(e11, e22, e12, lam, two_mu, s0):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_rate(p, vel, c, cs, sn):
-    """Strain rate of triangle p in its turned frame."""
-    i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
-    a, b, cc, d = c[4 * p], c[4 * p + 1], c[4 * p + 2], c[4 * p + 3]
-    ux, uy, wx, wy = vel[j] - vel[i], vel[j + 1] - vel[i + 1], vel[k] - vel[i], vel[k + 1] - vel[i + 1]
-    g11, g12, g21, g22 = ux * a + wx * cc, ux * b + wx * d, uy * a + wy * cc, uy * b + wy * d
-    return cs * g11 + sn * g21, cs * g22 - sn * g12, 0.5 * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _quad_kinetic(c, vel):
     """The same of a quad."""
     v2 = 0.0
@@ -500,53 +571,159 @@ def _quad_kinetic(c, vel):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _gather_quads(n, item, row, x, v, c, s0, stressed, lanes):
+    """Rows of quads into lanes, in groups of four; item, row (n,): places in the tables c and s0, and in x and v."""
+    for e in range(U(0), U(n), _FOUR):
+        r0, r1, r2, r3 = U(row[e]), U(row[e + _1]), U(row[e + _2]), U(row[e + _3])
+        at = (r0 * _TWELVE, r1 * _TWELVE, r2 * _TWELVE, r3 * _TWELVE)
+        four_columns(lanes, X1 + e, x, at)
+        four_columns(lanes, VX1 + e, v, at)
+        at = (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR)
+        four_columns(lanes, X3 + e, x, at)
+        four_columns(lanes, VX3 + e, v, at)
+        i0, i1, i2, i3 = U(item[e]), U(item[e + _1]), U(item[e + _2]), U(item[e + _3])
+        if stressed:
+            four_columns(lanes, Q_S11 + e, s0, (i0 * _FOUR, i1 * _FOUR, i2 * _FOUR, i3 * _FOUR))
+        at = (i0 * _QUAD, i1 * _QUAD, i2 * _QUAD, i3 * _QUAD)
+        for k in range(U(0), U(28), _FOUR):
+            to = Q_C + k * U(CAPACITY) + e
+            four_columns(lanes, to, c, (at[0] + k, at[1] + k, at[2] + k, at[3] + k))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gather_quad_edge(n, item, base, k, x, partner, law, table, lanes):
+    """The partners' edges and the laws of edge k."""
+    for e in range(U(0), U(n), _FOUR):
+        first = U(base + k)
+        q0, q1 = first + _FOUR * U(item[e]), first + _FOUR * U(item[e + _1])
+        q2, q3 = first + _FOUR * U(item[e + _2]), first + _FOUR * U(item[e + _3])
+        four_columns(lanes, PX + e, x, (U(partner[q0]), U(partner[q1]), U(partner[q2]), U(partner[q3])))
+        w0, w1, w2, w3 = U(law[q0]) * _EIGHT, U(law[q1]) * _EIGHT, U(law[q2]) * _EIGHT, U(law[q3]) * _EIGHT
+        four_columns(lanes, KOP + e, table, (w0, w1, w2, w3))
+        four_columns(lanes, COHESION + e, table, (w0 + _FOUR, w1 + _FOUR, w2 + _FOUR, w3 + _FOUR))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _slow_quad_joints(
+    n, first, rows, x, v, c, partner, law, kind, base, state, history, table, beyond, step, lanes, room, tally
+):  # fmt: skip
+    """Joints of n quads behind their peak, and those that get there now."""
+    soft, slots, edges = room
+    m = 0
+    for e in range(n):
+        for k in range(4):
+            slot = base + 4 * (first + e) + k
+            if law[slot] != 0 and lanes[(Q_LEFT0, Q_LEFT1, Q_LEFT2, Q_LEFT3)[k] + U(e)] < 0.0:
+                law[slot], state[slot] = 0, YIELDED
+                history[slot] = 0.0
+                history[slot, PEAK_STEP] = step
+                history[slot, PEAK_KINETIC] = _quad_kinetic(c[first + e], v[rows[first + e]])
+                tally[NEW_YIELDED] += 1
+            if state[slot] > INTACT:
+                slots[m], edges[m] = slot, 12 * rows[first + e] + 2 * k
+                m += 1
+    broken = softening.yielded_edges(
+        m, slots, edges, x, partner, kind, state, table, beyond, history.reshape(history.size), soft
+    )
+    for q in range(m):
+        e, k = (slots[q] - base) // 4 - first, (slots[q] - base) % 4
+        out, q = (A0, A1, A2, A3)[k] + U(e), U(q)
+        lanes[out], lanes[out + _NEXT] = soft[softening.FAX + q], soft[softening.FAY + q]
+        lanes[out + _B], lanes[out + _B + _NEXT] = soft[softening.FBX + q], soft[softening.FBY + q]
+    for q in range(broken):
+        slot = edges[q]
+        i = (slot - base) // 4
+        history[slot, STEP], history[slot, KINETIC] = step, _quad_kinetic(c[i], v[rows[i]])
+        tally[NEW_BROKEN] += 1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sum_quads(n, gx, gy, lanes):
+    """Stress, gravity and joints of each corner; edge k begins at corner k and ends at the next one."""
+    for e in range(U(n)):
+        bx1, by1 = lanes[A0 + e] + lanes[A3 + _B + e], lanes[A0 + _NEXT + e] + lanes[A3 + _B + _NEXT + e]
+        bx2, by2 = lanes[A1 + e] + lanes[A0 + _B + e], lanes[A1 + _NEXT + e] + lanes[A0 + _B + _NEXT + e]
+        bx3, by3 = lanes[A2 + e] + lanes[A1 + _B + e], lanes[A2 + _NEXT + e] + lanes[A1 + _B + _NEXT + e]
+        bx4, by4 = lanes[A3 + e] + lanes[A2 + _B + e], lanes[A3 + _NEXT + e] + lanes[A2 + _B + _NEXT + e]
+        lanes[B1 + e], lanes[B1 + _NEXT + e], lanes[B2 + e], lanes[B2 + _NEXT + e] = bx1, by1, bx2, by2
+        lanes[B3 + e], lanes[B3 + _NEXT + e], lanes[B4 + e], lanes[B4 + _NEXT + e] = bx3, by3, bx4, by4
+        lanes[FX1 + e] = (lanes[FX1 + e] + lanes[Q_M1 + e] * gx) + bx1
+        lanes[FY1 + e] = (lanes[FY1 + e] + lanes[Q_M1 + e] * gy) + by1
+        lanes[FX2 + e] = (lanes[FX2 + e] + lanes[Q_M2 + e] * gx) + bx2
+        lanes[FY2 + e] = (lanes[FY2 + e] + lanes[Q_M2 + e] * gy) + by2
+        lanes[FX3 + e] = (lanes[FX3 + e] + lanes[Q_M3 + e] * gx) + bx3
+        lanes[FY3 + e] = (lanes[FY3 + e] + lanes[Q_M3 + e] * gy) + by3
+        lanes[FX4 + e] = (lanes[FX4 + e] + lanes[Q_M4 + e] * gx) + bx4
+        lanes[FY4 + e] = (lanes[FY4 + e] + lanes[Q_M4 + e] * gy) + by4
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _put_quads(n, row, at, force, lanes):
+    """Eight lanes from `at` on into rows of forces (flat)."""
+    for e in range(U(0), U(n), _FOUR):
+        r0, r1, r2, r3 = U(row[e]), U(row[e + _1]), U(row[e + _2]), U(row[e + _3])
+        to = (r0 * _EIGHT, r1 * _EIGHT, r2 * _EIGHT, r3 * _EIGHT)
+        put_four_columns(force, to, lanes, at + e)
+        to = (to[0] + _FOUR, to[1] + _FOUR, to[2] + _FOUR, to[3] + _FOUR)
+        put_four_columns(force, to, lanes, at + U(4 * CAPACITY) + e)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _quads(
-    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
+    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
 ):  # fmt: skip
-    flat = x.reshape(x.size)
-    nothing = np.zeros(4)
-    own, bound = np.empty(FORCE), np.empty(FORCE)
-    for i in range(count * t // threads, count * (t + 1) // threads):
-        r = rows[i]
-        xy, vel = x[r], v[r]
-        own[:], bound[:] = 0.0, 0.0
-        quad_forces(xy, vel, c[i], s0[i] if stressed else nothing, small, own)
-        for k in range(4):
-            slot = base + 4 * i + k
-            if state[slot] == NONE:
-                continue
-            p, row, to = partner[slot], kind[slot], 2 * ((k + 1) % 4)
-            ax, ay, bx, by = xy[2 * k], xy[2 * k + 1], xy[2 * k + 2], xy[2 * k + 3]
-            px, py, qx, qy = flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
-            if state[slot] == INTACT:
-                left = joints.past_peak(ax, ay, bx, by, px, py, qx, qy, table[row])
-                if left < 0.0:
-                    state[slot] = YIELDED
-                    history[slot] = 0.0
-                    history[slot, PEAK_STEP], history[slot, PEAK_KINETIC] = step, _quad_kinetic(c[i], vel)
-                    tally[t, NEW_YIELDED] += 1
-            before = state[slot]
-            fax, fay, fbx, fby, now = joints.yielded_edge(
-                ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, before
-            )
-            if before == INTACT:
-                history[slot] = 0.0
-            elif now != before:
-                state[slot] = now
-                history[slot, STEP], history[slot, KINETIC] = step, _quad_kinetic(c[i], vel)
-                tally[t, NEW_BROKEN] += 1
-            bound[2 * k] += fax
-            bound[2 * k + 1] += fay
-            bound[to] += fbx
-            bound[to + 1] += fby
-        slot = slot_of[i]
-        for m in range(FORCE):
-            pull = c[i, Q_WEIGHT + m // 2] * (gx if m % 2 == 0 else gy)
-            push = pushed[slot, m] if slot >= 0 else 0.0
-            force[r, m] = ((own[m] + pull) + bound[m]) + push
-            if keep_joints:
-                of_joints[r, m] = bound[m]
+    lanes = np.zeros(QUAD_LANES * CAPACITY)
+    item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
+    flat_x, flat_v, flat_c, flat_s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
+    flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
+    flat_force, flat_of_joints = force.reshape(force.size), of_joints.reshape(of_joints.size)
+    room = softening.lanes_and_lists()
+    begin, end = count * t // threads, count * (t + 1) // threads
+    tied = False
+    for first in range(begin, end, QUAD_BLOCK):
+        n = min(QUAD_BLOCK, end - first)
+        whole = (n + 3) // 4 * 4
+        for e in range(whole):
+            item[e] = first + min(e, n - 1)
+            row[e] = rows[item[e]]
+        _gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
+        _overlay_loop_0(whole, small, lanes)
+        _overlay_loop_1(whole, small, lanes)
+        if tied:
+            lanes[A0 : A0 + U(16 * CAPACITY)] = 0.0
+        some = latest = np.uint8(NONE)
+        for slot in range(base + 4 * first, base + 4 * (first + n)):
+            some, latest = some | state[slot], max(latest, state[slot])
+        tied = some != NONE
+        if tied:
+            _gather_quad_edge(whole, item, base, 0, flat_x, partner, law, flat_table, lanes)
+            _quad_edge_loop_0(whole, lanes)
+            _gather_quad_edge(whole, item, base, 1, flat_x, partner, law, flat_table, lanes)
+            _quad_edge_loop_1(whole, lanes)
+            _gather_quad_edge(whole, item, base, 2, flat_x, partner, law, flat_table, lanes)
+            _quad_edge_loop_2(whole, lanes)
+            _gather_quad_edge(whole, item, base, 3, flat_x, partner, law, flat_table, lanes)
+            _quad_edge_loop_3(whole, lanes)
+            if latest > INTACT or _any_quad_past_peak(n, lanes) < 0:
+                _slow_quad_joints(
+                    n, first, rows, flat_x, v, c, partner, law, kind, base, state, history, flat_table, flat_beyond,
+                    step, lanes, room, tally[t],
+                )  # fmt: skip
+        _sum_quads(whole, gx, gy, lanes)
+        for e in range(n):
+            slot = slot_of[first + e]
+            if slot >= 0:
+                for m in range(FORCE):
+                    lanes[FX1 + U(m * CAPACITY + e)] += pushed[slot, m]
+        # The last quad may be in its group several times: all of them must be alike.
+        for e in range(n, whole):
+            for m in range(FORCE):
+                lanes[FX1 + U(m * CAPACITY + e)] = lanes[FX1 + U(m * CAPACITY + n - 1)]
+                lanes[B1 + U(m * CAPACITY + e)] = lanes[B1 + U(m * CAPACITY + n - 1)]
+        _put_quads(whole, row, FX1, flat_force, lanes)
+        if keep_joints:
+            _put_quads(whole, row, B1, flat_of_joints, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -560,14 +737,14 @@ def quads(threads, *args):
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def quads_threaded(
-    threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
+    threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _quads(
-            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, kind, state, history, table, beyond,
-            slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
         )  # fmt: skip
 
 

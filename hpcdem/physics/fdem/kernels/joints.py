@@ -51,74 +51,28 @@ def end_forces(tx, ty, s0, s1, s2, t0, t1, t2):
     return na * ty + ta * tx, ta * ty - na * tx, nb * ty + tb * tx, tb * ty - nb * tx
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def yielded_points(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state):
-    """Stresses at the points of a joint that has passed its peak, which remembers more by it.
+@njit(cache=True, nogil=True, error_model="numpy")
+def points_now(ax, ay, bx, by, px, py, qx, qy, law, beyond, history):
+    """Mid-line from a to b (tx, ty) [m], and normal (s0, s1, s2) and shear (t0, t1, t2) stresses [Pa] at the points
+    from a to b, of a joint in any state.
 
-    table (rows, 8), beyond (rows, 4): of the laws, and the row of this one; history (slots, 12), and the slot. (Rows
-    are not handed over as such: counting references to views takes longer than the law.) Returns the mid-line from a to
-    b (tx, ty) [m], normal (s0, s1, s2) and shear (t0, t1, t2) stresses [Pa] at the points from a to b, and the state:
-    BROKEN when two of the three points have no strength left; history[slot, MODE] then says how, from 1 (opened) to 2
-    (slid). At a joint before its peak, whose history is zero, this is the law of `laws.intact_point`. (Inlined: the
-    nine numbers would go through memory, a fifth of the time of a joint.)
+    law (8,), beyond (4,): rows of the tables; history (14,): stays as it is, zero before the peak.
     """
     tx, ty, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
     h = math.sqrt(h2)
     inverse = 1.0 / h
     oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
-    kop, tensile, overlay = table[row, KOP], table[row, TENSILE], table[row, OVERLAY]
-    tan_phi, cohesion = table[row, TAN_PHI], table[row, COHESION]
-    per_o_t, per_s_t = beyond[row, PER_O_T], beyond[row, PER_S_T]
-    per_kop, per_half_shear = beyond[row, PER_KOP], beyond[row, PER_HALF_SHEAR]
-    s0, t0, o0, u0, d0, f0, g0 = laws.yielded_point(
-        NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear, history[slot, OPENED], history[slot, SLIPPED], history[slot, DAMAGE],
-    )  # fmt: skip
-    s1, t1, o1, u1, d1, f1, g1 = laws.yielded_point(
-        0.5 * (oa + ob), 0.5 * (sa + sb), h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear,
-        history[slot, OPENED + 1], history[slot, SLIPPED + 1], history[slot, DAMAGE + 1],
-    )  # fmt: skip
-    s2, t2, o2, u2, d2, f2, g2 = laws.yielded_point(
-        FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, inverse, kop, tensile, overlay, tan_phi, cohesion, per_o_t,
-        per_s_t, per_kop, per_half_shear,
-        history[slot, OPENED + 2], history[slot, SLIPPED + 2], history[slot, DAMAGE + 2],
-    )  # fmt: skip
-    gone = (d0 >= 1.0) + (d1 >= 1.0) + (d2 >= 1.0)
-    if state == YIELDED and gone >= 2:
-        state = BROKEN
-        opened2, slid2 = max(f0, f1, f2), max(g0, g1, g2)
-        history[slot, MODE] = 1.0 + (slid2 / (opened2 + slid2) if opened2 + slid2 > 0.0 else 0.0)
-        d0 = d1 = d2 = 1.0
-    history[slot, OPENED], history[slot, OPENED + 1], history[slot, OPENED + 2] = o0, o1, o2
-    history[slot, SLIPPED], history[slot, SLIPPED + 1], history[slot, SLIPPED + 2] = u0, u1, u2
-    history[slot, DAMAGE], history[slot, DAMAGE + 1], history[slot, DAMAGE + 2] = d0, d1, d2
-    return tx, ty, s0, s1, s2, t0, t1, t2, state
+    s0, t0 = _point_now(NEAR * oa + FAR * ob, NEAR * sa + FAR * sb, h, inverse, law, beyond, history, 0)
+    s1, t1 = _point_now(0.5 * (oa + ob), 0.5 * (sa + sb), h, inverse, law, beyond, history, 1)
+    s2, t2 = _point_now(FAR * oa + NEAR * ob, FAR * sa + NEAR * sb, h, inverse, law, beyond, history, 2)
+    return tx, ty, s0, s1, s2, t0, t1, t2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def yielded_edge(ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state):
-    """Forces on a and b of a joint that has passed its peak (fax, fay, fbx, fby [N/m]), and its state; see
-    `yielded_points`."""
-    tx, ty, s0, s1, s2, t0, t1, t2, state = yielded_points(
-        ax, ay, bx, by, px, py, qx, qy, table, beyond, row, history, slot, state
-    )
-    fax, fay, fbx, fby = end_forces(tx, ty, s0, s1, s2, t0, t1, t2)
-    return fax, fay, fbx, fby, state
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def past_peak(ax, ay, bx, by, px, py, qx, qy, law):
-    """How much is left to the peak at the worst of the three points; negative behind it."""
-    _, _, h2, oa, sa, ob, sb = openings(ax, ay, bx, by, px, py, qx, qy)
-    inverse = 1.0 / h2
-    oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
-    left = math.inf
-    for g in range(3):
-        o = NEAR * oa + FAR * ob if g == 0 else (0.5 * (oa + ob) if g == 1 else FAR * oa + NEAR * ob)
-        s = NEAR * sa + FAR * sb if g == 0 else (0.5 * (sa + sb) if g == 1 else FAR * sa + NEAR * sb)
-        _, _, here = laws.intact_point(
-            o, s, law[KOP], law[TENSILE], law[OVERLAY], law[TAN_PHI], law[COHESION], law[HALF_SHEAR]
-        )
-        left = min(left, here)
-    return left
+def _point_now(o, s, h, inverse, law, beyond, history, g):
+    sigma, tau, _, _, _, _, _ = laws.yielded_point(
+        o, s, h, inverse, law[KOP], law[TENSILE], law[OVERLAY], law[TAN_PHI], law[COHESION], beyond[PER_O_T],
+        beyond[PER_S_T], beyond[PER_KOP], beyond[PER_HALF_SHEAR], history[OPENED + g], history[SLIPPED + g],
+        history[DAMAGE + g],
+    )  # fmt: skip
+    return sigma, tau
