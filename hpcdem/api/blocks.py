@@ -72,13 +72,13 @@ class Orders:
     ) -> None:
         """Carry out a command. kind: of the objects that `where` chooses; model: the constitutive model, or the
         condition, whose properties are given."""
+        project = self.project()  # first: kernels are settled before modules that have some are imported
         row = PCDC.command(command)
         chosen = chosen_by(where, kind)
         if model is None:
             found = arguments(row, given, chosen is not None)
         else:
             found = model_arguments(row, model, given)
-        project = self.project()
         project.line = place()[1]
         call = Call(project, found, None, lambda names, file: None)
         call.where = chosen

@@ -37,6 +37,11 @@ Where = str | Selection | None
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
+OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple"}
+"""Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
+have some are imported, and these import them when they are named."""
+
+
 def _command(method: Method, edits: bool = True) -> Method:
     """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
     particles."""
@@ -47,8 +52,13 @@ def _command(method: Method, edits: bool = True) -> Method:
         if self._engine is not None:
             self._engine.line = place[1]
 
+        def carry_out() -> Any:
+            if method.__name__ not in OF_BOTH:
+                _ = self.engine
+            return method(self, *values, **options)
+
         def done() -> Any:
-            value = carried_out(place, method.__name__, lambda: method(self, *values, **options))
+            value = carried_out(place, method.__name__, carry_out)
             if self._engine is not None:
                 self._engine.edited |= edits
             return value
@@ -183,7 +193,8 @@ class Simulation(BlockCommands):
         if self._project is not None:
             fdem.settings.new(self._project)
         if self._project is None or self._engine is not None:
-            dem.particles.start(self.engine)
+            engine = self.engine
+            dem.particles.start(engine)
 
     @_command
     def box(
@@ -384,7 +395,8 @@ class Simulation(BlockCommands):
     def cycle(self, n: int) -> None:
         """CYC: n steps, with output at the SET intervals."""
         self._refuse_only_blocks()
-        dem.cycles.cycle(self.engine, int(n))
+        engine = self.engine
+        dem.cycles.cycle(engine, int(n))
 
     @_command
     def imple(
@@ -400,7 +412,8 @@ class Simulation(BlockCommands):
     ) -> None:
         """IMPLE: step until the wall has gone this far [m]; outputs at these ways of the wall [m]."""
         self._refuse_only_blocks()
-        dem.cycles.imple(self.engine, wall, xmove, ymove, save, print, ps, vtk)
+        engine = self.engine
+        dem.cycles.imple(engine, wall, xmove, ymove, save, print, ps, vtk)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
         """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.
@@ -408,6 +421,7 @@ class Simulation(BlockCommands):
         It may look at everything and use all methods but those that step. If it returns True (on any rank), the
         running cycle ends with this step. A function that only looks changes nothing in the run.
         """
+        engine = self.engine
         from hpcdem.physics.dem.simulation import Watcher
 
         if int(steps) != steps or steps < 1:
@@ -419,14 +433,15 @@ class Simulation(BlockCommands):
 
         self._asked(("every", int(steps), function), lambda: None, again=True)
         watcher = Watcher(int(steps), call if running is None else running.function(call))
-        self.engine.watchers.append(watcher)
+        engine.watchers.append(watcher)
         return Call(self, watcher)
 
     @_look
     def save(self, file: str | Path) -> None:
         """SAV, model save: the whole state to a checkpoint, of particles, of blocks, or of both if they are coupled."""
         if self._project is None:
-            dem.checkpoints.save(self.engine, self.directory / file)
+            engine = self.engine
+            dem.checkpoints.save(engine, self.directory / file)
             return
         if self._project.coupled is None and not self._only_blocks:
             raise CommandError("particles and blocks that are not coupled are two states; couple() makes them one")
@@ -440,7 +455,8 @@ class Simulation(BlockCommands):
         kind = self._kind(path)
         if not kind:
             self._refuse_coupled("restore")
-            dem.checkpoints.restore(self.engine, path)
+            engine = self.engine
+            dem.checkpoints.restore(engine, path)
             return
         if kind == checkpoint.BOTH and (self._project is None or self._project.coupled is None):
             raise CommandError(f"{file} holds particles and blocks that are coupled: couple() comes first, or resume()")
@@ -480,7 +496,8 @@ class Simulation(BlockCommands):
         if found is None:
             return False
         self.engine.progress = found["progress"]
-        dem.cycles.resume(self.engine)
+        engine = self.engine
+        dem.cycles.resume(engine)
         return True
 
     def _newest(self, folder: Path) -> str | None:
