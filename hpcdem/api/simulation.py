@@ -37,7 +37,7 @@ Where = str | Selection | None
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple"}
+OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
 """Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
 have some are imported, and these import them when they are named."""
 

@@ -174,7 +174,8 @@ def test_of_two_threads(late, tmp_path: Path) -> None:
 def test_what_was_forgotten_is_told_and_not_stored(launch: Launcher, tmp_path: Path) -> None:
     """A kernel of the particles with arguments that no run has."""
     (tmp_path / "model.py").write_text(
-        "import hpcdem\nsim = hpcdem.Simulation()\nfrom hpcdem.numerics import rng\nrng.uniform(True, 1, 2)\n"
+        "import hpcdem\nsim = hpcdem.Simulation()\nsim.box(0, 1, 0, 1)\n"
+        "from hpcdem.numerics import rng\nrng.uniform(True, 1, 2)\n"
         "from hpcdem.runtime import kernels\nprint(*kernels.late)\n"
         "from pathlib import Path\nprint(len(list(Path(rng.uniform._cache.cache_path).glob('rng.uniform*.nbc'))))\n"
     )

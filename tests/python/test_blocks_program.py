@@ -84,6 +84,10 @@ SAME: list[tuple[str, str]] = [
     ("pcdc mesh glue tolerance 1e-3 between 'a' 'b' set 'd'", "sim.mesh.glue(1e-3, ('a', 'b'), set='d')"),
     ("pcdc mesh quality", "sim.mesh.quality()"),
     ("pcdc element group 'a' set 's' range x 0 1 present", "sim.elements.group('a', 's', where='x 0 1 present')"),
+    ("pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 cohesion 1e6 "
+     "tensile 1e5 dilation 5",
+     "sim.elements.model('mech-m-c', density=2500, young=50e9, poisson_ratio=0.25, friction=30, cohesion=1e6, "
+     "tensile=1e5, dilation=5)"),
     ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25 range group 'a' set "
      "'d'",
      "sim.elements.model('mech-iso-elastic', density=2500, young=50e9, poisson_ratio=0.25, where=g.InGroup('a', 'd'))"),
@@ -277,7 +281,7 @@ WRONG = {
     "property of another model": ("sim.joints.property(young=3)", "joints.property: face-joint property has no young"),
     "no such model": ("sim.elements.model('elastic', density=1)", "elements.model: there is no model 'elastic'"),
     "model that is no text": ("sim.elements.model(3)", "elements.model: expected the name of a model, got 3"),
-    "model of later": ("sim.elements.model('mech-m-c', density=1)", "mechanical-mohr-coulomb is not there yet: plast"),
+    "model of later": ("sim.elements.model('mech-burgers', density=1)", "mechanical-burgers is not there yet"),
     "incomplete model": ("sim.elements.model('mech-iso-elastic', density=1, young=3)",
                          "needs young and poisson_ratio or shear and bulk"),
     "missing property": ("sim.elements.model('mech-iso-elastic', young=3, poisson_ratio=0.2)", "needs density"),
