@@ -138,7 +138,7 @@ class Simulation(BlockCommands):
         if self._engine is None:
             folder = self._folder if self._project is None else self._folder / "particles"
             self._engine = self._session.simulation(folder, self._log)
-            self._engine.goes_on_with = "Simulation.resume()"
+            self._engine.resume_advice = "Simulation.resume()"
             self._engine.line = _place()[1]
         return self._engine
 
@@ -159,7 +159,7 @@ class Simulation(BlockCommands):
                 else:
                     folder = folder / "blocks"
             self._project = self._session.project(folder, quiet=self._log is None)
-            self._project.goes_on_with = "Simulation.resume()"
+            self._project.resume_advice = "Simulation.resume()"
         return self._project
 
     @staticmethod

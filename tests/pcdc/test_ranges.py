@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from hpcdem.commands.fdem import meshes
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import groups as g
@@ -145,7 +146,7 @@ def test_cracks(bench):
 def test_a_crack_that_is_no_line_of_the_mesh_follows_its_edges(bench):
     bench(BOX + "pcdc geometry create polyline (0,0.9) (4,1.1) as-layer 'fault'\n")
     with pytest.raises(CommandError, match="with follow the nearest edges are taken"):
-        bench.interpreter.commands.meshes.intersect(bench.project, "fault")
+        meshes.intersect(bench.project, "fault")
     bench("pcdc mesh intersect layer 'fault' follow\n")
     assert numbers(bench, g.JOINT, g.OnCrack()) == numbers(bench, g.JOINT, g.Span(1, 1, 1))
 

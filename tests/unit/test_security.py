@@ -45,8 +45,8 @@ KNOWN = {
     ("__init__.py", "importlib.import_module"),
     ("cases/__init__.py", "importlib.import_module"),
     ("cli/__init__.py", "importlib.import_module"),
-    ("lang/zdem/execute.py", "importlib.import_module"),
-    ("lang/pcdc/execute.py", "importlib.import_module"),
+    ("commands/dem/__init__.py", "importlib.import_module"),
+    ("commands/fdem/__init__.py", "importlib.import_module"),
     # The packages that hpcdem needs, for the doctor.
     ("runtime/doctor/software.py", "importlib.import_module"),
     # libgomp.so.1, by that name, where the system finds it.
@@ -55,6 +55,10 @@ KNOWN = {
     ("page/maker.py", "zipfile.ZipFile"),
     # This Python with a module of this package; requests reach it as JSON in a pipe.
     ("page/worker.py", "subprocess.Popen"),
+    # The same to compile kernels; what is pickled goes from the parent to its child through a pipe.
+    ("runtime/compilers.py", "subprocess.Popen"),
+    ("runtime/compilers.py", "import pickle"),
+    ("runtime/kernels.py", "import pickle"),
     # Programs with a list of words, never through a shell; the first is this one, for another set of kernels.
     ("cli/__init__.py", "subprocess.run"),
     ("post/movie.py", "subprocess.Popen"),

@@ -461,7 +461,7 @@ def _answer(sim: Simulation, request: int) -> None:
     if what == "stop":
         raise StoppedWithCheckpoint(
             f"stopped at step {sim.clock.step} by {sim.stop.reason}; checkpoint {path} written, "
-            f"go on with {sim.goes_on_with}"
+            f"go on with {sim.resume_advice}"
         )
     if sim.log is not None:
         why = "as the last one was long ago" if what == "auto" else "on request"

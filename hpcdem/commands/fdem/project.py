@@ -40,7 +40,7 @@ class Project:
     blocks; continues: the checkpoint from which they go on, asleep: the number of these particles, which are empty
     until then; due: what is due of the particles in the command that steps; calls_lost: that checkpoint knows nothing
     of methods of particles; stepping: the name of that command, "" if there is none; inputs: files that the script
-    reads, by their real paths, in words; made: files that were written by name; goes_on_with: what takes up a
+    reads, by their real paths, in words; made: files that were written by name; resume_advice: what takes up a
     checkpoint of a run without a script, "": model restore.
     """
 
@@ -66,7 +66,7 @@ class Project:
         self.calls_lost = False
         self.due: Due | None = None
         self.stepping = ""
-        self.goes_on_with = ""
+        self.resume_advice = ""
         self._forget()
 
     @property

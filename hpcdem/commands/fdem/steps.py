@@ -269,7 +269,7 @@ def _onwards(project: Project, path: Path) -> str:
     place = project.place()
     if place is not None and place["journal"] is not None:
         return "--resume"
-    return project.goes_on_with or f"pcdc model restore '{path}'"
+    return project.resume_advice or f"pcdc model restore '{path}'"
 
 
 class _Report:

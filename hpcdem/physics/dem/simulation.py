@@ -97,7 +97,7 @@ class ParticlePhysics(Protocol):
 class Simulation(Model):
     """One model of particles on one communicator, see `Model`.
 
-    watchers: see `Watcher`; goes_on_with: what the user is told to use after a stop with a checkpoint;
+    watchers: see `Watcher`; resume_advice: what the user is told to use after a stop with a checkpoint;
     draws: DRAW makes pictures; lost: particles that left the BOX so far; rows: first id of each row of GLINE and the
     one after its last; physics: on the particles, beside their motion, in the order in which they act; fast: particles
     with a reach of their own in the lists (physics/dem/kernels/fast.py); energy: the account of SET energy
@@ -123,7 +123,7 @@ class Simulation(Model):
         self.number = 0  # of the simulations of a program, in the order in which they were made
         self.prepare_kernels: Callable[[str], object] = lambda kind: None  # compiles those of added physics
         self.coupled = False  # to blocks, which step them both (physics/coupling)
-        self.goes_on_with = "--resume"
+        self.resume_advice = "--resume"
         self.draws = False
         self.script = ""
         self.position = 0
