@@ -39,8 +39,9 @@ KERNELS = {"shared": 31, "": 125, "blocks": 165, "coupled": 17}
 """About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
-PROCESSES = 8
-"""At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
+PROCESSES = int(os.environ.get("HPCDEM_COMPILERS", "1"))
+"""At most so many compile at the same time (more than one is on trial: a warm-up of blocks went wrong with kernels that
+two processes had compiled). The kernel that takes longest takes a fifth of the time of all."""
 MEMORY = 700e6
 """Of one of them, at most [bytes]."""
 FEW = 40
