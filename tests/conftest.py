@@ -23,7 +23,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # `nohup ... &`: programs
 
 # A ZDEM script that runs alone takes all cores unless this is set; tests run side by side.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ.setdefault("HPCDEM_COMPILERS", "8")
 
 # --- what this machine has -------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ import contextlib
 import faulthandler
 import gc
 import inspect
+import itertools
 import os
 import pickle
 import subprocess
@@ -90,6 +91,19 @@ def compile_in_processes(parts: list[Part], count: int, cores: Collection[int], 
         return f"exit codes {codes}; {errors.read().decode(errors='replace').strip().rpartition(chr(10))[2]}"
 
 
+def name_kernels_apart() -> None:
+    """See to it that kernels of this process have names of their own in object code.
+
+    numba counts the functions that a process compiles, and tells functions of the same qualified name and types, such
+    as two closures of one factory, apart by that number alone. Of two of the same name that were compiled by different
+    processes the linker takes one for both.
+    """
+    from numba.core.bytecode import FunctionIdentity
+
+    counter: Any = FunctionIdentity
+    counter._unique_ids = itertools.count(int.from_bytes(os.urandom(7), "little"))
+
+
 # -- in one of these processes -----------------------------------------------------------------------------------------
 
 
@@ -99,6 +113,7 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
+    name_kernels_apart()
     gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles
     filled: set[Path] = set()
     _write_in_turn(job, filled)

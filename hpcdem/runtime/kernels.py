@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.runtime import cgroups, launch
-from hpcdem.runtime.compilers import Part, compile_in_processes
+from hpcdem.runtime.compilers import Part, compile_in_processes, name_kernels_apart
 from hpcdem.runtime.launch import patient_barrier, version
 
 if TYPE_CHECKING:
@@ -35,13 +35,12 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-KERNELS = {"shared": 31, "": 125, "blocks": 165, "coupled": 17}
+KERNELS = {"shared": 31, "": 126, "blocks": 210, "coupled": 17}
 """About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
-PROCESSES = int(os.environ.get("HPCDEM_COMPILERS", "1"))
-"""At most so many compile at the same time (more than one is on trial: a warm-up of blocks went wrong with kernels that
-two processes had compiled). The kernel that takes longest takes a fifth of the time of all."""
+PROCESSES = 8
+"""At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
 MEMORY = 700e6
 """Of one of them, at most [bytes]."""
 FEW = 40
@@ -178,6 +177,7 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     (_only_read.add if building is None else _only_read.discard)(building or folder)
     try:
         count = len(late)
+        name_kernels_apart()
         _protect_complete_folders()
         warm()
         if building is not None:

@@ -67,7 +67,8 @@ try:
     once.made_once(comm, unreadable)
 except HpcdemError as error:
     assert str(error) == "m.msh: no" and not isinstance(error, CommandError)
-    print(flush=True)
+else:
+    sys.exit("no error")
 """
 
 

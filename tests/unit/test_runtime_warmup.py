@@ -138,6 +138,50 @@ def test_processes_know_what_to_compile(tmp_path, kinds):
     assert int(compiled) <= 6
 
 
+FACTORY = """
+import sys
+import numba
+
+def times(factor):
+    @numba.njit(cache=True)
+    def product(x):  # divisions by what may be zero raise errors: too long to be put into its caller
+        for k in range(3):
+            x = x / (k + 1) + x // (k + 2) + x % (k + 3)
+        return 0.0 * x + factor
+    return product
+
+@numba.njit(cache=True)
+def double(x):
+    return double_(x) + double_(x + 1.0)
+
+@numba.njit(cache=True)
+def treble(x):
+    return treble_(x) + treble_(x + 1.0)
+
+double_, treble_ = times(2), times(3)
+
+def compiled(apart):
+    if apart:
+        from hpcdem.runtime.compilers import name_kernels_apart
+        name_kernels_apart()
+    print([globals()[name](1.0) for name in sys.argv[1:]])
+"""
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_kernels_of_two_processes_are_told_apart(tmp_path, apart):
+    """Without names of their own they are not: then this precaution is no longer needed."""
+    (tmp_path / "factory.py").write_text(FACTORY)
+    env = dict(os.environ, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+
+    def called(*names: str) -> str:
+        command = [sys.executable, "-c", f"import factory; factory.compiled({apart})", *names]
+        return subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert called("double") == "[4.0]" and called("treble") == "[6.0]"
+    assert (called("double", "treble") == "[4.0, 6.0]") == apart
+
+
 def test_nobody_sees_a_folder_that_is_not_complete(base, kernels):
     def fails() -> None:
         kernels()()
