@@ -39,10 +39,14 @@ SAME: list[tuple[str, str]] = [
      "sim.option(dynamic=False, collision=True, overlap='relax', large_strain=False, energy=True)"),
     ("pcdc model time-step safety 0.5 mass-scaling 1e-6", "sim.time_step(safety=0.5, mass_scaling=1e-6)"),
     ("pcdc model time-step value 1e-7 auto off", "sim.time_step(value=1e-7, auto=False)"),
+    ("pcdc model creep on dt 10 change 0.1 least 1 greatest 100",
+     "sim.creep(True, dt=10, change=0.1, least=1, greatest=100)"),
+    ("pcdc model creep off", "sim.creep(False)"),
     ("pcdc model step 100", "sim.step(100)"),
     ("pcdc model solve ratio 1e-6 window 10 limit 0 on-failure continue",
      "sim.solve(ratio=1e-6, window=10, limit=0, on_failure='continue')"),
     ("pcdc model solve cycles 5 time 0.5", "sim.solve(cycles=5, time=0.5)"),
+    ("pcdc model solve elastic time 1e6", "sim.solve(elastic=True, time=1e6)"),
     ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
     ("pcdc geometry create polyline (0,0) (1,2) as-layer 'l'", "sim.geometry.polyline([(0, 0), (1, 2)], 'l')"),
     ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'l'",
@@ -99,6 +103,12 @@ SAME: list[tuple[str, str]] = [
      "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
      "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
     ("pcdc element initial stress-xy 1 stress-zz 2", "sim.elements.initial_stress(xy=1, zz=2)"),
+    ("pcdc element c-model mech-burgers property density 2500 bulk 20e9 maxwell-shear 10e9 maxwell-viscosity 1e16 "
+     "kelvin-shear 5e9 kelvin-viscosity 1e14",
+     "sim.elements.model('mech-burgers', density=2500, bulk=20e9, maxwell_shear=10e9, maxwell_viscosity=1e16, "
+     "kelvin_shear=5e9, kelvin_viscosity=1e14)"),
+    ("pcdc element reset kelvin-strain range id 1 2",
+     "sim.elements.reset_kelvin_strain(where=g.Ids(1, 2))"),
     ("pcdc element reset state range set 'd'", "sim.elements.reset_state(where=g.InSet('d'))"),
     ("pcdc element-face group 'a' set 's' range boundary", "sim.faces.group('a', 's', where='boundary')"),
     ("pcdc element-face c-model contact-m-c property friction 30", "sim.faces.model('contact-m-c', friction=30)"),

@@ -311,7 +311,8 @@ def reset_kelvin_strain(sim: Blocks, elements: Numbers = None) -> None:
         )
     sim.before_change()
     if "creep" in sim.cold:
-        sim.cold["creep"][np.ix_(np.isin(sim.number, at), [K11, K22, K12])] = 0.0
+        for column in (K11, K22, K12):
+            sim.cold["creep"][np.isin(sim.number, at), column] = 0.0
     sim.changed(stiffness=False)
 
 

@@ -52,14 +52,8 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain"),
     "plastic_work": Quantity("element", "J/m", "work of plastic flow"),
-    **{
-        f"{name}_{c}": Quantity("element", "1", f"{doc}, {c}")
-        for name, doc in (
-            ("creep_strain", "strain of creep, without volume"),
-            ("kelvin_strain", "that of the Kelvin unit"),
-        )
-        for c in ("xx", "yy", "xy")
-    },
+    **{f"creep_strain_{c}": Quantity("element", "1", f"creep strain {c}, without volume") for c in ("xx", "yy", "xy")},
+    **{f"kelvin_strain_{c}": Quantity("element", "1", f"strain {c} of the Kelvin unit") for c in ("xx", "yy", "xy")},
     "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep"),
     **_pair("position", "node", "m", "position"),
     **_pair("displacement", "node", "m", "displacement"),
@@ -502,8 +496,8 @@ def energies(sim: Blocks) -> dict[str, float]:
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
     in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity,
-    work_outside (loads and conditions), work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
-    what is stored + lost - work - commands; relative: that over the largest of all.
+    work_outside (loads and conditions), work_discs (particles that touch), commands (change of what is stored by
+    commands). closing: change of what is stored + lost - work - commands; relative: that over the largest of all.
     """
     if sim.budget is None:
         raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")
