@@ -150,13 +150,13 @@ class Blocks(State):
     def _take_kelvin_strain(self, elements: Numbers, names: Sequence[str]) -> None:
         """The strain of the Kelvin units becomes what their properties say, in these components; the model is open."""
         at = self.numbers_of_elements(elements)
-        values = np.array([self.element_rows.column(name)[self.element_row] for name in names]).reshape(len(names), -1)
-        if "creep" not in self.cold:
-            if not values[:, at].any():
-                return
-            self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
-        mine = np.isin(self.number, at)
-        for name, value in zip(names, values):
+        for name in names:
+            value = self.element_rows.column(name)[self.element_row]
+            if "creep" not in self.cold:
+                if not value[at].any():
+                    continue
+                self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
+            mine = np.isin(self.number, at)
             self.cold["creep"][mine, creeping.K11 + KELVIN_STRAIN.index(name)] = value[self.number[mine]]
 
     def option(
