@@ -195,7 +195,7 @@ def creeping(sim: Blocks) -> None:
     changes.element_model(sim, np.flatnonzero(centre[:, 0] < 0.9), "mech_burgers", {**soft, "kelvin_strain_xy": 1e-6})
     edges = mesh.edges()
     inner = edges.faces[edges.inner][:, 0]
-    weak = {**WEAK, "tensile_strength": 0.9e6, "gf1": 2.0, "gf2": 10.0}
+    weak = {**WEAK, "tensile_strength": 0.8e6, "gf1": 2.0, "gf2": 10.0}
     sim.joint_model(inner[centre[inner // 4, 0] > 0.6], COHESIVE, weak)
     x, y = mesh.points.T
     sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
@@ -219,7 +219,7 @@ def creep_more(sim: Blocks) -> None:
         sim.option(dynamic=True)
         creep.switch(sim, True)
         diagnostics.account_energy(sim)
-        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 1] > 0.7), vx=60.0, vy=5.0)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 1] > 0.7), vx=8.0, vy=1.0)
     if step == 1200:
         changes.reset_kelvin_strain(sim, np.arange(40))
         sim.element_property(np.arange(20, 60), {"kelvin_viscosity": 3e6})

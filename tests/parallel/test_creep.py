@@ -28,7 +28,8 @@ def test_much_happens(alone):
         intact, _, broken = found["counts"]
         assert broken > 10 and intact > 10
         steps, times = found["event_step"], found["event_time"]
-        assert (steps < 1000).any() and (times[(steps > 50) & (steps < 1000)] > 0.0).all()
+        in_creep = (steps > 200) & (steps < 1000)
+        assert in_creep.sum() > 5 and len(set(times[in_creep])) > 2  # at several creep times
         assert np.abs(found["creep_strain_xx"]).max() > 1e-6
         assert (found["creep_work"] > 0.0).sum() > 50
         assert found["energy_creep_lost"] > 0.0 and found["energy_relative"] < 0.01
