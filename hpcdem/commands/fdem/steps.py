@@ -141,9 +141,7 @@ def _check_creep(project: Project, time: float, cycles: int | None = None) -> No
 def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, Any]) -> None:
     """So much creep time [s] passes, each creep step by linear equations."""
     if project.dynamic:
-        raise CommandError(
-            "elastic with time makes creep time pass in static runs: model option dynamic off comes first"
-        )
+        raise CommandError("elastic with time is for static runs: model option dynamic off comes first")
     _check_creep(project, time)
     blocks = project.blocks
     if project.progress is None:
@@ -153,6 +151,8 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
     first, end = project.progress["first"], project.progress["creep"]
     try:
         project.stepping = "solve elastic"
+        if blocks.creep.passed == 0.0:
+            frames.write_due(project)
         while blocks.creep.time < end:
             if blocks.creep.passed == 0.0:
                 creep.begin(blocks, end)

@@ -452,7 +452,7 @@ _MODEL = (
             "whose joints stay before their peak and whose surfaces do not touch. A run towards a ratio that gets "
             "nowhere (window, limit) ends the script with exit code 3 and names the body that slides away; "
             "`pcdc.solved['reason']` says how a run ended.",
-            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic",
+            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
@@ -477,7 +477,7 @@ _MODEL = (
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",
             ("pcdc model creep on dt 3600", "pcdc model creep on dt 100 change 0.05 greatest 86400",
-             "pcdc model solve time 1e6", "pcdc model creep off"),
+             "pcdc model creep off"),
             (_leading("on", BOOL, "whether they creep"),),
             (Option("dt", (POSITIVE,), "creep step of static runs; with change the first one", "s"),
              Option("cha{nge}", (PART,), "the creep step follows this change of stress: the largest of the deviators "
