@@ -108,7 +108,9 @@ class Contours:
 
 def panels_of(state: MeshState) -> tuple[str, ...]:
     """The panels that show what there is."""
-    return PANELS if plastic_range(state)[1] > 0.0 else (CRACKS, STRESS)
+    if plastic_range(state)[1] > 0.0:
+        return PANELS if len(state.joints) else (STRESS, PLASTIC)
+    return CRACKS, STRESS
 
 
 def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
@@ -172,8 +174,9 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
             _bar(figure, colours, filled, looks.font)
-            unit = unit_of(shown, span)[1]
-            axes.set_title(f"{shown.title} ({unit})" if unit else shown.title, loc="right", fontsize=0.9 * looks.font, pad=3.0)
+            axes.set_title(
+                f"{shown.title} ({unit_of(shown, span)[1]})", loc="right", fontsize=0.9 * looks.font, pad=3.0
+            )
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
         axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
     if looks.title is not None:
@@ -287,7 +290,7 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 
 CONTOURS = {
     STRESS: Contours(compression, stress_range, PRESSURES, "compressive stress", "YlOrBr"),
-    PLASTIC: Contours(plastic_shear, plastic_range, ((1.0, ""),), "plastic shear strain", "YlGnBu"),
+    PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGnBu"),
 }
 
 
