@@ -16,11 +16,13 @@ from hpcdem.physics.fdem import build, histories, pairs
 from hpcdem.physics.fdem.warm_up import warm_up
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, plasticity, softening, stiffness
+from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, plasticity, softening
+from hpcdem.physics.fdem.kernels import stiffness
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():
-    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, plasticity, softening, stiffness)
+    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, plasticity,
+               softening, stiffness)
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 
@@ -46,8 +48,13 @@ for kind in ("cross", "quad", "mixed"):
     convergence.advance(sim, 10)
     sim.time_step(auto=True)
     convergence.advance(sim, 110)
-    diagnostics.energies(sim), diagnostics.contacts(sim), diagnostics.total(sim, "opening"), changes.reset_displacement(sim), diagnostics.values(sim, "displacement_x")
-rock = {"density": 2500.0, "young": 1e6, "poisson_ratio": 0.2, "friction": 30.0, "cohesion": 1.0, "tensile": 1.0, "dilation": 0.0}
+    diagnostics.energies(sim)
+    diagnostics.contacts(sim)
+    diagnostics.total(sim, "opening")
+    changes.reset_displacement(sim)
+    diagnostics.values(sim, "displacement_x")
+rock = {"density": 2500.0, "young": 1e6,
+        "poisson_ratio": 0.2, "friction": 30.0, "cohesion": 1.0, "tensile": 1.0, "dilation": 0.0}
 for dynamic in (True, False):
     sim = model(rectangle(4, 4, 1.0, 1.0, kind="cross"))
     changes.element_model(sim, None, "mech_mohr_coulomb", rock)
