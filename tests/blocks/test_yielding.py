@@ -327,6 +327,25 @@ def test_the_energy_budget_closes(kind, dilation):
     assert found["plastic_lost"] <= diagnostics.total(sim, "plastic_work")
 
 
+def test_triangles_that_were_saved_before_quads_could_yield():
+    """They have nine columns beside quads, and go on as they were."""
+    ends = []
+    for old in (False, True):
+        sim = soil("mixed")
+        triangles = np.flatnonzero(sim.mesh.cells[:, 3] < 0)
+        quads = np.flatnonzero(sim.mesh.cells[:, 3] >= 0)
+        elastic = {name: SOIL[name] for name in ("density", "bulk", "shear")}
+        changes.element_model(sim, quads, "mech_iso_elastic", elastic)
+        deform(sim, np.diag([1.0, 0.99]))
+        sim.open_model()
+        if old:
+            sim.cold["plastic"] = sim.cold["plastic"][:, :9].copy()
+        deform(sim, np.diag([1.0, 0.985]))
+        ends.append(np.column_stack([stresses(sim), diagnostics.values(sim, "plastic_work")]))
+        assert (diagnostics.values(sim, "plastic_state")[triangles] == SHEAR_NOW).all()
+    assert np.array_equal(*ends)
+
+
 def test_looking_changes_nothing(kind):
     ends = []
     for look in (False, True):

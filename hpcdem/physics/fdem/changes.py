@@ -12,7 +12,7 @@ from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
+from hpcdem.physics.fdem.properties import ELEMENT, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 

@@ -433,8 +433,9 @@ class Local:
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None or self.plastic, small, self.slots_of_triangles, self.slot_at, self.slot_law, self.slot_kind,
-            self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic, small, self.slots_of_triangles, self.slot_at, self.slot_law,
+            self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot,
+            pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -465,8 +466,8 @@ class Local:
             self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
 
     def _flow(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        """Elements outside their yield surface at the present positions flow: memory (n_own, 9 or 36), s0 (count + 3, 4)
-        and quad_s0 (quads, 16) [Pa] become those after it."""
+        """Elements outside their yield surface at the present positions flow: memory (n_own, 9 or 36), s0 (count + 3,
+        4) and quad_s0 (quads, 16) [Pa] become those after it."""
         sim, one = self.sim, self.sim.threads == 1
         small, step = not sim.options.large_strain, sim.clock.step
         kernel = plasticity.flows if one else plasticity.flows_threaded
@@ -475,8 +476,8 @@ class Local:
             self.yield_table, small, step, memory, s0,
         )  # fmt: skip
         if len(self.quad_rows):
-            kernel = plastic_quads.flows if one else plastic_quads.flows_threaded
-            kernel(
+            of_quads = plastic_quads.flows if one else plastic_quads.flows_threaded
+            of_quads(
                 sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
                 self.quad_law, self.yield_table, small, step, memory, quad_s0,
             )  # fmt: skip

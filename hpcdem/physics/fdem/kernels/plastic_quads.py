@@ -5,9 +5,9 @@ The strain of a triangle is that of elements.py: its e11 + e22 is the mean by ar
 two triangles of an overlay have, in general, not the same pressure in the plane, P = (s11 + s22) / 2, any more. Their
 volumes then change, against each other, until they have: by d11 = d22 = d with d = (P - mean P) / (2 (lambda + mu)),
 whose mean by area is zero, so that this does no work. Without it each triangle alone would have to follow the dilation
-of its flow, and a mesh of quads would lock as triangles do; FLAC takes the mean of the stresses for the same reason.
-d is kept with the plastic strain that stresses depend on, and is not counted as plastic strain. As both triangles have
-one pressure, forces are those of an elastic quad, bit for bit until something yields.
+of its flow, and the forces would not be those of the elastic energy; FLAC takes the mean of the stresses for the same
+reason. d is kept with the plastic strain that stresses depend on, and is not counted as plastic strain. As both
+triangles have one pressure the loop over quads is the elastic one.
 
 Sixteen quads are worked on together as 64 triangles: triangle p of quad e is entry 16 p + e of the lanes.
 """
@@ -20,7 +20,6 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
-from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.elements import BLOCK, PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
 from hpcdem.physics.fdem.kernels.plasticity import (
     CA,
@@ -169,13 +168,15 @@ def _try_overlay(overlay):
             mean = (lanes[one + e] * (a11 + a22) + lanes[two + e] * (b11 + b22)) / (lanes[one + e] + lanes[two + e])
             pressure = lame * mean
             shift = 0.5 * (mean - (a11 + a22))
-            s11, s22 = lanes[S11 + f] + (pressure + two_mu * (a11 + shift)), lanes[S22 + f] + (
-                pressure + two_mu * (a22 + shift)
+            s11, s22 = (
+                lanes[S11 + f] + (pressure + two_mu * (a11 + shift)),
+                lanes[S22 + f] + (pressure + two_mu * (a22 + shift)),
             )
             s12, s33 = lanes[S12 + f] + two_mu * a12, lanes[S33 + f] + pressure
             shift = 0.5 * (mean - (b11 + b22))
-            t11, t22 = lanes[S11 + g] + (pressure + two_mu * (b11 + shift)), lanes[S22 + g] + (
-                pressure + two_mu * (b22 + shift)
+            t11, t22 = (
+                lanes[S11 + g] + (pressure + two_mu * (b11 + shift)),
+                lanes[S22 + g] + (pressure + two_mu * (b22 + shift)),
             )
             t12, t33 = lanes[S12 + g] + two_mu * b12, lanes[S33 + g] + pressure
             lanes[LAM + f], lanes[MU2 + f], lanes[LAM + g], lanes[MU2 + g] = lame, two_mu, lame, two_mu

@@ -46,9 +46,9 @@ SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
 N_PHI, N_PSI, STRENGTH, TENSILE = range(4)
 YIELD = 4
 # Columns of what an element remembers (n, 9), or (n, 36) where there are quads: for each of their four triangles
-# (plastic_quads.py), triangles have the first nine; plastic strain 11, 22, 12, 33 in the frame that turns with it; shear and
-# volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0: never);
-# plastic work [J/m].
+# (plastic_quads.py), triangles have the first nine; plastic strain 11, 22, 12, 33 in the frame that turns with it;
+# shear and volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0:
+# never); plastic work [J/m].
 E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
 MEMORY = 9
 
