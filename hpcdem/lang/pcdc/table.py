@@ -201,7 +201,7 @@ NULL = Model(
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",
-    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations. For triangles.",
+    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.",
     declared(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
