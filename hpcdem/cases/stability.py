@@ -52,7 +52,7 @@ class SlopeStability(Case):
     precision: float = quantity(0.01, "1", "the factor lies in a range of this width over itself", gt=0, le=0.2)
     balance: float = quantity(1e-6, "1", "unbalanced ratio at which the slope stands", gt=0, le=1e-3)
     patience: int = quantity(100000, "1", "steps after which it does not stand", ge=1000)
-    collapse: float = quantity(0.05, "1", "displacement with which it has come down, over height", gt=0, le=0.5)
+    collapse: float = quantity(0.01, "1", "displacement with which it has come down, over height", gt=0, le=0.5)
 
     @model_validator(mode="after")
     def _fits(self) -> SlopeStability:

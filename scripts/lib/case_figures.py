@@ -1,4 +1,4 @@
-"""Figures of docs/cases.md and docs/validation.md: beam, tunnel and slope as their scripts make them.
+"""Figures of docs/cases.md and docs/validation.md: beam, tunnel and slopes as their scripts make them.
 
 `python scripts/lib/case_figures.py [FOLDER]` runs the three scripts (some minutes) and draws into docs/figures.
 """
@@ -74,7 +74,9 @@ def tunnel(folder: Path, case: Tunnel) -> Any:
     figure, (left, right) = plt.subplots(1, 2, figsize=(17 * CM, 7.8 * CM), layout="constrained")
     wide = case.zone * case.radius * 1.05
     blocks.cracks(left, state, FONT, 7.0 / (2 * wide))
-    filled = blocks.contours(right, state, blocks.CONTOURS["stress"], (0.0, 2.0 * max(-case.stress_xx, -case.stress_yy)))
+    filled = blocks.contours(
+        right, state, blocks.CONTOURS["stress"], (0.0, 2.0 * max(-case.stress_xx, -case.stress_yy))
+    )
     bar = figure.colorbar(filled, ax=right, shrink=0.8)
     bar.set_label("larger compressive stress (MPa)")
     for axes, label in ((left, "(a)"), (right, "(b)")):
