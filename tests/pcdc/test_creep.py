@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hpcdem.commands.fdem import checkpoints
-from hpcdem.core.errors import EquilibriumError, StoppedWithCheckpoint
+from hpcdem.commands.fdem import checkpoints, coupling
+from hpcdem.core.errors import CommandError, EquilibriumError, StoppedWithCheckpoint
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang.pcdc.statement import ScriptError
 from hpcdem.physics.fdem import diagnostics
@@ -202,6 +203,17 @@ def test_what_cannot_creep_is_refused(tmp_path, lines, told):
     with pytest.raises(ScriptError) as caught:
         Rock(tmp_path, SHEAR + lines + "\n")
     assert str(caught.value).startswith(f"script.sc:{last}: ") and told in str(caught.value)
+
+
+def test_coupled_blocks_do_not_creep(tmp_path):
+    rock = Rock(tmp_path, SHEAR + "pcdc model creep on dt 1\n")
+    particles = SimpleNamespace(outdir=tmp_path / "particles")
+    with pytest.raises(CommandError, match="do not creep: model creep off comes first"):
+        coupling.couple(rock.project, particles)
+    rock("pcdc model creep off\n")
+    rock.project.coupled = particles
+    with pytest.raises(ScriptError, match="model creep would leave the particles behind"):
+        rock("pcdc model creep on dt 1\n")
 
 
 def test_long_creep_steps_are_said(tmp_path):
