@@ -116,6 +116,15 @@ def the_same(straight: Rock, again: Rock) -> None:
         assert np.array_equal(again["pcdc"].history(name), straight["pcdc"].history(name))
 
 
+def test_runs_in_motion_one_after_the_other(tmp_path):
+    """Two runs are one, with a file between them or without."""
+    fast = SHEAR + "pcdc model option dynamic on\npcdc element property m-v 1e5 k-v 1e4\npcdc model creep on\n"
+    whole = Rock(tmp_path / "a", fast + "pcdc model step 60\n")
+    the_same(whole, Rock(tmp_path / "b", fast + "pcdc model step 29\npcdc model step 31\n"))
+    Rock(tmp_path / "c", fast + "pcdc model step 29\npcdc model save 'a.sav'\n")
+    the_same(whole, Rock(tmp_path / "c", "pcdc model restore 'a.sav'\npcdc model step 31\n"))
+
+
 def test_saved_between_two_runs(tmp_path):
     creep = "pcdc model creep on dt 500 change 0.1 greatest 3000\npcdc model solve elastic time 8e3\n"
     rest = "pcdc model solve elastic time 2e4\n"
@@ -214,6 +223,14 @@ def test_coupled_blocks_do_not_creep(tmp_path):
     rock.project.coupled = particles
     with pytest.raises(ScriptError, match="model creep would leave the particles behind"):
         rock("pcdc model creep on dt 1\n")
+
+
+def test_creep_of_nothing_is_said(tmp_path):
+    for model in ("mech-iso-e property den 2500 young 1e10 p-r 0.2", ""):
+        rock = Rock(tmp_path / (model or "burgers")[:4], SHEAR)
+        rock(f"pcdc element c-model {model}\n" if model else "")
+        rock("pcdc model creep on dt 1\npcdc model step 1\n")
+        assert any("creep is on, but no element can creep" in line for line in rock.blocks.log.lines) == bool(model)
 
 
 def test_long_creep_steps_are_said(tmp_path):

@@ -132,7 +132,7 @@ def finish(sim: Blocks, end: float) -> None:
 
 def drop(sim: Blocks) -> None:
     """Forget a creep step of a static run that did not come into balance: elements have not crept in it."""
-    if sim.creep.passed > 0.0:
+    if sim.creep.passed > 0.0 and not sim.options.dynamic:
         sim.creep.passed = 0.0
         sim.open_model()
 

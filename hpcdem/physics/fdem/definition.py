@@ -807,7 +807,7 @@ def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any
     changed = [name for name in moduli if name in given]
     stays = {name: value for name, value in old.items() if name not in moduli}
     if not changed:
-        pair = rigidities if creeps else ["young", "poisson_ratio"]
+        pair = moduli if creeps else ["young", "poisson_ratio"]
     elif len(changed) == 1:
         pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else rigidities
     else:

@@ -169,6 +169,14 @@ def _strength(values: dict[str, Any]) -> None:
         raise CommandError(f"dilation must not be above friction ({other:g} degrees), got {one:g}")
 
 
+def _agree(values: dict[str, Any]) -> bool:
+    """Whether E and Poisson's ratio are those of the bulk and Maxwell shear modulus beside them, but for rounding."""
+    one = {"shear": values["maxwell_shear"], "bulk": values["bulk"]}
+    _elastic(one)
+    near = (np.isclose(one[name], values[name], rtol=1e-9, atol=1e-9) for name in ("young", "poisson_ratio"))
+    return all(bool(np.all(each)) for each in near)
+
+
 def _burgers(values: dict[str, Any]) -> None:
     """All four moduli from Young's modulus and Poisson's ratio, of which a bulk or Maxwell shear modulus that is given
     takes the place of what they give, or from two of the four."""
@@ -176,6 +184,8 @@ def _burgers(values: dict[str, Any]) -> None:
     given = [name for name in own if name in values]
     if len(given) < 2:
         raise CommandError(f"a creeping model needs two of {', '.join(own)} (Pa), got {', '.join(given) or 'none'}")
+    if len(given) == 4 and _agree(values):
+        return
     if "maxwell_shear" in values:
         values["shear"] = values.pop("maxwell_shear")
     moduli = {name: values[name] for name in MODULI if name in values}

@@ -171,6 +171,8 @@ class Blocks(State):
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
         it; "relax": a static stage moves them apart; "keep": they start as they are."""
         before = self.options.dynamic
+        if dynamic is not None and dynamic != before:
+            creep.drop(self)
         super().option(dynamic, collision, large_strain, overlap)
         if self.options.dynamic != before:
             self.v[:] = 0.0
@@ -430,7 +432,10 @@ class Blocks(State):
             wanted = plasticity.MEMORY * (4 if self.wide else 1)
             if known.shape[1] < wanted:  # those of a file from before quads could yield have nine columns
                 self.cold["plastic"] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
-        if "creep" not in self.cold and self.creeping().any():
+        creeps = self.creeping().any()
+        if self.creep.on and not creeps and self.log is not None:
+            self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
+        if "creep" not in self.cold and creeps:
             self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
         with self.timers("neighbour"):
             if self._topology_stale:

@@ -116,7 +116,9 @@ def _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, 
             continue
         memory[j, C11], memory[j, C22], memory[j, C12] = c11, c22, c12
         memory[j, K11], memory[j, K22], memory[j, K12] = n11, n22, n12
-        memory[j, S11], memory[j, S22], memory[j, S12] = t11, t22, t12
+        # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
+        memory[j, S11], memory[j, S22] = b11 + two_mu * (e11 - c11), b22 + two_mu * (e22 - c22)
+        memory[j, S12] = b12 + two_mu * (e12 - c12)
         if dt > 0.0:
             lost = 0.5 * squares(s11, s22, s12) * maxwell
             if per_kelvin > 0.0:
