@@ -190,6 +190,7 @@ class Blocks(State):
                     raise
         with timers("halo"):
             halo.finish()
+        self.surface_loads.follow()
         if self.options.auto and self.options.dynamic and self.clock.step - rebuild_state.estimated >= AUTO:
             rebuild_state.dt, stale = 0.0, True
         if stale or outdated:
@@ -200,8 +201,9 @@ class Blocks(State):
         return request
 
     def check_start(self) -> None:
-        """CommandError if nothing has moved yet and bodies overlap, unless that was asked for; the model is closed.
-        Collective."""
+        """CommandError if a load lacks something, or nothing has moved yet and bodies overlap, unless that was asked
+        for; the model is closed. Collective."""
+        self.surface_loads.check_start()
         if self.untouched:
             overlaps.check(self, self.local)
 
