@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def split(
     """Nodes (n, 2) [m] along a line: each straight part in so many segments, or in ones no longer than length [m], or
     at the edges of elements, corners (ne, 4, 2) of cells (ne, 4)."""
     nodes = [line[:1]]
-    for a, b in zip(line[:-1], line[1:]):
+    for a, b in pairwise(line):
         span = float(np.hypot(*(b - a)))
         if segments is None and length is None:
             t = _crossings(a, b, corners, cells)

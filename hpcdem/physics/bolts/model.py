@@ -17,6 +17,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels, layout
 from hpcdem.physics.bolts.properties import BOLT
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE
 from hpcdem.physics.fdem.local import ALPHA
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
@@ -63,7 +64,7 @@ ELEMENT_QUANTITIES: dict[str, tuple[str, str]] = {
     "plastic_strain": ("1", "plastic part of it"),
     "bolt_state": ("1", "yields in tension 1, in compression 2; did so before 4, 8; broken 16"),
 }
-QUANTITIES = {"bolt-node": NODE_QUANTITIES, "bolt-element": ELEMENT_QUANTITIES}
+QUANTITIES = {BOLT_NODE: NODE_QUANTITIES, BOLT_ELEMENT: ELEMENT_QUANTITIES}
 """What can be asked of nodes and elements of bolts: unit and meaning."""
 
 _NODES: dict[str, tuple[type, int]] = {
@@ -111,14 +112,18 @@ class Bolts(SurfaceLoad):
         return len(self.nodes["bar"])
 
     @staticmethod
+    def there(blocks: Blocks) -> Bolts | None:
+        """Those of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, Bolts)), None)
+
+    @staticmethod
     def of(blocks: Blocks) -> Bolts:
         """Those of a model, made on the first call. Not collective."""
-        for load in blocks.surface_loads:
-            if isinstance(load, Bolts):
-                return load
-        made = Bolts(blocks)
-        blocks.surface_loads.add(made)
-        return made
+        found = Bolts.there(blocks)
+        if found is None:
+            found = Bolts(blocks)
+            blocks.surface_loads.add(found)
+        return found
 
     # ---- what is said --------------------------------------------------------------------------------------------
 
@@ -247,7 +252,7 @@ class Bolts(SurfaceLoad):
         used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
         return any(name in asdict(one).values() for one in used)
 
-    def reset_velocity(self) -> None:
+    def stop(self) -> None:
         """Velocities along the bolts become zero. Not collective."""
         self.nodes["v"][:] = 0.0
 
@@ -257,7 +262,7 @@ class Bolts(SurfaceLoad):
         """A quantity of `QUANTITIES` of nodes or elements (None: all), on all ranks. Not collective."""
         if name not in QUANTITIES[kind]:
             raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
-        found = self._node_value(name) if kind == "bolt-node" else self._element_value(name)
+        found = self._node_value(name) if kind == BOLT_NODE else self._element_value(name)
         return np.asarray(found if numbers is None else found[numbers], np.float64)
 
     def _node_value(self, name: str) -> np.ndarray:
@@ -583,7 +588,7 @@ def _empty(n: int, of: type, width: int) -> np.ndarray:
 
 
 def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    out = {}
+    out: dict[str, np.ndarray] = {}
     for name, values in columns.items():
         if values.ndim == 1:
             out[name] = values
@@ -593,7 +598,7 @@ def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _wide(columns: Mapping[str, np.ndarray], kinds: Mapping[str, tuple[type, int]]) -> dict[str, np.ndarray]:
-    out = {}
+    out: dict[str, np.ndarray] = {}
     for name, (of, width) in kinds.items():
         found = np.column_stack([columns[f"{name}_{c}"] for c in range(width)]) if width else columns[name]
         out[name] = np.ascontiguousarray(found.astype(of))

@@ -6,13 +6,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT
 from hpcdem.physics.fdem.properties import Model, Property
 
-BOLT_ELEMENT = "bolt-element"
 
-
-def _compression(values: dict[str, Any]) -> None:
-    values.setdefault("compressive_yield_force", values["tensile_yield_force"])
+def _strengths(values: dict[str, Any]) -> None:
+    tension, pre = values["tensile_yield_force"], values["pretension_force"]
+    values.setdefault("compressive_yield_force", tension)
+    if pre > tension:
+        raise CommandError(f"pretension_force must not be above tensile_yield_force ({tension:g} N), got {pre:g}")
 
 
 BOLT = Model(
@@ -40,5 +43,5 @@ BOLT = Model(
         Property("damp_factor", "1", "viscous damping of the motion along the bar, part of 2 A sqrt(rho E); without "
                  "effect in static runs", 0.0),
     ),
-    _compression,
+    _strengths,
 )  # fmt: skip

@@ -268,6 +268,9 @@ def set_velocity(sim: Blocks, nodes: Numbers, vx: float | None = None, vy: float
 def reset_velocity(sim: Blocks, nodes: Numbers = None) -> None:
     """Velocities become zero."""
     set_velocity(sim, nodes, 0.0, 0.0)
+    if nodes is None:
+        for load in sim.surface_loads:
+            load.stop()
 
 
 def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:

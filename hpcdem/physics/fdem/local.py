@@ -316,8 +316,8 @@ class Local:
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
-        contact of its free faces can have; and what surface loads bring. And the dashpots (n_own, 4) [N s/m per m] of these contacts,
-        and of quiet faces.
+        contact of its free faces can have; and what surface loads bring. And the dashpots (n_own, 4) [N s/m per m] of
+        these contacts, and of quiet faces.
 
         Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
         altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest

@@ -84,8 +84,7 @@ def tables(sim: Blocks) -> dict[str, Table]:
     if len(sim.born):
         born_at = sim.birthplace.reshape(-1, 8)
         tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
-    for name, columns in sim.surface_loads.saved_tables().items():
-        tables[name] = _whole(columns, root)
+    tables |= {name: _whole(of, root) for name, of in sim.surface_loads.saved_tables().items()}
     own = sim.owned
     number, x, v = sim.number[own], sim.x[own], sim.v[own]
     columns: dict[str, np.ndarray] = {"number": number.copy()}

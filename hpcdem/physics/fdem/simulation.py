@@ -137,6 +137,11 @@ class Blocks(State):
                 f"{_pascals(self.stress0[other[0]])}; element initial after the models sets it for the present ones",
             )
 
+    def remove_table(self, name: str) -> None:
+        if any(load.uses_table(name) for load in self.surface_loads):
+            raise CommandError(f"table '{name}' is used by a boundary condition")
+        super().remove_table(name)
+
     def option(
         self,
         dynamic: bool | None = None,
