@@ -184,8 +184,9 @@ class Bolts(SurfaceLoad):
         self.elements = {name: np.concatenate([old, bars[name]]) for name, old in self.elements.items()}
         self._arrange()
         blocks.changed()
-        if blocks.log is not None and len(held) < n:
-            blocks.log.info(f"{n - len(held)} of the {n} nodes of the bolt are in no element: no grout holds them")
+        free = int((host < 0).sum())
+        if blocks.log is not None and free:
+            blocks.log.info(f"{free} of the {n} nodes of the bolt are in no element: no grout holds them")
         return numbers
 
     def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
@@ -294,6 +295,14 @@ class Bolts(SurfaceLoad):
             case "plastic_strain":
                 return bars["plastic"] / bars["length"]
         return bars["state"].copy()
+
+    def columns(self) -> dict[str, dict[str, np.ndarray]]:
+        """What frames hold: "nodes" with the number of their bolt, "elements" with their first node. Not collective."""
+        found = {kind: {name: self.values(kind, name) for name in of} for kind, of in QUANTITIES.items()}
+        return {
+            "nodes": {"bolt": self.nodes["bar"].copy(), **found[BOLT_NODE]},
+            "elements": {"first_node": self.first.copy(), **found[BOLT_ELEMENT]},
+        }
 
     def energies(self) -> dict[str, float]:
         """Energy of the bolts [J/m] since the account began: stored: in bars and grout and as motion, and at_start;
