@@ -27,24 +27,29 @@ MASS, DRAG, GROUT, ROCK_COHESION, ROCK_FRICTION, BOLT_COHESION, BOLT_FRICTION = 
 # Work (4,) [J/m]: on the rock; lost in bars, in the grout, and by dashpots; by conditions.
 ON_ROCK, IN_BARS, IN_GROUT, IN_DASHPOTS, BY_CONDITIONS = range(5)
 WORK = 5
+CRUSHED = 0.5
+"""An element that is shorter than so much of its length has buckled: it carries nothing any more."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def directions(first, x, along, tangent):
-    """Unit vectors along elements (m, 2), and at nodes (n, 2) along the mean of their elements'."""
-    tangent[:] = 0.0
+def directions(first, x, state, along, tangent):
+    """Unit vectors along elements (m, 2), and at nodes (n, 2) along the mean of those beside them that are whole; where
+    none is, they stay."""
+    new = np.zeros(tangent.shape)
     for e in range(len(first)):
         i = first[e]
+        if state[e] & RUPTURED:
+            continue
         ux, uy = x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1]
         length = math.sqrt(ux * ux + uy * uy)
         along[e, 0], along[e, 1] = ux / length, uy / length
         for k in (i, i + 1):
-            tangent[k, 0] += along[e, 0]
-            tangent[k, 1] += along[e, 1]
+            new[k, 0] += along[e, 0]
+            new[k, 1] += along[e, 1]
     for i in range(len(x)):
-        size = math.sqrt(tangent[i, 0] ** 2 + tangent[i, 1] ** 2)
-        tangent[i, 0] /= size
-        tangent[i, 1] /= size
+        size = math.sqrt(new[i, 0] ** 2 + new[i, 1] ** 2)
+        if size > 0.0:
+            tangent[i, 0], tangent[i, 1] = new[i, 0] / size, new[i, 1] / size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -162,7 +167,7 @@ def stretch(first, x, elements, length, force, state, plastic, work):
     """New axial forces (m,) [N/m] from the new positions; length (m,): before, and then now.
 
     f += E A / L0 du, held between both yield forces; what goes beyond is plastic lengthening. An element that has
-    become longer than L0 by the failure strain is broken for good.
+    become longer than L0 by the failure strain, or shorter than CRUSHED L0, is broken for good.
     """
     for e in range(len(first)):
         i = first[e]
@@ -181,7 +186,8 @@ def stretch(first, x, elements, length, force, state, plastic, work):
         elif trial < new:
             state[e] |= IN_COMPRESSION | WAS_IN_COMPRESSION
         plastic[e] += (trial - new) / k
-        if now - elements[e, LENGTH] >= elements[e, FAILURE] * elements[e, LENGTH]:
+        grown = now - elements[e, LENGTH]
+        if grown >= elements[e, FAILURE] * elements[e, LENGTH] or now < CRUSHED * elements[e, LENGTH]:
             state[e] |= RUPTURED
             new = 0.0
         force[e] = new

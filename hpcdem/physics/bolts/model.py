@@ -71,11 +71,11 @@ _NODES: dict[str, tuple[type, int]] = {
     "bar": (np.int64, 0), "host": (np.int64, 0), "plate": (np.int64, 0), "condition": (np.int64, 0),
     "bond_state": (np.int64, 0), "arc": (np.float64, 0), "bond": (np.float64, 0), "slip": (np.float64, 0),
     "x": (np.float64, 2), "v": (np.float64, 2), "origin": (np.float64, 2), "point": (np.float64, 2),
-    "reaction": (np.float64, 2), "grout": (np.float64, 2), "weight": (np.float64, 4),
+    "tangent": (np.float64, 2), "reaction": (np.float64, 2), "grout": (np.float64, 2), "weight": (np.float64, 4),
 }  # fmt: skip
 """Columns of the nodes, by type and width. bar: which bolt; condition: row; arc: distance along the bolt [m]; bond:
-force of the grout [N/m]; point: where the rock is [m]; grout: length in grout of the halves of the elements before and
-after the node [m]; weight: of the corners of the host."""
+force of the grout [N/m]; point: where the rock is [m]; tangent: unit vector along the bolt; grout: length in
+grout of the halves of the elements before and after the node [m]; weight: of the corners of the host."""
 _ELEMENTS: dict[str, tuple[type, int]] = {
     "row": (np.int64, 0), "state": (np.int64, 0), "length": (np.float64, 0), "force": (np.float64, 0),
     "plastic": (np.float64, 0),
@@ -176,6 +176,8 @@ class Bolts(SurfaceLoad):
         seen = np.zeros((n, 3))
         kernels.host_points(held, held, weight, np.ascontiguousarray(corners[host].reshape(-1, 8)), seen)
         new["point"][held] = seen[held, :2]
+        speed = diagnostics.corner_values(blocks, "velocity").reshape(-1, 4, 2)
+        new["v"][held] = _at(weight[held], cells[host[held]], speed[host[held]])
         bars = {name: _empty(n - 1, *kind) for name, kind in _ELEMENTS.items()}
         bars["length"][:] = span
         numbers = np.arange(len(self), len(self) + n), len(self.elements["row"]) + np.arange(n - 1)
@@ -324,16 +326,21 @@ class Bolts(SurfaceLoad):
 
     def _stored(self) -> float:
         bars, nodes = self.elements, self.nodes
-        w = (nodes["v"] * self._tangent).sum(axis=1)
         soft, grout = self._element_table[:, kernels.STIFFNESS], self._node_table[:, kernels.GROUT]
         parts = [
             np.divide(bars["force"] ** 2, 2.0 * soft, out=np.zeros(len(soft)), where=soft > 0.0),
             np.divide(nodes["bond"] ** 2, 2.0 * grout, out=np.zeros(len(grout)), where=grout > 0.0),
         ]
-        if self._dynamic and self._prepared_for is not None:
-            own = (nodes["plate"] == 0) | (nodes["host"] < 0)
-            parts.append(np.where(own, 0.5 * self._node_table[:, kernels.MASS] * w * w, 0.0))
+        if self._dynamic:
+            self._set_masses()
+            parts.append(self._kinetic())
         return math.fsum(np.concatenate(parts).tolist())
+
+    def _kinetic(self) -> np.ndarray:
+        nodes = self.nodes
+        w = (nodes["v"] * self._tangent).sum(axis=1)
+        own = (nodes["plate"] == 0) | (nodes["host"] < 0)
+        return np.where(own, 0.5 * self._node_table[:, kernels.MASS] * w * w, 0.0)
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
@@ -350,7 +357,7 @@ class Bolts(SurfaceLoad):
         first = self.first
         self.hosted = nodes["host"] >= 0
         self._carrier, self._share = layout.carriers(nodes["bar"], nodes["arc"], nodes["host"])
-        self._along, self._tangent = np.zeros((m, 2)), np.zeros((n, 2))
+        self._along, self._tangent = np.zeros((m, 2)), nodes["tangent"]
         self._total, self._on_rock = np.zeros((n, 2)), np.zeros((n, 2))
         self._step, self._rock = np.zeros((n, 2)), np.zeros((n, 2))
         way = nodes["x"][first + 1] - nodes["x"][first]
@@ -390,7 +397,7 @@ class Bolts(SurfaceLoad):
         self._prepared_for = None
         self._mine, self._rows = np.empty(0, np.int64), np.empty(0, np.int64)
         if n:
-            kernels.directions(first, nodes["x"], self._along, self._tangent)
+            kernels.directions(first, nodes["x"], bars["state"], self._along, self._tangent)
 
     def _set_masses(self) -> None:
         """Masses along the bar for this time step: 2 k / m bounds omega^2, k: of the elements on both sides and of the
@@ -398,13 +405,18 @@ class Bolts(SurfaceLoad):
         o, dt = self.blocks.options, self.blocks.clock.dt
         if self._prepared_for == (dt, o.dynamic, o.safety):
             return
-        self._prepared_for = dt, o.dynamic, o.safety
+        known, self._prepared_for = self._prepared_for is not None, (dt, o.dynamic, o.safety)
+        before = self._kinetic().sum()
         k = self._stiffness + self._node_table[:, kernels.GROUT]
         if not o.dynamic:
             self._node_table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * k
             return
         mass = np.maximum(self._true_mass, 0.5 * k * (dt / o.safety) ** 2)
         self._node_table[:, kernels.MASS] = mass
+        if known and self._account is not None:
+            self.commands += float(self._kinetic().sum() - before)
+        if not self._true_mass.any():
+            return
         added = float((mass - self._true_mass).sum() / self._true_mass.sum())
         if self.blocks.log is not None and abs(added - self._told) > 0.1 * self._told:
             raised = int((mass > self._true_mass).sum())
@@ -514,7 +526,7 @@ class Bolts(SurfaceLoad):
                 self._tangent, self._step, self._rock, self.hosted, self._node_table, normal, nodes["bond"],
                 nodes["slip"], nodes["bond_state"], work,
             )  # fmt: skip
-            kernels.directions(self.first, nodes["x"], self._along, self._tangent)
+            kernels.directions(self.first, nodes["x"], bars["state"], self._along, self._tangent)
             self._find_forces()
             kernels.work_on_rock(before, self._on_rock, self._rock, work)
 
@@ -590,6 +602,11 @@ class Bolts(SurfaceLoad):
         made.commands, made._stored_at_start = state["commands"], state["start"]
         made._dynamic, made._account = state["dynamic"], blocks.budget
         made._arrange()
+
+
+def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (k, 4, 2) of the corners of elements (k, 4) at points in them."""
+    return (weight[:, :, None] * np.where(cells[:, :, None] >= 0, values, 0.0)).sum(axis=1)
 
 
 def _empty(n: int, of: type, width: int) -> np.ndarray:
