@@ -34,8 +34,8 @@ class MeshFrame:
 
     corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
     columns; joints: number, first, last (corners at their ends) and further columns. group_names: by name of an integer
-    column of the elements what its values stand for. bolts: columns of their "nodes" and "elements", equal on all ranks;
-    empty without bolts.
+    column of the elements what its values stand for. bolts: columns of their "nodes" and "elements", equal on all
+    ranks; empty without bolts.
     """
 
     step: int

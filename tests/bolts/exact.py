@@ -9,7 +9,7 @@ P = E A beta tanh(beta L) u_head.
 Slip begins at the head where K u = S: P = (S / beta) tanh(beta L). Beyond, a length a at the head slips with S, and the
 rest L - a is at that limit itself: P = S a + (S / beta) tanh(beta (L - a)). The most is S L.
 
-Displacement of the head then: u = S / K at the end of the elastic part; in the slipping part N grows by S per length, so
+Displacement of the head then: u = S / K at the end of the elastic part; in the slipping part N grows by S per length:
 u_head = S / K + (N1 a + S a^2 / 2) / (E A), N1 = (S / beta) tanh(beta (L - a)).
 """
 

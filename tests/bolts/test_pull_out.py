@@ -115,5 +115,3 @@ def test_pressure_across_the_bar_adds_friction() -> None:
         found[sigma] = np.abs(bolts.values("bolt-node", "bond_force"))
     assert found[-2e6] == pytest.approx(math.pi * 0.025 * (2e6 + 2e6 * math.tan(math.pi / 6.0)), rel=1e-6)
     assert found[2e6] == pytest.approx(STRENGTH, rel=1e-9)
-
-

@@ -701,7 +701,7 @@ _OBJECTS = (
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
-            models=(BOLT,), ranged="bolt-element", manual=True),
+            models=(BOLT,), ranged="bolt-element"),
     _group_command("bolt-element", "bolt-e{lement}"),
     _group_command("bolt-node", "bolt-n{ode}"),
     Command("bolt-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",

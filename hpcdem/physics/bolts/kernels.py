@@ -127,35 +127,36 @@ def move(
     for i in range(len(x)):
         tx, ty = tangent[i, 0], tangent[i, 1]
         f = total[i, 0] * tx + total[i, 1] * ty + grout[i]
-        m = nodes[i, MASS]
+        m, drag = nodes[i, MASS], 0.0
+        w = v[i, 0] * tx + v[i, 1] * ty
         if plate[i] and hosted[i]:
             dx, dy = rock[i, 0], rock[i, 1]
         else:
-            w = v[i, 0] * tx + v[i, 1] * ty
             if alpha > 0.0:
                 new = w + dt / m * laws.damped(f, w, alpha)
             else:
-                g = 0.5 * nodes[i, DRAG] * dt / m
+                drag = nodes[i, DRAG]
+                g = 0.5 * drag * dt / m
                 new = ((1.0 - g) * w + dt / m * f) / (1.0 + g)
-                work[IN_DASHPOTS] += nodes[i, DRAG] * 0.25 * (w + new) ** 2 * dt
             slide = new * dt - (rock[i, 0] * tx + rock[i, 1] * ty)
             dx, dy = rock[i, 0] + slide * tx, rock[i, 1] + slide * ty
         reaction[i, 0] = reaction[i, 1] = 0.0
-        for c in range(2):
-            does, at = (conditions[i, DOES_X], conditions[i, AT_X]) if c == 0 else (
-                conditions[i, DOES_Y], conditions[i, AT_Y]
-            )  # fmt: skip
-            if does == FREE:
-                continue
-            new = at if does == VELOCITY else v[i, c] + at * dt
-            along = tx if c == 0 else ty
-            reaction[i, c] = m * (new - v[i, c]) / dt - total[i, c] - grout[i] * along
-            if c == 0:
-                dx = new * dt
-            else:
-                dy = new * dt
-        work[BY_CONDITIONS] += reaction[i, 0] * dx + reaction[i, 1] * dy
-        work[BY_CONDITIONS] += conditions[i, FORCE_X] * dx + conditions[i, FORCE_Y] * dy
+        led_x, led_y = conditions[i, DOES_X] != FREE, conditions[i, DOES_Y] != FREE
+        if led_x:
+            at = conditions[i, AT_X]
+            dx = dt * (at if conditions[i, DOES_X] == VELOCITY else v[i, 0] + at * dt)
+        if led_y:
+            at = conditions[i, AT_Y]
+            dy = dt * (at if conditions[i, DOES_Y] == VELOCITY else v[i, 1] + at * dt)
+        mean = 0.5 * (w + (dx * tx + dy * ty) / dt)
+        if led_x:
+            reaction[i, 0] = m * (dx / dt - v[i, 0]) / dt - total[i, 0] - (grout[i] - drag * mean) * tx
+        if led_y:
+            reaction[i, 1] = m * (dy / dt - v[i, 1]) / dt - total[i, 1] - (grout[i] - drag * mean) * ty
+        work[IN_DASHPOTS] += drag * mean * mean * dt
+        mean_x, mean_y = 0.5 * (v[i, 0] * dt + dx), 0.5 * (v[i, 1] * dt + dy)  # forces of a moment, see energy.py
+        work[BY_CONDITIONS] += (reaction[i, 0] + conditions[i, FORCE_X]) * mean_x
+        work[BY_CONDITIONS] += (reaction[i, 1] + conditions[i, FORCE_Y]) * mean_y
         step[i, 0], step[i, 1] = dx, dy
         v[i, 0], v[i, 1] = dx / dt, dy / dt
         x[i, 0] += dx

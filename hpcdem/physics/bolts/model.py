@@ -433,11 +433,13 @@ class Bolts(SurfaceLoad):
         def now(value: Number, when: float) -> float:
             return tables[value](when) if isinstance(value, str) else value
 
+        used, row = np.unique(self.nodes["condition"], return_inverse=True)
+        now_of = [self.conditions[one] for one in used.tolist()]
         rows = np.array([
             (one.does_x, now(one.at_x, middle), one.does_y, now(one.at_y, middle), now(one.force_x, time),
-             now(one.force_y, time)) for one in self.conditions
-        ])  # fmt: skip
-        table = rows[self.nodes["condition"]]
+             now(one.force_y, time)) for one in now_of
+        ]).reshape(-1, 6)  # fmt: skip
+        table = rows[row.reshape(-1)]
         table[:, kernels.FORCE_X :] /= self._node_spacing[:, None]
         return table
 
