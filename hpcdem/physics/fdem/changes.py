@@ -10,9 +10,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
-from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
+from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
+from hpcdem.physics.fdem.properties import ELEMENT, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 
@@ -69,8 +69,6 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if name == MECH_MOHR_COULOMB.name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
-        raise CommandError(f"element {quads[0]} is a quad: {name} is for triangles")
     if elements is not None:
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
@@ -292,8 +290,10 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
     if "plastic" in sim.cold:
         sim.before_change()
         mine = np.isin(sim.number, at)
-        for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
-            sim.cold["plastic"][mine, column] = 0.0
+        plastic = sim.cold["plastic"]
+        for part in range(0, plastic.shape[1], MEMORY):
+            for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
+                plastic[mine, part + column] = 0.0
         sim.changed(stiffness=False)
     if sim.log is not None and not sim.yielding()[at].any():
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
