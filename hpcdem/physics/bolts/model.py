@@ -337,10 +337,21 @@ class Bolts(SurfaceLoad):
         return math.fsum(np.concatenate(parts).tolist())
 
     def _kinetic(self) -> np.ndarray:
-        nodes = self.nodes
+        """m w- w+ / 2 of nodes that move by themselves, of the velocities before and after this moment (energy.py); of
+        those that are led m w- w- / 2."""
+        nodes, table = self.nodes, self._node_table
+        mass = table[:, kernels.MASS]
         w = (nodes["v"] * self._tangent).sum(axis=1)
-        own = (nodes["plate"] == 0) | (nodes["host"] < 0)
-        return np.where(own, 0.5 * self._node_table[:, kernels.MASS] * w * w, 0.0)
+        f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
+        drag, kick = 0.5 * table[:, kernels.DRAG] * self.blocks.clock.dt, self.blocks.clock.dt * f
+        after = np.divide((mass - drag) * w + kick, mass + drag, out=w.copy(), where=~self._led() & (mass > 0.0))
+        own = (nodes["plate"] == 0) | ~self.hosted
+        return np.where(own, 0.5 * mass * w * after, 0.0)
+
+    def _led(self) -> np.ndarray:
+        """(n,) bool: nodes with a prescribed velocity or acceleration."""
+        rows = [(one.does_x, one.does_y) for one in self.conditions]
+        return (np.array(rows) != kernels.FREE).any(axis=1)[self.nodes["condition"]]
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
@@ -398,6 +409,7 @@ class Bolts(SurfaceLoad):
         self._mine, self._rows = np.empty(0, np.int64), np.empty(0, np.int64)
         if n:
             kernels.directions(first, nodes["x"], bars["state"], self._along, self._tangent)
+            self._find_forces()
 
     def _set_masses(self) -> None:
         """Masses along the bar for this time step: 2 k / m bounds omega^2, k: of the elements on both sides and of the
@@ -487,11 +499,11 @@ class Bolts(SurfaceLoad):
         if blocks.options.dynamic != self._dynamic:  # velocities of the static mode are ways per step
             self._dynamic = blocks.options.dynamic
             self.nodes["v"][:] = 0.0
+        self._mine, self._rows = self._held_here()
+        self._find_forces()
         if self._account is not blocks.budget:
             self._account = blocks.budget
             self.work[:], self.commands, self._stored_at_start = 0.0, 0.0, self._stored()
-        self._mine, self._rows = self._held_here()
-        self._find_forces()
 
     def add_to(self, applied: np.ndarray) -> None:
         """Forces on the rock at the present positions, in the order of nodes [N/m]."""
@@ -550,9 +562,7 @@ class Bolts(SurfaceLoad):
         if self.blocks.comm.rank > 0:
             return np.empty(0), np.empty(0)
         nodes = self.nodes
-        rows = [(one.does_x, one.does_y) for one in self.conditions]
-        led = (np.array(rows) != kernels.FREE).any(axis=1)[nodes["condition"]]
-        free = ~led & ~((nodes["plate"] > 0) & self.hosted)
+        free = ~self._led() & ~((nodes["plate"] > 0) & self.hosted)
         f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
         return np.abs(f[free]), np.concatenate([2.0 * np.abs(self.elements["force"]), np.abs(nodes["bond"])])
 
