@@ -21,7 +21,13 @@ from hpcdem.physics.fdem.tables import Drawn, Over
 
 Where = str | g.Term | tuple[g.Term, ...] | None
 """The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
-_WORDS = {g.ELEMENT: "element", g.NODE: "node", g.FACE: "element-face", g.JOINT: "face-joint"}
+_WORDS = {
+    g.ELEMENT: "element",
+    g.NODE: "node",
+    g.FACE: "element-face",
+    g.JOINT: "face-joint",
+    **{kind: kind for kind in g.BOLTS},
+}
 
 
 def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False) -> dict[str, Any]:

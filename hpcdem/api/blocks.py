@@ -31,7 +31,7 @@ Number = float | str
 """Of a condition: a number, or the name of a table of time."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
-OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT}
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{kind: kind for kind in g.BOLTS}}
 """What histories call them."""
 
 
@@ -449,6 +449,68 @@ class Nodes(Objects):
 
 
 @commands
+class Bolts(Objects):
+    """Rock bolts: `sim.bolts["axial-force"]` is that of their elements, see `Objects`."""
+
+    _word, kind, pcdc = "bolts", g.BOLT_ELEMENT, "bolt-element"
+
+    def create(
+        self,
+        points: Sequence[Point],
+        *,
+        segments: int | None = None,
+        length: float | None = None,
+        grout: tuple[float, float] | None = None,
+        plate: bool = False,
+        group: str | None = None,
+        set: str | None = None,
+    ) -> None:
+        """Install a bolt along these points [m], from its head on, as things are now: divided at the edges of elements,
+        into so many segments or ones of this length [m]; in grout from where to where along it [m]; plate: the head is
+        tied to the rock. group: that its elements and nodes are put into."""
+        if group is None and set is not None:
+            raise TypeError("set goes with group")
+        given = {
+            "points": points, "segments": segments, "length": length, "grout": grout, "plate": plate,
+            "group": _group(group, set),
+        }  # fmt: skip
+        self._do("bolt create polyline", given)
+
+    def model(self, name: str, *, where: Where = None, **properties: float) -> None:
+        """The properties of elements of bolts: docs/pcdc_reference.md lists them; those of one bolt."""
+        self._do("bolt c-model", properties, where, self.kind, name)
+
+
+@commands
+class BoltNodes(Objects):
+    """Nodes of rock bolts: `sim.bolt_nodes["slip"]`, see `Objects`."""
+
+    _word, kind, pcdc = "bolt_nodes", g.BOLT_NODE, "bolt-node"
+
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        ax: Number | None = None,
+        ay: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Velocity [m/s] or acceleration [m/s2] from now on; components left out stay free."""
+        given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
+        self._carry_out("boundary", given, where, "bolt-node-constrain")
+
+    def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
+        """Force on each node of one bolt [N]."""
+        given = {"force_x": fx, "force_y": fy}
+        self._carry_out("boundary", given, where, "bolt-node-force-boundary-condition")
+
+    def remove_boundary(self, *, where: Where = None) -> None:
+        """Take back what was prescribed."""
+        self._carry_out("boundary remove", {}, where)
+
+
+@commands
 class Tables(Words):
     """Functions of time for conditions, or of a coordinate for properties; linear from point to point."""
 
@@ -530,7 +592,8 @@ class Histories(Words):
         every: int | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint" or of the "model": of one (id, or nearest to a point), or of
+        """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element" or of the "model": of one (id, or
+        nearest to a point), or of
         those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
@@ -609,6 +672,8 @@ class BlockCommands:
     faces: Faces
     joints: Joints
     nodes: Nodes
+    bolts: Bolts
+    bolt_nodes: BoltNodes
     tables: Tables
     fields: Fields
     histories: Histories
@@ -619,6 +684,7 @@ class BlockCommands:
         self._blocks = do = Orders(project)
         self.geometry, self.mesh = Geometry(do), Mesh(do)
         self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
+        self.bolts, self.bolt_nodes = Bolts(do), BoltNodes(do)
         self.tables, self.fields = Tables(do), Fields(do)
         self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)
 

@@ -1,4 +1,5 @@
-"""Pictures of blocks: cracks coloured by the way they broke, contours of the compressive stress and of plastic strain.
+"""Pictures of blocks: cracks coloured by the way they broke, axial forces of bolts, contours of the compressive stress
+and of plastic strain.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
 """
@@ -18,6 +19,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
+from hpcdem.post import bolts
 
 CRACKS, STRESS, PLASTIC = "cracks", "stress", "plastic"
 PANELS = (CRACKS, STRESS, PLASTIC)
@@ -172,6 +174,8 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
             shown = CONTOURS[panel]
             span = looks.ranges.get(panel) or shown.range(state)
             filled = contours(axes, state, shown, span)
+            if number == 0:  # no panel of cracks, which would show them
+                bolts.draw(axes, state)
             colours = figure.add_axes(
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
@@ -241,7 +245,7 @@ def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
     for rows, shade, part, word in _kinds(joint_state, mode):
         lines(axes, at[rows], shade, part * width)
         handles.insert(0, Line2D([], [], color=shade, linewidth=max(part * width, 0.9), label=word))
-    return handles
+    return handles + bolts.draw(axes, state)
 
 
 def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, float, str]]:

@@ -9,11 +9,11 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.surface_loads import ORDER, SurfaceLoads
+from hpcdem.physics.fdem.surface_loads import ORDER, SurfaceLoad, SurfaceLoads
 from tests.blocks.support import model, rectangle
 
 
-class Push:
+class Push(SurfaceLoad):
     """A force [N/m] on each corner of some elements, from the left end of the model."""
 
     def __init__(self, blocks: Blocks, name: str, elements: np.ndarray, force: float) -> None:

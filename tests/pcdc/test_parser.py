@@ -118,7 +118,24 @@ def test_values_of_the_wrong_kind(words, values, message):
     assert len(str(caught.value)) < 400
 
 
+BOLT = "den 7850 young 200e9 diam 0.02 s-s-r-b 1e9 g-t 0.01 c-r-g 1e6 c-g-b 1e6"
 REFUSED = [
+    ("bolt create polyline (0,0)", "a bolt goes through two points at least, got 1"),
+    ("bolt create polyline (0,0) (0,0) (1,1)", "two points of the bolt that follow each other are the same"),
+    ("bolt create polyline (0,0) (1,1) segments 4 length 0.1", "segments and length exclude each other"),
+    ("bolt create polyline (0,0) (1,1) segments 0", "read '0', expected a whole number above 0 for 'segments'"),
+    ("bolt create polyline (0,0) (1,1) grout -1 2", "read '-1', expected a number, not negative for 'grout'"),
+    ("bolt create line (0,0) (1,1)", "read 'line' after 'bolt create'"),
+    ("bolt c-model mech-e-p property density 1", "lacks y{oung}, d{iameter}"),
+    ("bolt c-model mech-e-p property spacing 0", "read '0', expected a number above 0 for 'spacing'"),
+    (f"bolt c-model mech-e-p property {BOLT} t-y-f 1e3 pre-f 2e3", "pretension_force must not be above"),
+    (f"bolt c-model mech-e-p property {BOLT} f-r-g 90", "read '90', expected an angle from 0 to 89"),
+    (f"bolt c-model mech-e-p property {BOLT} young table 'a' over x", "expected a number above 0"),
+    (f"bolt c-model mech-e-p property {BOLT} range geometry 'a'", "read 'geometry' after"),
+    (f"bolt c-model mech-e-p property {BOLT} range boundary", "read 'boundary' after"),
+    ("bolt c-model mech-iso-elastic property density 1", "read 'mech-iso-elastic' after 'bolt c-model'"),
+    ("bolt-n boundary b-n-c", "needs at least one of"),
+    ("bolt-n boundary b-n-c velocity-x 1 acceleration-x 1", "exclude each other"),
     ("", "the line ends where a command: model, geometry,"),
     ("foo bar", "read 'foo' after 'pcdc', expected one of model, geometry"),
     ("modle new", "did you mean 'model'?"),
@@ -207,8 +224,6 @@ LATER = [
     ("node boundary therm-s-b-c t 1", "heat comes later"),
     ("element-face boundary therm-const-h h-f 1", "heat comes later"),
     ("node initial temp 20", "heat comes later"),
-    ("bolt create polyline (0,0) (1,1)", "rock bolts come later"),
-    ("bolt-n boundary b-n-c", "rock bolts come later"),
     ("flow-node initial pressure 1", "fluid in fractures comes later"),
     ("model option hydraulic on", "fluid in fractures comes later"),
     ("model sub-step mechanical 1", "fluid in fractures comes later"),

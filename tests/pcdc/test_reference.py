@@ -108,6 +108,12 @@ def test_a_new_property_is_a_word_of_the_language(monkeypatch):
 
 
 def test_histories_record_what_the_commands_can():
-    kinds = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, "model": "model"}
+    kinds = {
+        "node": g.NODE,
+        "element": g.ELEMENT,
+        "joint": g.JOINT,
+        "model": "model",
+        **{kind: kind for kind in g.BOLTS},
+    }
     for kind, values in t.RECORDED.items():
         assert {python(name): unit for name, unit in values.items()} == UNITS[kinds[kind]]

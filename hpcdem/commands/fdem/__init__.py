@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import (
         assignments,
+        bolts,
         charts,
         checkpoints,
         coupling,
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem.project import Project
 
 __all__ = [
-    "Project", "assignments", "charts", "checkpoints", "coupling", "cracks", "frames", "geometry", "histories",
+    "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "frames", "geometry", "histories",
     "meshes", "queries", "settings", "steps", "summary",
 ]  # fmt: skip
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
 from hpcdem.pre.mesh import geometry
@@ -38,6 +39,13 @@ def everything(project: Project, kind: str, where: g.Range | None, null_too: boo
     return _Objects(project, kind, null_too).numbers if found is None else found
 
 
+def places(project: Project, kind: str) -> np.ndarray:
+    """(n, 2) [m] where the objects of a kind that are there are now: their middle."""
+    objects = _Objects(project, kind)
+    objects.now = True
+    return objects.places().mean(axis=1)
+
+
 def _why(objects: _Objects, where: g.Range) -> str:
     """What it chose was taken out, or which of several terms is fulfilled by nothing at all."""
     if not objects.null_too and not objects.project.alive.all():
@@ -52,6 +60,7 @@ def _why(objects: _Objects, where: g.Range) -> str:
 
 _ONLY_JOINTS = (g.Between, g.OnCrack)
 _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
+_NOT_BOLTS = (*_NOT_ELEMENTS, g.OnLayer)
 
 
 class _Objects:
@@ -64,6 +73,13 @@ class _Objects:
         self.mesh = mesh = project.whole_mesh()
         self.groups = project.groups
         self.now = False
+        if kind in g.BOLTS:
+            bolts = Bolts.there(project.blocks)
+            if bolts is None:
+                raise CommandError("there are no bolts yet: bolt create comes first")
+            self.bolts = bolts
+            self.numbers = np.arange(len(bolts) if kind == g.BOLT_NODE else len(bolts.first))
+            return
         there = np.ones(len(mesh.cells), bool) if null_too else project.alive
         if kind == g.ELEMENT:
             self.numbers = np.flatnonzero(there)
@@ -93,8 +109,12 @@ class _Objects:
 
     def places(self) -> np.ndarray:
         """(n, k, 2) [m] where x, y and geometry look for each: the centre of an element, a node, both ends of a face or
-        joint (of the element that it is numbered by)."""
+        joint (of the element that it is numbered by) or of an element of a bolt."""
         mesh = self.mesh
+        if self.kind in g.BOLTS:
+            at = self.bolts.nodes["x" if self.now else "origin"]
+            first = self.bolts.first
+            return at[:, None] if self.kind == g.BOLT_NODE else np.stack([at[first], at[first + 1]], axis=1)
         if not self.now:
             if self.kind == g.ELEMENT:
                 return centroids(mesh.points, mesh.cells[self.numbers])[:, None]
@@ -112,6 +132,8 @@ class _Objects:
     def mask(self, term: g.Term) -> np.ndarray:
         """(n,) bool: which of them a term holds for."""
         if isinstance(term, _ONLY_JOINTS) and self.kind != g.JOINT:
+            raise CommandError(f"{term} makes no sense for {self.kind}s")
+        if isinstance(term, _NOT_BOLTS) and self.kind in g.BOLTS:
             raise CommandError(f"{term} makes no sense for {self.kind}s")
         if isinstance(term, _NOT_ELEMENTS) and self.kind == g.ELEMENT:
             raise CommandError(f"{term} makes no sense for elements")

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hpcdem.commands.fdem.choices import chosen, everything
+from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, MODEL, UNITS, History
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
-from hpcdem.physics.fdem.groups import ELEMENT, NODE, Ids, Range
+from hpcdem.physics.fdem.groups import BOLTS, ELEMENT, NODE, Ids, Range
 
 FLUSH = 500
 """Records that wait at most before they go to the file."""
@@ -55,6 +55,9 @@ def create(
 
 
 def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
+    if kind in BOLTS:
+        numbers, middles = everything(project, kind, None), places(project, kind)
+        return nearest_point(middles, at, numbers)
     mesh, xy = project.whole_mesh(), project.positions()
     if kind == NODE:
         return nearest_point(xy, at, np.flatnonzero(~np.isnan(xy[:, 0])))

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
+from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE
 
@@ -32,13 +37,13 @@ UNITS = {
         "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
         "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
     },
+    **{kind: {name: unit for name, (unit, _) in of.items()} for kind, of in OF_BOLTS.items()},
     MODEL: {
         "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
         "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
         "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
-        "gravity_work": "J/m",
-        "outside_work": "J/m", "disc_work": "J/m", "energy_error": "J/m",
+        "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "energy_error": "J/m",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -72,8 +77,13 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "gravity_work": _energy("work_gravity"),
     "outside_work": _energy("work_outside"),
     "disc_work": _energy("work_discs"),
+    "bolt_work": _energy("work_bolts"),
     "energy_error": _energy("closing"),
 }
+_OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
+    "": lambda values: values[0], "sum": lambda values: math.fsum(values.tolist()),
+    "mean": lambda values: math.fsum(values.tolist()) / len(values), "minimum": np.min, "maximum": np.max,
+}  # fmt: skip
 ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")
 
 
@@ -110,7 +120,7 @@ class History:
         clock = blocks.clock
         if self.waits or (self.rows and self.rows[-1][0] == clock.step):
             return
-        if goes_on and self.value in _FORCES:
+        if goes_on and self.kind == NODE and self.value in _FORCES:
             probe = self._probe_of(blocks)
             probe.find()
             assert probe.local is not None
@@ -138,6 +148,9 @@ class History:
         """The number now. Collective, equal on all ranks."""
         if self.kind == MODEL:
             return _OF_MODEL[self.value](blocks)
+        if self.kind in OF_BOLTS:
+            values = Bolts.of(blocks).values(self.kind, self.value, np.array(self.numbers, np.int64))
+            return float(_OF_SEVERAL[self.how](values))
         return self._probe_of(blocks).reduced(self.how)
 
 

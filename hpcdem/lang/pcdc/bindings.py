@@ -184,6 +184,22 @@ def _face_condition(call: Call) -> None:
     fdem.assignments.stress(call.project, **given, where=call.where)
 
 
+# ---- bolts ---------------------------------------------------------------------------------------------------------
+
+
+def _bolt(call: Call) -> None:
+    words = {name: call.get(name) for name in ("segments", "length", "grout")}
+    fdem.bolts.create(call.project, call["points"], **words, plate=call.get("plate", False), **call.group())
+
+
+def _bolt_node_condition(call: Call) -> None:
+    given = _short(call.properties())
+    if call["model"] == "bolt-node-constrain":
+        fdem.bolts.velocity(call.project, **given, where=call.where)
+    else:
+        fdem.bolts.force(call.project, **given, where=call.where)
+
+
 # ---- records -------------------------------------------------------------------------------------------------------
 
 
@@ -272,6 +288,12 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),
     "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
+    "bolt create polyline": _bolt,
+    "bolt c-model": lambda c: fdem.bolts.model(c.project, c.properties(), c.where),
+    "bolt-element group": _group(g.BOLT_ELEMENT),
+    "bolt-node group": _group(g.BOLT_NODE),
+    "bolt-node boundary": _bolt_node_condition,
+    "bolt-node boundary remove": lambda c: fdem.bolts.remove_conditions(c.project, c.where),
     "table create": lambda c: fdem.assignments.table(c.project, c["name"], c["values"]),
     "field create": _field,
     "field delete": lambda c: fdem.assignments.remove_field(c.project, c["name"]),

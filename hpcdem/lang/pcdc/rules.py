@@ -39,6 +39,11 @@ def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | No
         )
 
 
+def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if "segments" in arguments and "length" in arguments:
+        raise ValueError("segments and length exclude each other: both say where a bolt is divided")
+
+
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if ("values" in arguments) == ("y" in arguments):
         raise ValueError("a curve has either y, the name of a history, or values")
@@ -96,6 +101,7 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 
 _RULES = {
+    "bolt create polyline": _bolt,
     "field create": _field,
     "model new": _dimensions,
     "model time-step": _time_step,

@@ -41,13 +41,13 @@ from hpcdem.lang.pcdc.kinds import (
     limited,
     varied,
 )  # fmt: skip
+from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
 
 THREE_D = "this version computes in two dimensions"
 FLOW = "fluid in fractures comes later; this version computes mechanics"
 HEAT = "heat comes later; this version computes mechanics"
 PROPPANT = "proppant comes later; this version computes mechanics"
-BOLTS = "rock bolts come later"
 
 
 @dataclass(frozen=True)
@@ -161,12 +161,12 @@ SET = Option("set", (STRING,), "the set of the group", default="'default'")
 
 
 def declared(
-    model: properties.Model, *notations: str, also: Mapping[str, tuple[str, ...]] | None = None
+    model: properties.Model, *notations: str, also: Mapping[str, tuple[str, ...]] | None = None, uniform: bool = False
 ) -> tuple[Option, ...]:
     """One option for each property of a model, with its limits, unit, text and default.
 
     notations: of those that may be shortened, in the order of the page, others follow by their names; also: see
-    `Option`.
+    `Option`; uniform: neither a table nor a field can stand for a number.
     """
     names = [Keyword(notation).name for notation in notations]
     more = [name for one in model.properties if (name := one.name.replace("_", "-")) not in names]
@@ -174,7 +174,8 @@ def declared(
     for notation, name in zip((*notations, *more), (*names, *more)):
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
-        kind = varied(limited(one.low, one.high, one.low_itself, one.unit))
+        kind = limited(one.low, one.high, one.low_itself, one.unit)
+        kind = kind if uniform else varied(kind)
         required = not (default or one.optional)
         options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
     return tuple(options)
@@ -325,6 +326,32 @@ _LATER_JOINT = (
           later=PROPPANT),
 )  # fmt: skip
 
+# ---- bolts (tables 19 to 21) ---------------------------------------------------------------------------------------
+
+BOLT = Model(
+    "mech{anical}-e{lastic}-p{lastic}", "19",
+    "Bars with one force along them, elastic and perfectly plastic, in grout that slips at its strength. Forces and "
+    "stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per length is "
+    "the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan friction-rock-grout) and pi "
+    "diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress across the bar in the rock if it is "
+    "pressure. Given again, the force in the bar stays, but for the difference of the pretension.",
+    declared(
+        BOLT_PROPERTIES, "den{sity}", "y{oung}", "d{iameter}", "t{ensile}-y{ield}-f{orce}",
+        "c{ompressive}-y{ield}-f{orce}", "t{ension}-f{ailure}-s{train}", "s{hear}-s{tiffness}-r{ock}-b{olt}",
+        "g{rout}-t{hickness}", "c{ohesion}-r{ock}-g{rout}", "c{ohesion}-g{rout}-b{olt}", "f{riction}-r{ock}-g{rout}",
+        "f{riction}-g{rout}-b{olt}", "spac{ing}", "pre{tension}-f{orce}", "d{amp}-f{actor}", uniform=True,
+    ),
+    of=BOLT_PROPERTIES,
+)  # fmt: skip
+BOLT_VELOCITY = Model(
+    "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
+    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True,
+)  # fmt: skip
+BOLT_FORCE = Model(
+    "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
+    "takes it.", FORCE.options, any_of=True,
+)  # fmt: skip
+
 # ---- RANGE ---------------------------------------------------------------------------------------------------------
 
 _FACES = ("element-face", "face-joint", "node")
@@ -336,7 +363,7 @@ RANGE_TERMS = (
     Option("y", (FLOAT, FLOAT), "y from ... to ..., in the mesh", "m"),
     Option("z", (FLOAT, FLOAT), "", later=THREE_D),
     Option("geom{etry}", (STRING,), "lies on the lines of the geometry layer; elements: their centre is inside of it; "
-           "in the mesh"),
+           "in the mesh", only=("element", *_FACES)),
     Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in it",
@@ -368,12 +395,18 @@ RECORDED = {
         "normal-stress-last": "Pa", "shear-stress-largest": "Pa", "shear-stress-first": "Pa",
         "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
     },
+    "bolt-node": {
+        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
+        "velocity-y": "m/s", "bond-force": "N/m", "slip": "m", "bond-state": "1", "reaction-x": "N",
+        "reaction-y": "N", "host": "1", "distance": "m",
+    },
+    "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "model": {
         "time": "s", "creep-time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1",
         "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
         "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
-        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "energy-error": "J/m",
+        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "energy-error": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -667,9 +700,33 @@ _OBJECTS = (
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True),
     Command("flow-n{ode}", "", later=FLOW),
-    Command("bolt", "", later=BOLTS),
-    Command("bolt-e{lement}", "", later=BOLTS),
-    Command("bolt-n{ode}", "", later=BOLTS),
+    Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
+            "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
+            "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "
+            "Bolts have no weight and no stiffness in bending.",
+            ("pcdc bolt create polyline (0,2) (0,5) length 0.1 grout 0.5 3 plate group 'roof'",
+             "pcdc bolt create polyline [points]"),
+            (_leading("points", VECTORS, "the points, from the head on; or a list of vectors", "m"),),
+            (Option("seg{ments}", (COUNT,), "elements of each straight part"),
+             Option("len{gth}", (POSITIVE,), "of an element, at most", "m", "to the edges of the elements of the mesh"),
+             Option("grout", (NOT_NEGATIVE, POSITIVE), "from where to where along the bolt there is grout; without "
+                    "the rest is free", "m", "all of it"),
+             Option("plate", (), "the first node is tied to the rock: a face plate"),
+             Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+                    more=(SET,)))),
+    Command("bolt c-m{odel}", "The properties of elements of bolts, which act from then on.",
+            ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
+             "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
+             "spacing 1.5 pretension-force 50e3 range group 'roof'",),
+            models=(BOLT,), ranged="bolt-element"),
+    _group_command("bolt-element", "bolt-e{lement}"),
+    _group_command("bolt-node", "bolt-n{ode}"),
+    Command("bolt-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
+            ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
+             "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
+            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node"),
+    Command("bolt-n{ode} bou{ndary} rem{ove}", "Takes it back.",
+            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node"),
 )  # fmt: skip
 
 _RECORDS = (

@@ -7,13 +7,14 @@ from typing import Any
 
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import Pending, TableName
-from hpcdem.lang.pcdc.table import BURGERS, COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, Command
+from hpcdem.lang.pcdc.table import BOLT, BOLT_VELOCITY, BURGERS, COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, Command
+from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, CONTACT, COHESIVE)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, CONTACT, COHESIVE, BOLT)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -77,7 +78,7 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
         kind, *way = given["type"]
         if kind == 2 and not (way and any(way[0])):
             raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
-    elif name == "mechanical-velocity-boundary-condition":
+    elif name in ("mechanical-velocity-boundary-condition", BOLT_VELOCITY.keyword.name):
         for axis in "xy":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
@@ -96,6 +97,8 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
+    if model is BOLT.of and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys():
+        model.complete(given)
     if model is properties.COHESIVE:
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
             pair = {name: given.get(name, 0.0) for name in (strength, energy)}
@@ -154,6 +157,10 @@ def _frames(arguments: Mapping[str, Any]) -> None:
     frames.file_name(arguments["file"])
 
 
+def _bolt(arguments: Mapping[str, Any]) -> None:
+    layout.checked(arguments["points"])
+
+
 def _fractures(arguments: Mapping[str, Any]) -> None:
     from hpcdem.commands.fdem import meshes
 
@@ -178,6 +185,7 @@ _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     **{f"geometry create {name}": _make_shape(name) for name in
        ("polyline", "polygon", "rectangle", "circle", "arc", "point")},
     "geometry create fractures": _fractures,
+    "bolt create polyline": _bolt,
     "mesh structured": _rectangle,
     "mesh equilateral": _equilateral,
     "table create": _table,

@@ -15,7 +15,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.physics.fdem import groups as g
 
-KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE}
+KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE, **{kind: kind for kind in g.BOLTS}}
 _VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}
 
 
@@ -75,7 +75,8 @@ class Model:
         return View(self, "joint", number)
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
-        """Numbers of the elements, nodes, joints or faces that are there: of a group (group=, set=), of a layer
+        """Numbers of the elements, nodes, joints, faces, bolt-elements or bolt-nodes that are there: of a group
+        (group=, set=), of a layer
         (geometry=), or x=(from, to), y= in the mesh; with present=True by where they are now."""
         return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
 

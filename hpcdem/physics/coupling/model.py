@@ -31,6 +31,7 @@ from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.fdem import build
 from hpcdem.physics.fdem import diagnostics as of_blocks
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 
 __all__ = ["Coupled"]
 
@@ -42,7 +43,7 @@ ON_DISCS, ON_FACES = 0, 1
 """The two sides of the work done across the contacts."""
 
 
-class Coupled:
+class Coupled(SurfaceLoad):
     """A model of particles and a model of blocks on the same ranks. Every method is collective.
 
     friction: of the contacts between them, the smaller of this and that of the disc counts; None: that of the disc.

@@ -48,6 +48,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     left = _forces_left_behind(sim, dying) if span > 0.0 and len(at) else None
     sim.before_change()
     sim.alive[at] = False
+    sim.surface_loads.elements_removed(at)
     faces = (4 * at[:, None] + np.arange(4)).reshape(-1)
     beside = sim.partner[faces]
     sim.open[faces[beside >= 0]] = True
@@ -268,6 +269,9 @@ def set_velocity(sim: Blocks, nodes: Numbers, vx: float | None = None, vy: float
 def reset_velocity(sim: Blocks, nodes: Numbers = None) -> None:
     """Velocities become zero."""
     set_velocity(sim, nodes, 0.0, 0.0)
+    if nodes is None:
+        for load in sim.surface_loads:
+            load.stop()
 
 
 def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:

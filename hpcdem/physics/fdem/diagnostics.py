@@ -442,7 +442,8 @@ def unbalanced_ratio(sim: Blocks) -> float:
     seen, local, own = sim.evaluate(), sim.local, sim.owned
     felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
     alone = seen.force[own].reshape(-1, 4, 2)[local.alone()].reshape(-1)
-    unbalanced = np.concatenate([np.abs(felt[:, :2] + outside).reshape(-1), np.abs(alone)])
+    of_loads = sim.surface_loads.balance()[0]
+    unbalanced = np.concatenate([np.abs(felt[:, :2] + outside).reshape(-1), np.abs(alone), *of_loads])
     total = exact_sum(contributing(sim, seen), sim.comm)
     return exact_sum(unbalanced, sim.comm) / total if total != 0.0 else 0.0
 
@@ -464,7 +465,7 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
         pull = np.where(real, pull, 0.0).reshape(-1, elements.FORCE)
         stress -= pull
         parts.append(pull)
-    return np.concatenate([np.abs(part).reshape(-1) for part in parts])
+    return np.concatenate([np.abs(part).reshape(-1) for part in (*parts, *sim.surface_loads.balance()[1])])
 
 
 def critical_time_step(sim: Blocks) -> float:
@@ -495,8 +496,8 @@ def energies(sim: Blocks) -> dict[str, float]:
     """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
-    in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity,
-    work_outside (loads and conditions), work_discs (particles that touch), commands (change of what is stored by
+    in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity, work_outside
+    (loads and conditions), work_discs (particles that touch), work_bolts, commands (change of what is stored by
     commands). closing: change of what is stored + lost - work - commands; relative: that over the largest of all.
     """
     if sim.budget is None:

@@ -82,6 +82,10 @@ def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: s
     """
     if cycles < 1 or not ratio > 0.0 or solver not in SOLVERS:
         raise CommandError(f"cycles and ratio must be positive, solver one of {', '.join(SOLVERS)}")
+    for load in sim.surface_loads:
+        raise CommandError(
+            f"the static solve knows no {load.name}: model solve relaxes blocks with them to equilibrium"
+        )
     yielding = np.flatnonzero(sim.yielding())
     if len(yielding):
         raise CommandError(

@@ -1,4 +1,4 @@
-"""Groups of elements, nodes, faces and joints, and ranges that choose among them.
+"""Groups of elements, nodes, faces, joints and parts of bolts, and ranges that choose among them.
 
 A group belongs to a set; an object is in one group of each set at most. Objects are numbered for the whole model
 (`connectivity`): a group is an ascending array of numbers, and knows neither ranks nor how many objects there are.
@@ -14,7 +14,9 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 
 ELEMENT, NODE, FACE, JOINT = "element", "node", "element-face", "face-joint"
-KINDS = (ELEMENT, NODE, FACE, JOINT)
+BOLT_ELEMENT, BOLT_NODE = "bolt-element", "bolt-node"
+BOLTS = (BOLT_ELEMENT, BOLT_NODE)
+KINDS = (ELEMENT, NODE, FACE, JOINT, *BOLTS)
 DEFAULT = "default"
 """The set of groups that name none."""
 

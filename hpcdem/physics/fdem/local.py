@@ -348,8 +348,8 @@ class Local:
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m per m] at each corner: half the largest penalty of each of its joints, and what the
-        contact of its free faces can have. And the dashpots (n_own, 4) [N s/m per m] of these contacts,
-        and of quiet faces.
+        contact of its free faces can have; and what surface loads bring. And the dashpots (n_own, 4) [N s/m per m] of
+        these contacts, and of quiet faces.
 
         Contact on a face of length L: P (3/2) (L / h + L / h_other), h: altitude on the face, h_other: the smallest
         altitude of all elements. Where elements are of one size that is about what there is; elsewhere the smallest
@@ -387,7 +387,9 @@ class Local:
             drag = drag + np.where(quiet, 0.5 * self._impedances(number)[0][:, None] * self.shapes.length[own], 0.0)
         before = np.where(np.arange(4) > 0, np.arange(4) - 1, corners[:, None] - 1)
         springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
-        return np.where(real, springs, 0.0), np.where(real, dashpots, 0.0)
+        springs = np.where(real, springs, 0.0)
+        sim.surface_loads.springs(sim, springs)
+        return springs, np.where(real, dashpots, 0.0)
 
     def critical_time_step(self, target: float = 0.0, mass: np.ndarray | None = None) -> float:
         """Stability limit times the safety factor [s]; infinite in static mode. target: raise `mass` (n, 4) until this
@@ -701,11 +703,14 @@ class Local:
     def _alone(self) -> np.ndarray:
         return ~self.special & (self.sim.the_mesh().cells[self.sim.number[self.sim.owned]] >= 0)
 
-    def stresses(self, at: np.ndarray | None = None, energies: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    def stresses(
+        self, at: np.ndarray | None = None, energies: bool = True, flow: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Stress (n_own, 4) xx, yy, xy, zz [Pa] and, unless they are not wanted, elastic energies (n_own,) [J/m] of the
-        owned elements, or of some of them (at: the how-manieth)."""
+        owned elements, or of some of them (at: the how-manieth). flow: after the flow of this moment, which the next
+        forces will see; without it, which looks at all elements, after that of the last step."""
         sim = self.sim
-        memory, s0, quad_s0 = self.flowed() if self.plastic else (None, self.s0, self.quad_s0)
+        memory, s0, quad_s0 = self.flowed() if self.plastic and flow else (None, self.s0, self.quad_s0)
         crept, s0 = self.crept(None if memory is None else s0) if self.creeps else (None, s0)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0

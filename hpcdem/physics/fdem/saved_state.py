@@ -14,6 +14,7 @@ from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
+from hpcdem.physics.block_physics import PHYSICS
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
@@ -55,6 +56,7 @@ def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
         "tally": tally.tolist(),
         "rebuilds": sim.rebuilds,
         "budget": sim.budget.state(sim) if sim.budget is not None else None,
+        "loads": sim.surface_loads.saved_state(),
         "columns": {name: values.shape[1] for name, values in sim.cold.items()},
         "mesh": None if mesh is None else {
             "groups": {s: {g: rows.tolist() for g, rows in of.items()} for s, of in mesh.groups.items()},
@@ -83,6 +85,7 @@ def tables(sim: Blocks) -> dict[str, Table]:
     if len(sim.born):
         born_at = sim.birthplace.reshape(-1, 8)
         tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
+    tables |= {name: _whole(of, root) for name, of in sim.surface_loads.saved_tables().items()}
     own = sim.owned
     number, x, v = sim.number[own], sim.x[own], sim.v[own]
     columns: dict[str, np.ndarray] = {"number": number.copy()}
@@ -190,6 +193,8 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     places = _take_rows(sim, state, tables)
     if state["budget"] is not None:
         sim.budget = Budget.restored(state["budget"], sim.comm.rank == 0)
+    for name, about in state.get("loads", {}).items():
+        PHYSICS[name]().restored(sim, about, tables)
     if state["closed"]:
         _close_as_it_was(sim, state, places)
     sim.rebuilds = state["rebuilds"]

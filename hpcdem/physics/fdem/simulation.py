@@ -159,6 +159,11 @@ class Blocks(State):
             mine = np.isin(self.number, at)
             self.cold["creep"][mine, creeping.K11 + KELVIN_STRAIN.index(name)] = value[self.number[mine]]
 
+    def remove_table(self, name: str) -> None:
+        if any(load.uses_table(name) for load in self.surface_loads):
+            raise CommandError(f"table '{name}' is used by a boundary condition")
+        super().remove_table(name)
+
     def option(
         self,
         dynamic: bool | None = None,
@@ -217,6 +222,7 @@ class Blocks(State):
                     raise
         with timers("halo"):
             halo.finish()
+        self.surface_loads.follow()
         if self.options.auto and self.options.dynamic and self.clock.step - rebuild_state.estimated >= AUTO:
             rebuild_state.dt, stale = 0.0, True
         if stale or outdated:
@@ -227,8 +233,9 @@ class Blocks(State):
         return request
 
     def check_start(self) -> None:
-        """CommandError if nothing has moved yet and bodies overlap, unless that was asked for; the model is closed.
-        Collective."""
+        """CommandError if a load lacks something, or nothing has moved yet and bodies overlap, unless that was asked
+        for; the model is closed. Collective."""
+        self.surface_loads.check_start()
         if self.untouched:
             overlaps.check(self, self.local)
 

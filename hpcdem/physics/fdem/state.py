@@ -123,6 +123,7 @@ class State(ModelDefinition, Model):
     def clear(self) -> None:
         """Start a new model: no mesh, step 0, default options."""
         self.restart()
+        self.surface_loads.mesh_replaced()
         self.clear_definition()
         self.rebuild_state = ListState()
         self.creep = Creep()

@@ -1,8 +1,10 @@
-"""Forces on free faces that other physics compute: discs that touch them, later fluid, heat, bolts."""
+"""Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, later fluid and
+heat."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Protocol
+from collections.abc import Iterator
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,22 +14,64 @@ ORDER = ("discs", "fluid", "heat", "bolts")
 """In which they are added up, whoever came first: sums keep their bits."""
 
 
-class SurfaceLoad(Protocol):
-    """What blocks ask of one; `name` is one of ORDER."""
+class SurfaceLoad:
+    """What blocks ask of one; `name` is one of ORDER. of_mesh: it goes with the mesh that it was made for."""
 
     name: ClassVar[str]
+    of_mesh: ClassVar[bool] = False
 
     def corners(self, blocks: Any) -> np.ndarray:
         """(n_own, 4) bool: corners of owned elements that may get such a force."""
+        raise NotImplementedError
 
     def add_to(self, applied: np.ndarray) -> None:
         """Add the present ones to what is applied to corners (n, 8), in storage order [N/m]. Not collective."""
+        raise NotImplementedError
 
     def storage_rebuilt(self) -> None:
         """Elements have other rows or owners. Collective."""
+        raise NotImplementedError
 
     def mesh_replaced(self) -> None:
         """There is another mesh."""
+        raise NotImplementedError
+
+    def springs(self, blocks: Any) -> np.ndarray | None:
+        """(n_own, 4) stiffness [N/m per m] that it brings to corners of owned elements, for masses and time step."""
+        return None
+
+    def check_start(self) -> None:
+        """CommandError if no step can be done with it. Not collective."""
+
+    def follow(self) -> None:
+        """The elements have moved by a step; their new positions are there, ghosts too. Collective."""
+
+    def balance(self) -> tuple[np.ndarray, np.ndarray]:
+        """This rank's share of its own unbalanced and contributing forces [N/m], for the ratio of the model."""
+        return np.empty(0), np.empty(0)
+
+    def work_done(self) -> float:
+        """On the blocks since the account of energy began, as far as it keeps an account by itself; equal on all
+        ranks [J/m]."""
+        return 0.0
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """These elements are taken out; the model is open. Collective."""
+
+    def uses_table(self, name: str) -> bool:
+        """Whether something of it follows this table of time. Not collective."""
+        return False
+
+    def stop(self) -> None:
+        """All velocities become zero. Not collective."""
+
+    def saved_state(self) -> dict[str, Any] | None:
+        """What a checkpoint holds of it, as JSON values; None: it is saved elsewhere. Collective."""
+        return None
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Columns that a checkpoint holds of it, by the name of their table; equal on all ranks."""
+        return {}
 
 
 class SurfaceLoads:
@@ -38,6 +82,9 @@ class SurfaceLoads:
 
     def __bool__(self) -> bool:
         return bool(self._loads)
+
+    def __iter__(self) -> Iterator[SurfaceLoad]:
+        return iter(self._loads)
 
     def __contains__(self, name: str) -> bool:
         return any(load.name == name for load in self._loads)
@@ -68,6 +115,47 @@ class SurfaceLoads:
             load.storage_rebuilt()
 
     def mesh_replaced(self) -> None:
-        """There is another mesh."""
+        """There is another mesh, or none."""
         for load in self._loads:
             load.mesh_replaced()
+        self._loads = [load for load in self._loads if not load.of_mesh]
+
+    def springs(self, blocks: Any, out: np.ndarray) -> None:
+        """Add the stiffness that all of them bring to corners of owned elements, out (n_own, 4) [N/m per m]."""
+        for load in self._loads:
+            found = load.springs(blocks)
+            if found is not None:
+                out += found
+
+    def check_start(self) -> None:
+        """CommandError if no step can be done with them. Not collective."""
+        for load in self._loads:
+            load.check_start()
+
+    def follow(self) -> None:
+        """The elements have moved by a step. Collective."""
+        for load in self._loads:
+            load.follow()
+
+    def balance(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """This rank's share of their own unbalanced and contributing forces [N/m]. Not collective."""
+        found = [load.balance() for load in self._loads]
+        return [one for one, _ in found], [other for _, other in found]
+
+    def work_done(self) -> float:
+        """On the blocks, by those that keep an account by themselves [J/m]. Not collective."""
+        return sum(load.work_done() for load in self._loads)
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """These elements are taken out; the model is open. Collective."""
+        for load in self._loads:
+            load.elements_removed(elements)
+
+    def saved_state(self) -> dict[str, dict[str, Any]]:
+        """By name what a checkpoint holds of them, as JSON values. Collective."""
+        found = {load.name: load.saved_state() for load in self._loads}
+        return {name: state for name, state in found.items() if state is not None}
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Columns that a checkpoint holds of them, by the name of their table; equal on all ranks."""
+        return {name: columns for load in self._loads for name, columns in load.saved_tables().items()}

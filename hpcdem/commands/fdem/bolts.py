@@ -1,0 +1,80 @@
+"""Rock bolts: where they are, their properties, what is prescribed at their nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts import kernels
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE, DEFAULT, Range
+
+Number = float | str
+"""A number, or the name of a table of time."""
+
+
+def create(
+    project: Project,
+    points: Sequence[tuple[float, float]],
+    segments: int | None = None,
+    length: float | None = None,
+    grout: tuple[float, float] | None = None,
+    plate: bool = False,
+    group: str | None = None,
+    set_name: str = DEFAULT,
+) -> None:
+    """Install a bolt, as things are now, see `Bolts.create`; group: that its elements and nodes are put into."""
+    blocks = project.ready()
+    known = Bolts.there(blocks)
+    bolts = Bolts.of(blocks)
+    try:
+        nodes, elements = bolts.create(points, segments, length, grout, plate)
+    except CommandError:
+        if known is None:
+            blocks.surface_loads.remove(bolts)
+        raise
+    if group is not None:
+        project.groups[BOLT_NODE].assign(nodes, group, set_name)
+        project.groups[BOLT_ELEMENT].assign(elements, group, set_name)
+
+
+def model(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+    """Properties of elements of bolts (physics.bolts.properties)."""
+    elements = everything(project, BOLT_ELEMENT, where)
+    Bolts.of(project.ready()).assign(elements, properties)
+
+
+def velocity(
+    project: Project,
+    vx: Number | None = None,
+    vy: Number | None = None,
+    ax: Number | None = None,
+    ay: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Velocity [m/s] or acceleration [m/s2] of nodes of bolts; a text is the name of a table of time."""
+    changes: dict[str, Number] = {}
+    for axis, speed, push in (("x", vx, ax), ("y", vy, ay)):
+        if speed is not None and push is not None:
+            raise CommandError(f"velocity and acceleration in {axis} cannot both be prescribed")
+        if speed is not None:
+            changes[f"does_{axis}"], changes[f"at_{axis}"] = kernels.VELOCITY, speed
+        if push is not None:
+            changes[f"does_{axis}"], changes[f"at_{axis}"] = kernels.ACCELERATION, push
+    nodes = everything(project, BOLT_NODE, where)
+    Bolts.of(project.ready()).condition(nodes, **changes)
+
+
+def force(project: Project, fx: Number | None = None, fy: Number | None = None, where: Range | None = None) -> None:
+    """Force [N] on each of these nodes of one bolt."""
+    given = {"force_x": fx, "force_y": fy}
+    nodes = everything(project, BOLT_NODE, where)
+    Bolts.of(project.ready()).condition(nodes, **{name: value for name, value in given.items() if value is not None})
+
+
+def remove_conditions(project: Project, where: Range | None = None) -> None:
+    """Nodes of bolts are free again."""
+    nodes = everything(project, BOLT_NODE, where)
+    Bolts.of(project.ready()).remove_conditions(nodes)

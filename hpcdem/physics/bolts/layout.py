@@ -1,0 +1,131 @@
+"""Where the nodes of a bolt are, and in which elements: functions of the present mesh."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+
+SHORTEST = 0.1
+"""Crossings of edges that are nearer to each other than this part of the mean edge count once."""
+INSIDE = 1e-9
+"""Barycentric coordinates of points on an edge are as low as this below zero."""
+
+
+def checked(points: Sequence[tuple[float, float]]) -> np.ndarray:
+    """The points (k, 2) [m] of a bolt. CommandError unless two at least, finite, each away from the one before."""
+    line = np.asarray(points, np.float64).reshape(-1, 2)
+    if len(line) < 2:
+        raise CommandError(f"a bolt goes through two points at least, got {len(line)}")
+    if not np.isfinite(line).all():
+        raise CommandError("the points of a bolt must be finite")
+    twice = np.flatnonzero((np.diff(line, axis=0) == 0.0).all(axis=1))
+    if len(twice):
+        x, y = line[twice[0]]
+        raise CommandError(f"two points of the bolt that follow each other are the same, ({x:g},{y:g})")
+    return line
+
+
+def split(
+    line: np.ndarray, corners: np.ndarray, cells: np.ndarray, mean_edge: float, segments: int | None,
+    length: float | None,
+) -> np.ndarray:  # fmt: skip
+    """Nodes (n, 2) [m] along a line: each straight part in so many segments, or in ones no longer than length [m], or
+    at the edges of elements, corners (ne, 4, 2) of cells (ne, 4)."""
+    nodes = [line[:1]]
+    for a, b in pairwise(line):
+        span = float(np.hypot(*(b - a)))
+        if segments is None and length is None:
+            t = _crossings(a, b, corners, cells)
+            near = SHORTEST * mean_edge / span
+            kept = [0.0]
+            for one in t.tolist():
+                if one - kept[-1] > near and 1.0 - one > near:
+                    kept.append(one)
+            at = np.array([*kept[1:], 1.0])
+        else:
+            count = segments if segments is not None else max(1, math.ceil(span / float(length or span) - 1e-9))
+            at = np.arange(1, count + 1) / count
+        nodes.append(a + at[:, None] * (b - a))
+        nodes[-1][-1] = b
+    return np.concatenate(nodes)
+
+
+def _crossings(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Parts (k,) of the way from a to b, ascending, at which it crosses edges of elements."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    real = (cells >= 0)[:, :, None]
+    near = (np.where(real, corners, np.inf).min(axis=1) <= high) & (np.where(real, corners, -np.inf).max(axis=1) >= low)
+    some = np.flatnonzero(near.all(axis=1))
+    of, four = corners[some], cells[some, 3] >= 0
+    after = np.stack([of[:, 1], of[:, 2], np.where(four[:, None], of[:, 3], of[:, 0]), of[:, 0]], axis=1)
+    use = np.ones((len(some), 4), bool)
+    use[:, 3] = four
+    p, q = of[use], after[use]
+    d, s = b - a, q - p
+    cross = d[0] * s[:, 1] - d[1] * s[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        w = p - a
+        t = (w[:, 0] * s[:, 1] - w[:, 1] * s[:, 0]) / cross
+        u = (w[:, 0] * d[1] - w[:, 1] * d[0]) / cross
+    hit = (cross != 0.0) & (t > 0.0) & (t < 1.0) & (u >= -INSIDE) & (u <= 1.0 + INSIDE)
+    return np.sort(t[hit])
+
+
+def hosts(
+    points: np.ndarray, corners: np.ndarray, cells: np.ndarray, alive: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """For points (n, 2) [m] the lowest element in which each is, -1: none, and the weights of its corners (n, 4);
+    corners (ne, 4, 2) [m] of cells (ne, 4), of which some are there."""
+    host, weight = np.full(len(points), -1, np.int64), np.zeros((len(points), 4))
+    real = (cells >= 0)[:, :, None]
+    low = np.where(real, corners, np.inf).min(axis=1)
+    high = np.where(real, corners, -np.inf).max(axis=1)
+    slack = INSIDE * (np.nanmax(high - low, initial=0.0) if len(cells) else 0.0)
+    low, high = low - slack, high + slack
+    here = np.flatnonzero(alive & (low <= points.max(axis=0)).all(axis=1) & (high >= points.min(axis=0)).all(axis=1))
+    low, high = low[here], high[here]
+    for i, at in enumerate(points):
+        for e in here[((low <= at) & (at <= high)).all(axis=1)].tolist():
+            found = coordinates(at, corners[e], bool(cells[e, 3] >= 0))
+            if found.min() >= -INSIDE:
+                host[i], weight[i] = e, found
+                break
+    return host, weight
+
+
+def coordinates(at: np.ndarray, corners: np.ndarray, four: bool) -> np.ndarray:
+    """Weights (4,) of the corners (4, 2) of an element at a point, from inside or outside: barycentric in the triangle,
+    of a quad in the half of it that holds the point best."""
+    best = np.full(4, -math.inf)
+    for half in ((0, 1, 2), (0, 2, 3)) if four else ((0, 1, 2),):
+        a, b, c = corners[list(half)]
+        u, w, p = b - a, c - a, at - a
+        double = u[0] * w[1] - u[1] * w[0]
+        second, third = (p[0] * w[1] - p[1] * w[0]) / double, (u[0] * p[1] - u[1] * p[0]) / double
+        found = np.zeros(4)
+        found[list(half)] = 1.0 - second - third, second, third
+        if found.min() > best.min():
+            best = found
+    return best
+
+
+def carriers(bar: np.ndarray, arc: np.ndarray, host: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Who carries nodes without a host across the bar: the nodes with one before and after them on the same bar (n, 2),
+    -1: none, and the share of the second (n,), by the distance arc along the bar."""
+    carrier, share = np.full((len(bar), 2), -1, np.int64), np.zeros(len(bar))
+    for one in np.unique(bar[host < 0]).tolist():
+        members = np.flatnonzero(bar == one)
+        held = members[host[members] >= 0]
+        for i in members[host[members] < 0].tolist():
+            before, after = held[held < i], held[held > i]
+            if len(before) and len(after):
+                carrier[i] = before[-1], after[0]
+                share[i] = (arc[i] - arc[before[-1]]) / (arc[after[0]] - arc[before[-1]])
+            elif len(held):
+                carrier[i, 0] = before[-1] if len(before) else after[0]
+    return carrier, share

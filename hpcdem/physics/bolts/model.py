@@ -1,0 +1,643 @@
+"""Rock bolts as a load on blocks: what is known of them, and their step.
+
+All ranks have all bolts: per step they hand each other where the rock is at the nodes, one reduction of integers, and
+then compute the same. So the bits depend on neither ranks nor threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts import kernels, layout
+from hpcdem.physics.bolts.properties import BOLT
+from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE
+from hpcdem.physics.fdem.local import ALPHA
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+Number = float | str
+"""A number, or the name of a table over model time."""
+MARGIN = 1.25
+"""Reserve of the fictitious masses of the static mode, as for elements."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is prescribed at nodes of bolts: does_x, does_y (kernels.FREE, VELOCITY, ACCELERATION) with its value; the
+    force [N] on one bolt."""
+
+    does_x: int = kernels.FREE
+    at_x: Number = 0.0
+    does_y: int = kernels.FREE
+    at_y: Number = 0.0
+    force_x: Number = 0.0
+    force_y: Number = 0.0
+
+
+NODE_QUANTITIES: dict[str, tuple[str, str]] = {
+    "position_x": ("m", "position in x"),
+    "position_y": ("m", "position in y"),
+    "displacement_x": ("m", "displacement in x since it was installed"),
+    "displacement_y": ("m", "displacement in y since it was installed"),
+    "velocity_x": ("m/s", "velocity in x"),
+    "velocity_y": ("m/s", "velocity in y"),
+    "bond_force": ("N/m", "force of the grout per length of one bolt, towards its last point"),
+    "slip": ("m", "slip of the bar in the grout, towards its last point"),
+    "bond_state": ("1", "slips 1, has slipped 2"),
+    "reaction_x": ("N", "force in x by which conditions act on one bolt"),
+    "reaction_y": ("N", "force in y by which conditions act on one bolt"),
+    "host": ("1", "element that holds the node, -1: none"),
+    "distance": ("m", "distance from the first point along the bolt, as installed"),
+}
+ELEMENT_QUANTITIES: dict[str, tuple[str, str]] = {
+    "axial_force": ("N", "axial force of one bolt, tension positive"),
+    "axial_strain": ("1", "lengthening since it was installed, over its length"),
+    "plastic_strain": ("1", "plastic part of it"),
+    "bolt_state": ("1", "yields in tension 1, in compression 2; did so before 4, 8; broken 16"),
+}
+QUANTITIES = {BOLT_NODE: NODE_QUANTITIES, BOLT_ELEMENT: ELEMENT_QUANTITIES}
+"""What can be asked of nodes and elements of bolts: unit and meaning."""
+
+_NODES: dict[str, tuple[type, int]] = {
+    "bar": (np.int64, 0), "host": (np.int64, 0), "plate": (np.int64, 0), "condition": (np.int64, 0),
+    "bond_state": (np.int64, 0), "arc": (np.float64, 0), "bond": (np.float64, 0), "slip": (np.float64, 0),
+    "x": (np.float64, 2), "v": (np.float64, 2), "origin": (np.float64, 2), "point": (np.float64, 2),
+    "tangent": (np.float64, 2), "reaction": (np.float64, 2), "grout": (np.float64, 2), "weight": (np.float64, 4),
+}  # fmt: skip
+"""Columns of the nodes, by type and width. bar: which bolt; condition: row; arc: distance along the bolt [m]; bond:
+force of the grout [N/m]; point: where the rock is [m]; tangent: unit vector along the bolt; grout: length in
+grout of the halves of the elements before and after the node [m]; weight: of the corners of the host."""
+_ELEMENTS: dict[str, tuple[type, int]] = {
+    "row": (np.int64, 0), "state": (np.int64, 0), "length": (np.float64, 0), "force": (np.float64, 0),
+    "plastic": (np.float64, 0),
+}  # fmt: skip
+"""Columns of the elements. row: of the properties, 0: none yet; length: as installed [m]; force: axial [N/m]; plastic:
+lengthening [m]."""
+_PROPERTIES = tuple(one.name for one in BOLT.properties)
+
+
+class Bolts(SurfaceLoad):
+    """All bolts of a model of blocks. nodes, elements: columns by name, equal on all ranks; the elements of a bolt lie
+    between nodes that follow each other. Methods are collective unless they say otherwise; CommandError, alike on all
+    ranks, for what makes no sense."""
+
+    name: ClassVar[str] = "bolts"
+    of_mesh: ClassVar[bool] = True
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        self.nodes = {name: _empty(0, *kind) for name, kind in _NODES.items()}
+        self.elements = {name: _empty(0, *kind) for name, kind in _ELEMENTS.items()}
+        self.rows: list[tuple[float, ...]] = []
+        self.conditions: list[Condition] = [Condition()]
+        self.work = np.zeros(kernels.WORK)
+        self.commands = 0.0
+        self._stored_at_start = 0.0
+        self._account: Any = None
+        self._dynamic = blocks.options.dynamic
+        self._prepared_for: tuple[float, bool, float] | None = None
+        self._told = 0.0
+        self._arrange()
+
+    def __len__(self) -> int:
+        return len(self.nodes["bar"])
+
+    @staticmethod
+    def there(blocks: Blocks) -> Bolts | None:
+        """Those of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, Bolts)), None)
+
+    @staticmethod
+    def of(blocks: Blocks) -> Bolts:
+        """Those of a model, made on the first call. Not collective."""
+        found = Bolts.there(blocks)
+        if found is None:
+            found = Bolts(blocks)
+            blocks.surface_loads.add(found)
+        return found
+
+    # ---- what is said --------------------------------------------------------------------------------------------
+
+    def create(
+        self,
+        points: Sequence[tuple[float, float]],
+        segments: int | None = None,
+        length: float | None = None,
+        grout: tuple[float, float] | None = None,
+        plate: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Install a bolt along these points [m], as things are now; returns the numbers of its nodes and elements.
+
+        segments: of each straight part; length: of an element at most [m]; else nodes are at the edges of elements.
+        grout: from where to where along the bolt there is grout [m]. plate: the first node is tied to the rock.
+        """
+        blocks, line = self.blocks, layout.checked(points)
+        if segments is not None and length is not None:
+            raise CommandError("segments and length exclude each other: both say where a bolt is divided")
+        if (segments is not None and segments < 1) or (length is not None and not 0.0 < length < math.inf):
+            raise CommandError("a bolt has one segment at least, of a length above 0")
+        total = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        begin, end = (0.0, total) if grout is None else grout
+        if not 0.0 <= begin < end or begin >= total:
+            raise CommandError(f"grout goes from a distance of 0 or more to a larger one on a bolt of {total:g} m, "
+                               f"got {begin:g} to {end:g}")  # fmt: skip
+        cells = blocks.the_mesh().cells
+        corners = diagnostics.corner_values(blocks, "position").reshape(-1, 4, 2)
+        x = layout.split(line, corners, np.where(blocks.alive[:, None], cells, -1), blocks.mean_edge, segments, length)
+        host, weight = layout.hosts(x, corners, cells, blocks.alive)
+        held = np.flatnonzero(host >= 0)
+        if not len(held):
+            raise CommandError("no node of the bolt is in an element")
+        if plate and host[0] < 0:  # in front of the face: tied to the element in which the bolt begins
+            e = int(host[held[0]])
+            host[0], weight[0] = e, layout.coordinates(x[0], corners[e], bool(cells[e, 3] >= 0))
+        n, way = len(x), np.diff(x, axis=0)
+        span = np.hypot(way[:, 0], way[:, 1])
+        arc = np.concatenate([[0.0], np.cumsum(span)])
+        middle = 0.5 * (arc[:-1] + arc[1:])
+
+        def within(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+            return np.maximum(np.minimum(b, end) - np.maximum(a, begin), 0.0)
+
+        new = {name: _empty(n, *kind) for name, kind in _NODES.items()}
+        new["bar"][:] = self.nodes["bar"].max(initial=-1) + 1
+        new["host"][:], new["weight"][:], new["arc"][:], new["plate"][0] = host, weight, arc, plate
+        new["x"][:], new["origin"][:], new["point"][:] = x, x, x
+        new["grout"][1:, 0], new["grout"][:-1, 1] = within(middle, arc[1:]), within(arc[:-1], middle)
+        seen = np.zeros((n, 3))
+        kernels.host_points(held, held, weight, np.ascontiguousarray(corners[host].reshape(-1, 8)), seen)
+        new["point"][held] = seen[held, :2]
+        speed = diagnostics.corner_values(blocks, "velocity").reshape(-1, 4, 2)
+        new["v"][held] = _at(weight[held], cells[host[held]], speed[host[held]])
+        bars = {name: _empty(n - 1, *kind) for name, kind in _ELEMENTS.items()}
+        bars["length"][:] = span
+        numbers = np.arange(len(self), len(self) + n), len(self.elements["row"]) + np.arange(n - 1)
+        blocks.before_change()
+        self.nodes = {name: np.concatenate([old, new[name]]) for name, old in self.nodes.items()}
+        self.elements = {name: np.concatenate([old, bars[name]]) for name, old in self.elements.items()}
+        self._arrange()
+        blocks.changed()
+        free = int((host < 0).sum())
+        if blocks.log is not None and free:
+            blocks.log.info(f"{free} of the {n} nodes of the bolt are in no element: no grout holds them")
+        return numbers
+
+    def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
+        """Give elements (k,) properties. Those that have some take the new ones: the force they carry stays, but for
+        the difference of the pretension."""
+        values = BOLT.complete(given)
+        self._check_spacing(elements, values["spacing"])
+        row = tuple(values.values())
+        blocks = self.blocks
+        blocks.before_change()
+        stored = self._stored() if self._account is not None else 0.0
+        before = self._column("pretension_force")[elements]
+        if row not in self.rows:
+            self.rows.append(row)
+        bars = self.elements
+        bars["row"][elements] = self.rows.index(row) + 1
+        whole = elements[bars["state"][elements] & kernels.RUPTURED == 0]
+        more = (values["pretension_force"] - before) / values["spacing"]
+        bars["force"][whole] += more[bars["state"][elements] & kernels.RUPTURED == 0]
+        self._arrange()
+        if self._account is not None:
+            self.commands += self._stored() - stored
+        blocks.changed()
+
+    def _check_spacing(self, elements: np.ndarray, spacing: float) -> None:
+        """One bolt has one spacing from the beginning: what it carries is divided by it."""
+        bar, first = self.nodes["bar"], self.first
+        known = self.elements["row"] > 0
+        others = known & np.isin(bar[first], bar[first[elements]]) & (self._column("spacing") != spacing)
+        others[elements] &= known[elements]
+        if others.any():
+            e = int(np.flatnonzero(others)[0])
+            raise CommandError(
+                f"bolt-element {e} has the spacing {self._column('spacing')[e]:g} m: all of a bolt has one spacing, "
+                f"which stays; got {spacing:g}"
+            )
+
+    def condition(self, nodes: np.ndarray, **changes: Any) -> None:
+        """Prescribe components of nodes (k,), see `Condition`; the others stay as they are."""
+        for value in changes.values():
+            if isinstance(value, str) and value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+            if not isinstance(value, str) and not math.isfinite(value):
+                raise CommandError(f"a condition of a bolt must be finite, got {value:g}")
+        self.blocks.before_change()
+        column = self.nodes["condition"]
+        for row in np.unique(column[nodes]).tolist():
+            wanted = replace(self.conditions[row], **changes)
+            if wanted not in self.conditions:
+                self.conditions.append(wanted)
+            column[nodes[column[nodes] == row]] = -1 - self.conditions.index(wanted)
+        column[column < 0] = -1 - column[column < 0]
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray) -> None:
+        """Take back what was prescribed at nodes (k,)."""
+        self.blocks.before_change()
+        self.nodes["condition"][nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def uses_table(self, name: str) -> bool:
+        """Whether a node follows this table. Not collective."""
+        used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
+        return any(name in asdict(one).values() for one in used)
+
+    def stop(self) -> None:
+        """Velocities along the bolts become zero. Not collective."""
+        self.nodes["v"][:] = 0.0
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+
+    def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
+        """A quantity of `QUANTITIES` of nodes or elements (None: all), on all ranks. Not collective."""
+        if name not in QUANTITIES[kind]:
+            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
+        found = self._node_value(name) if kind == BOLT_NODE else self._element_value(name)
+        return np.asarray(found if numbers is None else found[numbers], np.float64)
+
+    def _node_value(self, name: str) -> np.ndarray:
+        nodes = self.nodes
+        stem, _, axis = name.rpartition("_")
+        c = 0 if axis == "x" else 1
+        match stem:
+            case "position":
+                return nodes["x"][:, c].copy()
+            case "displacement":
+                return nodes["x"][:, c] - nodes["origin"][:, c]
+            case "velocity":
+                return nodes["v"][:, c].copy()
+            case "reaction":
+                return nodes["reaction"][:, c] * self._node_spacing
+        if name == "bond_force":
+            length = nodes["grout"].sum(axis=1)
+            force = nodes["bond"] * self._node_spacing
+            return np.divide(force, length, out=np.zeros(len(force)), where=length > 0.0)
+        return nodes[{"distance": "arc"}.get(name, name)].copy()
+
+    def _element_value(self, name: str) -> np.ndarray:
+        bars = self.elements
+        match name:
+            case "axial_force":
+                return bars["force"] * self._column("spacing", 1.0)
+            case "axial_strain":
+                return (self._length - bars["length"]) / bars["length"]
+            case "plastic_strain":
+                return bars["plastic"] / bars["length"]
+        return bars["state"].copy()
+
+    def columns(self) -> dict[str, dict[str, np.ndarray]]:
+        """What frames hold: "nodes" with the number of their bolt, "elements" with their first node. Not collective."""
+        found = {kind: {name: self.values(kind, name) for name in of} for kind, of in QUANTITIES.items()}
+        return {
+            "nodes": {"bolt": self.nodes["bar"].copy(), **found[BOLT_NODE]},
+            "elements": {"first_node": self.first.copy(), **found[BOLT_ELEMENT]},
+        }
+
+    def energies(self) -> dict[str, float]:
+        """Energy of the bolts [J/m] since the account began: stored: in bars and grout and as motion, and at_start;
+        lost in bars (yield, rupture), in the grout (slip), by dashpots; work_on_rock, work_of_conditions, commands
+        (pretension); closing: what does not add up, relative: that over the largest. Not collective."""
+        work, stored = self.work, self._stored()
+        found = {
+            "stored": stored, "at_start": self._stored_at_start, "lost_in_bars": float(work[kernels.IN_BARS]),
+            "lost_in_grout": float(work[kernels.IN_GROUT]), "lost_by_dashpots": float(work[kernels.IN_DASHPOTS]),
+            "work_on_rock": float(work[kernels.ON_ROCK]), "work_of_conditions": float(work[kernels.BY_CONDITIONS]),
+            "commands": self.commands,
+        }  # fmt: skip
+        given = found["work_of_conditions"] + self.commands
+        taken = float(work[[kernels.ON_ROCK, kernels.IN_BARS, kernels.IN_GROUT, kernels.IN_DASHPOTS]].sum())
+        largest = max(map(abs, found.values()))
+        found["closing"] = stored - self._stored_at_start + taken - given
+        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
+        return found
+
+    def _stored(self) -> float:
+        bars, nodes = self.elements, self.nodes
+        soft, grout = self._element_table[:, kernels.STIFFNESS], self._node_table[:, kernels.GROUT]
+        parts = [
+            np.divide(bars["force"] ** 2, 2.0 * soft, out=np.zeros(len(soft)), where=soft > 0.0),
+            np.divide(nodes["bond"] ** 2, 2.0 * grout, out=np.zeros(len(grout)), where=grout > 0.0),
+        ]
+        if self._dynamic:
+            self._set_masses()
+            parts.append(self._kinetic())
+        return math.fsum(np.concatenate(parts).tolist())
+
+    def _kinetic(self) -> np.ndarray:
+        """m w- w+ / 2 of nodes that move by themselves, of the velocities before and after this moment (energy.py); of
+        those that are led m w- w- / 2."""
+        nodes, table = self.nodes, self._node_table
+        mass = table[:, kernels.MASS]
+        w = (nodes["v"] * self._tangent).sum(axis=1)
+        f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
+        drag, kick = 0.5 * table[:, kernels.DRAG] * self.blocks.clock.dt, self.blocks.clock.dt * f
+        after = np.divide((mass - drag) * w + kick, mass + drag, out=w.copy(), where=~self._led() & (mass > 0.0))
+        own = (nodes["plate"] == 0) | ~self.hosted
+        return np.where(own, 0.5 * mass * w * after, 0.0)
+
+    def _led(self) -> np.ndarray:
+        """(n,) bool: nodes with a prescribed velocity or acceleration."""
+        rows = [(one.does_x, one.does_y) for one in self.conditions]
+        return (np.array(rows) != kernels.FREE).any(axis=1)[self.nodes["condition"]]
+
+    # ---- tables of the kernels -------------------------------------------------------------------------------------
+
+    def _column(self, name: str, otherwise: float = 0.0) -> np.ndarray:
+        """A property of all elements (m,), `otherwise` where there is no model yet."""
+        k = _PROPERTIES.index(name)
+        return np.array([otherwise, *(row[k] for row in self.rows)])[self.elements["row"]]
+
+    def _arrange(self) -> None:
+        """All that follows from columns, properties and hosts."""
+        nodes, bars = self.nodes, self.elements
+        n, m = len(nodes["bar"]), len(bars["row"])
+        self.first = kernels.first_nodes(nodes["bar"])
+        first = self.first
+        self.hosted = nodes["host"] >= 0
+        self._carrier, self._share = layout.carriers(nodes["bar"], nodes["arc"], nodes["host"])
+        self._along, self._tangent = np.zeros((m, 2)), nodes["tangent"]
+        self._total, self._on_rock = np.zeros((n, 2)), np.zeros((n, 2))
+        self._step, self._rock = np.zeros((n, 2)), np.zeros((n, 2))
+        way = nodes["x"][first + 1] - nodes["x"][first]
+        self._length = np.array([math.sqrt(x * x + y * y) for x, y in way.tolist()])
+        spacing, diameter = self._column("spacing", 1.0), self._column("diameter")
+        area = 0.25 * math.pi * diameter**2
+        young, rho = self._column("young"), self._column("density")
+        table = np.zeros((m, 5))
+        table[:, kernels.STIFFNESS] = young * area / (bars["length"] * spacing)
+        table[:, kernels.LENGTH] = bars["length"]
+        table[:, kernels.TENSION] = self._column("tensile_yield_force") / spacing
+        table[:, kernels.COMPRESSION] = self._column("compressive_yield_force") / spacing
+        table[:, kernels.FAILURE] = self._column("tension_failure_strain", math.inf)
+        self._element_table = table
+        mass = 0.5 * rho * area * bars["length"] / spacing
+        drag = 0.5 * self._column("damp_factor") * 2.0 * area * np.sqrt(young * rho) / spacing
+        outside, inside = diameter + 2.0 * self._column("grout_thickness"), diameter
+        tan_rock, tan_bolt = (np.tan(np.radians(self._column(f"friction_{at}"))) for at in ("rock_grout", "grout_bolt"))
+        of_grout = (
+            (kernels.GROUT, self._column("shear_stiffness_rock_bolt")),
+            (kernels.ROCK_COHESION, math.pi * outside * self._column("cohesion_rock_grout")),
+            (kernels.ROCK_FRICTION, math.pi * outside * tan_rock),
+            (kernels.BOLT_COHESION, math.pi * inside * self._column("cohesion_grout_bolt")),
+            (kernels.BOLT_FRICTION, math.pi * inside * tan_bolt),
+        )
+        nodal = np.zeros((n, 7))
+        self._node_spacing, self._stiffness = np.ones(n), np.zeros(n)
+        for side, at in ((1, first), (0, first + 1)):  # the element after the node, and that before it
+            nodal[at, kernels.MASS] += mass
+            nodal[at, kernels.DRAG] += drag
+            for column, per_length in of_grout:
+                nodal[at, column] += per_length * nodes["grout"][at, side] / spacing
+            self._node_spacing[at] = spacing
+            self._stiffness[at] += table[:, kernels.STIFFNESS]
+        self._node_table, self._true_mass = nodal, nodal[:, kernels.MASS].copy()
+        self._rubs = bool((nodal[self.hosted][:, [kernels.ROCK_FRICTION, kernels.BOLT_FRICTION]] > 0.0).any())
+        self._prepared_for = None
+        self._mine, self._rows = np.empty(0, np.int64), np.empty(0, np.int64)
+        if n:
+            kernels.directions(first, nodes["x"], bars["state"], self._along, self._tangent)
+            self._find_forces()
+
+    def _set_masses(self) -> None:
+        """Masses along the bar for this time step: 2 k / m bounds omega^2, k: of the elements on both sides and of the
+        grout. In dynamic runs they are raised where the step would not be stable, in static ones fictitious."""
+        o, dt = self.blocks.options, self.blocks.clock.dt
+        if self._prepared_for == (dt, o.dynamic, o.safety):
+            return
+        known, self._prepared_for = self._prepared_for is not None, (dt, o.dynamic, o.safety)
+        before = self._kinetic().sum()
+        k = self._stiffness + self._node_table[:, kernels.GROUT]
+        if not o.dynamic:
+            self._node_table[:, kernels.MASS] = 0.5 * MARGIN * (1.0 + ALPHA) * k
+            return
+        mass = np.maximum(self._true_mass, 0.5 * k * (dt / o.safety) ** 2)
+        self._node_table[:, kernels.MASS] = mass
+        if known and self._account is not None:
+            self.commands += float(self._kinetic().sum() - before)
+        if not self._true_mass.any():
+            return
+        added = float((mass - self._true_mass).sum() / self._true_mass.sum())
+        if self.blocks.log is not None and abs(added - self._told) > 0.1 * self._told:
+            raised = int((mass > self._true_mass).sum())
+            self.blocks.log.info(
+                f"bolts: the time step {dt:.4g} s would be too large for {raised} of {len(mass)} nodes; mass scaling "
+                f"adds {added:.3g} times the mass of the bolts, along them"
+            )
+            self._told = added
+
+    def _conditions_at(self, time: float, middle: float) -> np.ndarray:
+        """The table of conditions (n, 6), forces at `time`, motion in the middle of a step."""
+        tables = self.blocks.tables
+
+        def now(value: Number, when: float) -> float:
+            return tables[value](when) if isinstance(value, str) else value
+
+        used, row = np.unique(self.nodes["condition"], return_inverse=True)
+        now_of = [self.conditions[one] for one in used.tolist()]
+        rows = np.array([
+            (one.does_x, now(one.at_x, middle), one.does_y, now(one.at_y, middle), now(one.force_x, time),
+             now(one.force_y, time)) for one in now_of
+        ]).reshape(-1, 6)  # fmt: skip
+        table = rows[row.reshape(-1)]
+        table[:, kernels.FORCE_X :] /= self._node_spacing[:, None]
+        return table
+
+    def _find_forces(self) -> None:
+        """Forces on nodes and rock, of the present positions and moment."""
+        nodes, time = self.nodes, self.blocks.clock.time
+        kernels.node_forces(
+            self.first, self._along, self._tangent, self.elements["force"], nodes["bond"], nodes["plate"], self.hosted,
+            self._carrier, self._share, self._conditions_at(time, time), self._total, self._on_rock,
+        )  # fmt: skip
+
+    # ---- called by the blocks ----------------------------------------------------------------------------------------
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        """(n_own, 4) bool: corners of the owned elements that hold nodes."""
+        out = np.zeros((blocks.n_own, 4), bool)
+        at, rows = self._held_here()
+        np.logical_or.at(out, rows - blocks.n_left, self.nodes["weight"][at] != 0.0)
+        return out
+
+    def springs(self, blocks: Any) -> np.ndarray:
+        """(n_own, 4) stiffness [N/m per m] that grout and plates bring to these corners."""
+        out = np.zeros((blocks.n_own, 4))
+        at, rows = self._held_here()
+        k = self._node_table[:, kernels.GROUT] + np.where(self.nodes["plate"] > 0, self._stiffness, 0.0)
+        np.add.at(out, rows - blocks.n_left, k[at, None] * np.abs(self.nodes["weight"][at]))
+        return out
+
+    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes whose host is owned by this rank, and its storage rows."""
+        blocks = self.blocks
+        row = np.where(self.hosted, blocks.where[self.nodes["host"]], -1)
+        at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
+        return at, row[at]
+
+    def check_start(self) -> None:
+        """CommandError if an element of a bolt has no model yet. Not collective."""
+        bare = np.flatnonzero(self.elements["row"] == 0)
+        if len(bare):
+            raise CommandError(f"bolt-element {bare[0]} has no model ({len(bare)} in all): bolt c-model comes first")
+
+    def storage_rebuilt(self) -> None:
+        """Elements have other rows or owners."""
+        blocks = self.blocks
+        if blocks.options.dynamic != self._dynamic:  # velocities of the static mode are ways per step
+            self._dynamic = blocks.options.dynamic
+            self.nodes["v"][:] = 0.0
+        self._mine, self._rows = self._held_here()
+        self._find_forces()
+        if self._account is not blocks.budget:
+            self._account = blocks.budget
+            self.work[:], self.commands, self._stored_at_start = 0.0, 0.0, self._stored()
+
+    def add_to(self, applied: np.ndarray) -> None:
+        """Forces on the rock at the present positions, in the order of nodes [N/m]."""
+        kernels.add(self._mine, self._rows, self.nodes["weight"], self._on_rock, applied)
+
+    def follow(self) -> None:
+        """The rock has moved: move the nodes over the same step, and find the new forces."""
+        blocks, nodes, bars = self.blocks, self.nodes, self.elements
+        clock = blocks.clock
+        with blocks.timers("force"):
+            self._set_masses()
+            seen = self._seen()
+        if blocks.comm.size > 1:
+            with blocks.timers("reduce"):
+                blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
+        with blocks.timers("force"):
+            static = not blocks.options.dynamic
+            point, normal = np.ascontiguousarray(seen[:, :2]), np.ascontiguousarray(seen[:, 2])
+            time = clock.time if static else clock.time - clock.dt
+            conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
+            work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
+            before = self._on_rock.copy()
+            kernels.move(
+                self.first, nodes["x"], nodes["v"], point, nodes["point"], self._tangent, self._total, nodes["bond"],
+                nodes["plate"], self.hosted, self._carrier, self._share, conditions, self._node_table, clock.dt,
+                ALPHA if static else 0.0, nodes["reaction"], self._step, self._rock, work,
+            )  # fmt: skip
+            nodes["point"][self.hosted] = point[self.hosted]
+            kernels.stretch(
+                self.first, nodes["x"], self._element_table, self._length, bars["force"], bars["state"],
+                bars["plastic"], work,
+            )  # fmt: skip
+            kernels.hold(
+                self._tangent, self._step, self._rock, self.hosted, self._node_table, normal, nodes["bond"],
+                nodes["slip"], nodes["bond_state"], work,
+            )  # fmt: skip
+            kernels.directions(self.first, nodes["x"], bars["state"], self._along, self._tangent)
+            self._find_forces()
+            kernels.work_on_rock(before, self._on_rock, self._rock, work)
+
+    def _seen(self) -> np.ndarray:
+        """(n, 3) of the nodes whose host is owned here: where the rock is [m], and its stress across the bar [Pa]."""
+        blocks, seen = self.blocks, np.zeros((len(self), 3))
+        kernels.host_points(self._mine, self._rows, self.nodes["weight"], blocks.x, seen)
+        if self._rubs and len(self._mine):
+            rows, place = np.unique(self._rows, return_inverse=True)
+            stress, _ = blocks.local.stresses(rows - blocks.n_left, energies=False, flow=False)
+            xx, yy, xy, _ = stress[place.reshape(-1)].T
+            tx, ty = self._tangent[self._mine].T
+            seen[self._mine, 2] = xx * ty * ty + yy * tx * tx - 2.0 * xy * tx * ty
+        return seen
+
+    def balance(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unbalanced and contributing forces along the bars [N/m] of all nodes that move by themselves, on the first
+        rank. Not collective."""
+        if self.blocks.comm.rank > 0:
+            return np.empty(0), np.empty(0)
+        nodes = self.nodes
+        free = ~self._led() & ~((nodes["plate"] > 0) & self.hosted)
+        f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
+        return np.abs(f[free]), np.concatenate([2.0 * np.abs(self.elements["force"]), np.abs(nodes["bond"])])
+
+    def work_done(self) -> float:
+        """On the rock, since the account of energy began [J/m]. Not collective."""
+        return float(self.work[kernels.ON_ROCK])
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """Nodes in these elements of the rock are free of it from now on, plates fall off."""
+        lost = np.isin(self.nodes["host"], elements)
+        if not lost.any():
+            return
+        stored = self._stored() if self._account is not None else 0.0
+        nodes = self.nodes
+        nodes["host"][lost], nodes["plate"][lost], nodes["weight"][lost] = -1, 0, 0.0
+        nodes["bond"][lost], nodes["bond_state"][lost] = 0.0, nodes["bond_state"][lost] & ~kernels.SLIPS
+        self._arrange()
+        if self._account is not None:
+            self.commands += self._stored() - stored
+        if self.blocks.log is not None:
+            self.blocks.log.info(f"{int(lost.sum())} nodes of bolts are no longer in rock: it was taken out")
+
+    def mesh_replaced(self) -> None:
+        """There is another mesh: `of_mesh` says that these are gone with the one before."""
+
+    # ---- state on disk -----------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        """All but the columns, as JSON values."""
+        return {
+            "rows": [list(row) for row in self.rows], "conditions": [asdict(one) for one in self.conditions],
+            "work": self.work.tolist(), "commands": self.commands, "start": self._stored_at_start,
+            "dynamic": self._dynamic,
+        }  # fmt: skip
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """The columns of nodes and elements, by the name of their table."""
+        return {"bolt_nodes": _flat(self.nodes), "bolt_elements": _flat(self.elements)}
+
+    @staticmethod
+    def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse of both: the blocks, whose budget is back already, have these bolts."""
+        made = Bolts.of(blocks)
+        made.nodes = _wide(tables["bolt_nodes"], _NODES)
+        made.elements = _wide(tables["bolt_elements"], _ELEMENTS)
+        made.rows = [tuple(row) for row in state["rows"]]
+        made.conditions = [Condition(**one) for one in state["conditions"]]
+        made.work = np.array(state["work"])
+        made.commands, made._stored_at_start = state["commands"], state["start"]
+        made._dynamic, made._account = state["dynamic"], blocks.budget
+        made._arrange()
+
+
+def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Values (k, 4, 2) of the corners of elements (k, 4) at points in them."""
+    return (weight[:, :, None] * np.where(cells[:, :, None] >= 0, values, 0.0)).sum(axis=1)
+
+
+def _empty(n: int, of: type, width: int) -> np.ndarray:
+    return np.zeros((n, width) if width else n, of)
+
+
+def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    out: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        if values.ndim == 1:
+            out[name] = values
+        else:
+            out.update({f"{name}_{c}": values[:, c].copy() for c in range(values.shape[1])})
+    return out
+
+
+def _wide(columns: Mapping[str, np.ndarray], kinds: Mapping[str, tuple[type, int]]) -> dict[str, np.ndarray]:
+    out: dict[str, np.ndarray] = {}
+    for name, (of, width) in kinds.items():
+        found = np.column_stack([columns[f"{name}_{c}"] for c in range(width)]) if width else columns[name]
+        out[name] = np.ascontiguousarray(found.astype(of))
+    return out

@@ -1,0 +1,54 @@
+"""Bolts in pictures of blocks: the bars, and the axial force along them as areas beside them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hpcdem.io.vtkhdf_mesh import MeshState
+
+BAR, TENSION, COMPRESSION = "#202020", "#2f7fb5", "#d0562a"
+HEIGHT = 0.06
+"""Of the area at the largest force, over the size of the model."""
+BROKEN = 16
+"""Bit of the state of an element."""
+
+
+def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (m, 4, 2) [m] of the area beside each element of a bolt, from its bar out by its force, and the forces
+    (m,) [N]."""
+    nodes, elements = state.bolts["nodes"], state.bolts["elements"]
+    at = np.column_stack([nodes["position_x"], nodes["position_y"]])
+    first, force = elements["first_node"], elements["axial_force"]
+    a, b = at[first], at[first + 1]
+    way = b - a
+    across = np.column_stack([-way[:, 1], way[:, 0]]) / np.hypot(way[:, 0], way[:, 1])[:, None]
+    size = float(np.ptp(state.points, axis=0).max())
+    out = HEIGHT * size * (force / max(float(np.abs(force).max(initial=0.0)), 1e-300))[:, None] * across
+    return np.stack([a, b, b + out, a + out], axis=1), force
+
+
+def draw(axes: Any, state: MeshState) -> list[Any]:
+    """Draw the bolts of a frame; returns what a legend is made of, nothing without bolts."""
+    if not state.bolts:
+        return []
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    corners, force = areas(state)
+    handles: list[Any] = []
+    for rows, shade, word in ((force > 0.0, TENSION, "tension"), (force < 0.0, COMPRESSION, "compression")):
+        if rows.any():
+            axes.add_collection(
+                PolyCollection(corners[rows], facecolors=shade, edgecolors="none", alpha=0.75, zorder=4), autolim=False
+            )
+            handles.append(Patch(color=shade, label=f"{word} up to {np.abs(force[rows]).max() / 1e3:.3g} kN"))
+    axes.add_collection(LineCollection(corners[:, :2], colors=BAR, linewidths=0.9, zorder=5), autolim=False)
+    broken = state.bolts["elements"]["bolt_state"].astype(np.int64) & BROKEN > 0
+    if broken.any():
+        middle = corners[broken, :2].mean(axis=1)
+        axes.plot(middle[:, 0], middle[:, 1], "x", color=COMPRESSION, markersize=4.0, zorder=6)
+        handles.append(Line2D([], [], color=COMPRESSION, marker="x", linestyle="", markersize=4.0, label="broken bolt"))
+    return handles or [Line2D([], [], color=BAR, linewidth=0.9, label="bolts without force")]

@@ -1,0 +1,222 @@
+"""Bolts that are installed in mid-run, tensioned, excavated; what they do to the rock; how much energy they hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts import kernels
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import model, rectangle
+from tests.bolts.support import STEEL, state
+
+
+def block(dynamic: bool = False, young: float = 1e9) -> Blocks:
+    """1 m x 1 m that stands on its base."""
+    sim = model(rectangle(8, 8, 1.0, 1.0))
+    sim.element_property(None, {"young": young})
+    sim.option(dynamic=dynamic, collision=False)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
+    return sim
+
+
+def bolt(sim: Blocks, *points: tuple[float, float], **more: object) -> Bolts:
+    bolts = Bolts.of(sim)
+    of_bolt = {name: more.pop(name) for name in ("segments", "length", "grout", "plate") if name in more}
+    _, elements = bolts.create(points, **of_bolt)
+    bolts.assign(elements, {**STEEL, **more})
+    return bolts
+
+
+def test_a_soft_block_hangs_on_a_bolt_and_a_plate() -> None:
+    """A block under a void hangs on one bolt: all of its weight is in the bar where it crosses the void. Per metre of
+    thickness; one bolt has the spacing times as much."""
+    sim = model(rectangle(4, 12, 0.4, 1.2))
+    y = sim.mesh.points[:, 1]
+    sim.option(dynamic=False, collision=False)
+    sim.gravity(0.0, -9.81)
+    sim.velocity_condition(np.flatnonzero(y == 1.2), vx=0.0, vy=0.0)
+    sim.velocity_condition(None, vx=0.0)
+    bolts = bolt(sim, (0.2, 0.0), (0.2, 1.1), plate=True, spacing=1.7, segments=22, grout=(0.6, 1.1))
+    middle = sim.mesh.centroids()[:, 1]
+    changes.null(sim, np.flatnonzero((middle > 0.4) & (middle < 0.6)))
+    assert convergence.solve(sim, ratio=1e-7, cycles=200_000).reason == "ratio"
+    weight = 2700.0 * 9.81 * 0.4 * 0.4
+    free = slice(1, 12)  # from the plate to the grout
+    assert bolts.values("bolt-element", "axial_force")[free] == pytest.approx(1.7 * weight, rel=1e-4)
+    assert bolts.nodes["bond"].sum() == pytest.approx(weight, rel=1e-4)
+    reaction = diagnostics.total(sim, "reaction_y")
+    assert reaction == pytest.approx(2700.0 * 9.81 * 0.4 * 1.0, rel=1e-4)
+
+
+def test_bolts_bring_no_force_or_moment_from_nowhere() -> None:
+    """A tensioned bolt in a body without supports: what it does to the rock adds up to nothing, also where it has a
+    kink."""
+    sim = block(True)
+    sim.remove_conditions()
+    bolts = bolt(sim, (0.13, 0.97), (0.31, 0.41), (0.83, 0.22), plate=True, pretension_force=50e3, grout=(0.4, 2.0))
+    convergence.advance(sim, 300)
+    force = bolts._on_rock
+    assert np.abs(force).max() > 1e4
+    # Inertia along the bar is all that is missing; it is small beside the forces once it has come to rest.
+    bar = (bolts._total * bolts._tangent).sum(axis=1) + bolts.nodes["bond"]
+    free = bolts.nodes["plate"] == 0
+    missing = (bar[free, None] * bolts._tangent[free]).sum(axis=0)
+    assert np.allclose(force.sum(axis=0) + missing, 0.0, atol=1e-9 * np.abs(force).sum())
+
+
+def test_pretension_presses_the_rock_and_is_given_again_by_difference() -> None:
+    sim = block(young=50e9)
+    bolts = bolt(sim, (0.5, 1.0), (0.5, 0.1), plate=True, pretension_force=40e3, segments=18, grout=(0.6, 0.9))
+    assert bolts.values("bolt-element", "axial_force") == pytest.approx(40e3)
+    convergence.solve(sim, ratio=1e-7)
+    first = bolts.values("bolt-element", "axial_force")
+    assert 25e3 < first[0] < 35e3 and first[:11] == pytest.approx(first[0], rel=1e-3)
+    assert diagnostics.values(sim, "stress_yy").min() < -1e5
+    bolts.assign(np.arange(18), {**STEEL, "pretension_force": 45e3})
+    assert bolts.values("bolt-element", "axial_force") == pytest.approx(first + 5e3)
+    bolts.assign(np.arange(18), {**STEEL, "pretension_force": 45e3})  # nothing new is said
+    assert bolts.values("bolt-element", "axial_force") == pytest.approx(first + 5e3)
+
+
+def test_excavated_hosts_let_go() -> None:
+    """The rock around the head is taken out: its nodes are free of grout, the plate is gone, the rest still holds."""
+    sim = block()
+    sim.gravity(0.0, -9.81)
+    bolts = bolt(sim, (0.5, 1.0), (0.5, 0.2), plate=True, pretension_force=20e3, segments=16)
+    convergence.solve(sim, ratio=1e-6)
+    assert bolts.hosted.all() and bolts.nodes["plate"][0]
+    changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 1] > 0.75))
+    convergence.solve(sim, ratio=1e-6)
+    gone = bolts.nodes["origin"][:, 1] > 0.75 + 1e-9
+    assert np.array_equal(~bolts.hosted, gone) and not bolts.nodes["plate"].any()
+    assert not bolts.nodes["bond"][gone].any() and bolts.nodes["bond"][~gone].any()
+    force = bolts.values("bolt-element", "axial_force")
+    assert np.abs(force[:5]).max() < 1e-2 * np.abs(force).max()  # nothing holds its head any more
+    # All of it out, one after the other: it floats, without force.
+    changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 1] > 0.15) & sim.alive))
+    convergence.advance(sim, 200)
+    assert not bolts.hosted.any() and np.isfinite(bolts.nodes["x"]).all()
+
+
+def test_a_bolt_stiffens_what_is_cracked() -> None:
+    """Installed in the middle of a run, it holds from then on: its elements begin without force."""
+    opened = []
+    for bolted in (False, True):
+        sim = model(rectangle(8, 2, 0.8, 0.2))
+        sim.option(dynamic=False, collision=False)
+        x = sim.mesh.points[:, 0]
+        sim.velocity_condition(np.flatnonzero(x == 0.0), vx=0.0, vy=0.0)
+        edges = sim.mesh.edges()
+        across = edges.inner & (np.abs(sim.mesh.points[edges.points][:, :, 0] - 0.4) < 1e-9).all(axis=1)
+        joint = {"friction": 0.0, "cohesion": 1e6, "tensile_strength": 1e6, "gf1": 50.0, "gf2": 50.0,
+                 "penalty_normal": 2e7}  # fmt: skip
+        sim.joint_model(edges.faces[across][:, 0], "classic_intrinsic_cohesive_interface", joint)
+        convergence.advance(sim, 100)
+        if bolted:
+            bolts = bolt(sim, (0.1, 0.1), (0.7, 0.1))
+            assert not bolts.elements["force"].any()
+        sim.force_condition(np.flatnonzero(x == 0.8), fx=5e3)
+        assert convergence.solve(sim, ratio=1e-7, cycles=200_000).reason == "ratio"
+        opened.append(float(np.nanmax(diagnostics.values(sim, "opening"))))
+    assert opened[1] < 0.5 * opened[0]
+
+
+def test_the_account_of_energy_closes() -> None:
+    """Pulled until bars yield and grout slips, in motion: what goes in is stored or lost, within 1 % of the losses."""
+    sim = block(True, 5e9)
+    bolts = bolt(sim, (0.5, 1.0), (0.5, 0.2), segments=20, tensile_yield_force=8e3, cohesion_grout_bolt=2e5,
+                 cohesion_rock_grout=2e5, damp_factor=0.1, pretension_force=3e3)  # fmt: skip
+    bolts.condition(np.array([0]), does_y=kernels.VELOCITY, at_y=0.3)
+    bolts.condition(np.array([20]), does_y=kernels.VELOCITY, at_y=0.1)
+    diagnostics.account_energy(sim)
+    convergence.advance(sim, 1500)
+    found, rock = bolts.energies(), diagnostics.energies(sim)
+    assert min(found["lost_in_bars"], found["lost_in_grout"], found["lost_by_dashpots"]) > 0.1
+    assert found["work_of_conditions"] > 1.0 and found["relative"] < 1e-3
+    assert rock["work_bolts"] == found["work_on_rock"] != 0.0 and rock["relative"] < 1e-6
+    assert abs(rock["work_outside"]) < 1e-6 * abs(rock["work_bolts"])  # bolts alone drive it
+
+
+@pytest.mark.parametrize("at", [0, 150, 400])
+def test_a_saved_model_goes_on(at, tmp_path) -> None:
+    """Before the first step, in mid-run, after rupture: with commands given just before, too."""
+    sim = block(True, 5e9)
+    bolts = bolt(sim, (0.5, 1.0), (0.42, 0.2), segments=20, tensile_yield_force=8e3, tension_failure_strain=0.1,
+                 friction_rock_grout=30.0, cohesion_grout_bolt=2e5)  # fmt: skip
+    sim.table("pull", [(0.0, 0.0), (1e-4, 0.5)])
+    bolts.condition(np.array([0]), does_y=kernels.VELOCITY, at_y="pull")
+    convergence.advance(sim, at)
+    assert (bolts.elements["state"] & kernels.RUPTURED > 0).any() == (at == 400)
+    if at == 150:
+        changes.null(sim, np.array([int(bolts.nodes["host"][2])]))
+    saved_state.save(sim, tmp_path / "a.sav")
+    again = Blocks()
+    saved_state.restore(again, tmp_path / "a.sav")
+    for one in (sim, again):
+        convergence.advance(one, 120)
+    there = Bolts.of(again)
+    for name, values in state(bolts).items():
+        assert np.array_equal(values, state(there)[name]), name
+    assert np.array_equal(
+        diagnostics.values(sim, "position_y"), diagnostics.values(again, "position_y"), equal_nan=True
+    )
+
+
+def test_mass_is_added_where_the_time_step_needs_it_and_said() -> None:
+    from tests.pcdc.fake import Noted
+
+    sim = block(True, 1e8)
+    sim.log = Noted()
+    bolts = bolt(sim, (0.5, 1.0), (0.5, 0.2), segments=200)
+    convergence.advance(sim, 50)
+    said = [line for line in sim.log.lines if "mass scaling adds" in line]
+    assert len(said) == 1 and "201 of 201 nodes" in said[0]
+    assert np.isfinite(bolts.nodes["x"]).all() and np.abs(bolts.nodes["v"]).max() < 1.0
+
+
+def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
+    sim = block()
+    bolts = Bolts.of(sim)
+    for points, more, message in (
+        ([(0.5, 0.5)], {}, "two points at least"),
+        ([(0.5, 0.5), (0.5, 0.5)], {}, "are the same"),
+        ([(0.5, 0.5), (0.5, np.nan)], {}, "must be finite"),
+        ([(2.0, 2.0), (3.0, 3.0)], {}, "no node of the bolt is in an element"),
+        ([(0.5, 0.5), (0.5, 0.9)], {"grout": (0.5, 0.6)}, "grout goes from"),
+        ([(0.5, 0.5), (0.5, 0.9)], {"grout": (0.3, 0.2)}, "grout goes from"),
+        ([(0.5, 0.5), (0.5, 0.9)], {"segments": 0}, "one segment at least"),
+        ([(0.5, 0.5), (0.5, 0.9)], {"segments": 2, "length": 0.1}, "exclude each other"),
+    ):
+        with pytest.raises(CommandError, match=message):
+            bolts.create(points, **more)
+    assert len(bolts) == 0
+    _, elements = bolts.create([(0.5, 0.5), (0.5, 0.9)])
+    with pytest.raises(CommandError, match="bolt-element 0 has no model"):
+        sim.step()
+    for given, message in (
+        ({"tensile_yield_force": 1e3, "pretension_force": 2e3}, "pretension_force must not be above"),
+        ({"young": -1.0}, "young must be > 0"), ({"youth": 1.0}, "has no property youth"),
+        ({"friction_rock_grout": 90.0}, "friction_rock_grout must be"),
+    ):  # fmt: skip
+        with pytest.raises(CommandError, match=message):
+            bolts.assign(elements, {**STEEL, **given})
+    bolts.assign(elements, {**STEEL, "spacing": 2.0})
+    with pytest.raises(CommandError, match=r"bolt-element 0 has the spacing 2 m: all of a bolt has one spacing"):
+        bolts.assign(elements[1:], STEEL)
+    with pytest.raises(CommandError, match="there is no table 'v'"):
+        bolts.condition(np.array([0]), force_x="v")
+    sim.table("v", [(0.0, 0.0), (1.0, 1.0)])
+    bolts.condition(np.array([0]), force_x="v")
+    with pytest.raises(CommandError, match="is used by a boundary condition"):
+        sim.remove_table("v")
+    bolts.remove_conditions(np.array([0]))
+    sim.remove_table("v")
+    with pytest.raises(CommandError, match="the static solve knows no bolts"):
+        equilibrium.solve_elastic(sim)
+    sim.step()
+    sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
+    assert Bolts.there(sim) is None

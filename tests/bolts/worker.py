@@ -1,0 +1,108 @@
+"""Runs bolted blocks, on any number of ranks and threads, and writes what became of them.
+
+python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import ROCK, rectangle, shaken
+from tests.blocks.worker import COHESIVE, WEAK, communicator
+from tests.bolts.support import STEEL, state
+
+WEAKER = {
+    **STEEL, "tensile_yield_force": 4e3, "tension_failure_strain": 2e-3, "friction_rock_grout": 25.0,
+    "friction_grout_bolt": 30.0, "cohesion_rock_grout": 2e4, "cohesion_grout_bolt": 3e4, "spacing": 1.3,
+}  # fmt: skip
+
+
+def breaking(sim: Blocks) -> None:
+    """A jointed block with bolts is torn apart: bars yield and rupture, grout slips, while all flies to the right,
+    through the strips of the ranks."""
+    sim.take_mesh(shaken(rectangle(16, 6, 1.6, 0.6, kind="mixed"), 0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    inner = sim.mesh.edges()
+    sim.joint_model(inner.faces[inner.inner][:, 0], COHESIVE, WEAK)
+    x = sim.mesh.points[:, 0]
+    for one in np.unique(np.round(x, 1)):
+        changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
+    bolts = Bolts.of(sim)
+    for y in (0.1, 0.33):
+        _, elements = bolts.create([(0.0, y), (1.6, y + 0.07)], plate=True)
+        bolts.assign(elements, {**WEAKER, "pretension_force": 1e3})
+    diagnostics.account_energy(sim)
+
+
+def more(sim: Blocks) -> None:
+    """What happens to them."""
+    if sim.clock.step == 500:  # installed in the middle of the run
+        at = diagnostics.values(sim, "position_x"), diagnostics.values(sim, "position_y")
+        a, b = (tuple(float(v[n]) for v in at) for n in (3, len(at[0]) - 4))
+        bolts = Bolts.of(sim)
+        _, elements = bolts.create([a, b], length=0.05, grout=(0.3, 9.0), plate=True)
+        bolts.assign(elements, {**WEAKER, "pretension_force": 2e3})
+        bolts.condition(np.array([0]), force_x=-500.0)
+    if sim.clock.step == 900:  # hosts of the first bolt go
+        host = Bolts.of(sim).nodes["host"]
+        changes.null(sim, np.unique(host[(Bolts.of(sim).nodes["bar"] == 0) & (host >= 0)])[:6])
+
+
+def relaxing(sim: Blocks) -> None:
+    """The same block at rest, static mode, pulled by its bolts."""
+    sim.take_mesh(rectangle(16, 6, 1.6, 0.6))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8})
+    sim.option(dynamic=False, collision=False)
+    sim.gravity(0.0, -9.81)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
+    bolts = Bolts.of(sim)
+    for x in (0.33, 1.21):
+        _, elements = bolts.create([(x, 0.6), (x + 0.1, 0.1)], plate=True, grout=(0.2, 0.6))
+        bolts.assign(elements, {**WEAKER, "pretension_force": 3e3})
+
+
+def excavate(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=200.0)
+    if sim.clock.step == 1000:
+        sim.option(dynamic=True)
+
+
+KINDS = {"breaking": (breaking, more), "relaxing": (relaxing, excavate)}
+
+
+def main() -> None:
+    kind, threads, steps, out, *rest = sys.argv[1:]
+    sim = Blocks(communicator(), int(threads))
+    if rest[:1] == ["resume"]:
+        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
+    else:
+        KINDS[kind][0](sim)
+    while sim.clock.step < int(steps):
+        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
+            saved_state.save(sim, rest[1], {"kind": kind})
+        KINDS[kind][1](sim)
+        convergence.advance(sim, 1)
+    found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx", "damage")}
+    found.update(state(Bolts.of(sim)))
+    found["counts"] = np.array(diagnostics.joint_counts(sim))
+    found["ratio"] = np.array(diagnostics.unbalanced_ratio(sim))
+    if sim.budget is not None:
+        found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
+        found.update({f"bolts_{name}": np.array(value) for name, value in Bolts.of(sim).energies().items()})
+    found["about"] = np.array([sim.rebuilds])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
+if __name__ == "__main__":
+    main()
