@@ -89,7 +89,10 @@ for _on, _names in (("element", ("position", "displacement", "velocity")), ("joi
 _STRENGTH = {"cohesion": "element_cohesion", "tensile": "element_tensile", "dilation": "element_dilation"}
 PROPERTIES = {
     "element": {
-        _STRENGTH.get(p.name, p.name): p.name for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB) for p in m.properties
+        _STRENGTH.get(p.name, p.name): p.name
+        for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB)
+        for p in m.properties
+        if not p.internal
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }

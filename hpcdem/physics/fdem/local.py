@@ -13,11 +13,12 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
-from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plastic_quads, plasticity
+from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plastic_quads, plasticity, strength
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
-from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, Rows
+from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, SOFTENS, Rows, softening_table
+from hpcdem.physics.fdem.tables import Table
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
@@ -74,6 +75,20 @@ def yield_table(rows: Rows) -> np.ndarray:
     apex = np.divide(cohesion, np.tan(friction), out=np.full(len(rows), math.inf), where=friction > 0.0)
     table[:, plasticity.TENSILE] = np.where(yields, np.minimum(rows.column("tensile"), apex), math.inf)
     return table
+
+
+def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np.ndarray) -> strength.Strength:
+    """The arrays of strength.py; of (own rows,): the row of the model of each."""
+    pieces = [np.column_stack([one.times, one.values]) for one in tables]
+    return strength.Strength(
+        len(rows),
+        of.astype(np.int64),
+        np.column_stack([rows.column(name) for name in SOFTENS]),
+        np.column_stack([rows.column(softening_table(name)) for name in SOFTENS]).astype(np.int64),
+        np.cumsum([0, *map(len, pieces)]),
+        np.concatenate([np.empty((0, 2)), *pieces]),
+        history,
+    )
 
 
 @dataclass
@@ -160,13 +175,34 @@ class Local:
             self.initial = self.s0[:count].copy()
             self.law = np.zeros(count + 3, np.int32)
             self.law[:count] = sim.element_row[sim.number[rows]]
-            self.yield_table = yield_table(sim.element_rows)
             memory, own = sim.cold["plastic"], self.quad_rows
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, memory, self.s0)
             self.quad_initial = self.quad_s0[:, :4].copy()
             self.quad_law = np.repeat(sim.element_row[sim.number[own]].astype(np.int32)[:, None], 4, axis=1)
+            self._make_strength(rows)
             if len(own):
                 plastic_quads.relieve_all(own, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
+
+    def _make_strength(self, rows: np.ndarray) -> None:
+        """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
+        rows of the triangles."""
+        sim = self.sim
+        of_models = yield_table(sim.element_rows)
+        history = sim.cold.get("softening", np.zeros((0, strength.HISTORY)))
+        tables = [sim.element_rows.column(softening_table(name)) > 0.0 for name in SOFTENS]
+        softens = np.any(tables, axis=0) if len(history) else np.zeros(len(of_models), bool)
+        law = self.law[: self.count, None]
+        of, first = [], len(of_models)
+        for laws_ in (law, self.quad_law):
+            own = softens[laws_]
+            of.append(laws_[own])
+            laws_[own] = first + np.arange(int(own.sum()))
+            first += int(own.sum())
+        self.strength = strength_tables(sim.element_rows, np.concatenate(of), sim.softening, history)
+        self.yield_table = np.concatenate([of_models, np.zeros((first - len(of_models), plasticity.YIELD))])
+        if len(history):
+            strength.renew_all(rows, sim.n_left, 1, law, self.strength, self.yield_table)
+            strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -458,38 +494,46 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self._flow(sim.cold["plastic"], self.s0, self.quad_s0)
+            self._flow(*self._plastic_state())
         self._triangles(
             *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
         )
         if len(self.quad_rows):
             self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
 
-    def _flow(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        """Elements outside their yield surface at the present positions flow: memory (n_own, 9 or 36), s0 (count + 3,
-        4) and quad_s0 (quads, 16) [Pa] become those after it."""
+    def _plastic_state(self) -> tuple[np.ndarray, ...]:
+        """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
+        (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""
+        return self.sim.cold["plastic"], self.s0, self.quad_s0, self.yield_table, self.strength.history
+
+    def _flow(
+        self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, table: np.ndarray, history: np.ndarray
+    ) -> None:
+        """Elements outside their yield surface at the present positions flow: the arrays of `_plastic_state`, or copies
+        of them, become those after it."""
         sim, one = self.sim, self.sim.threads == 1
         small, step = not sim.options.large_strain, sim.clock.step
+        soft = self.strength._replace(history=history)
         kernel = plasticity.flows if one else plasticity.flows_threaded
         kernel(
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            self.yield_table, small, step, memory, s0,
+            soft, small, step, memory, s0, table,
         )  # fmt: skip
         if len(self.quad_rows):
             of_quads = plastic_quads.flows if one else plastic_quads.flows_threaded
             of_quads(
                 sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
-                self.quad_law, self.yield_table, small, step, memory, quad_s0,
+                self.quad_law, soft, small, step, memory, quad_s0, table,
             )  # fmt: skip
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], after the flow of this moment, which the next forces will see:
         copies."""
-        memory, s0, quad_s0 = self.sim.cold["plastic"].copy(), self.s0.copy(), self.quad_s0.copy()
+        after = tuple(part.copy() for part in self._plastic_state())
         if self.yields:
-            self._flow(memory, s0, quad_s0)
-        return memory, s0, quad_s0
+            self._flow(*after)
+        return after[0], after[1], after[2]
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
         """Columns `plasticity.MEMORY` (n, 9) of what owned elements remember of yielding, after the flow of this
@@ -548,7 +592,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *((sim.cold["plastic"], self.s0, self.quad_s0) if self.yields else ()),
+                *(self._plastic_state() if self.yields else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
+from hpcdem.physics.fdem.kernels import strength
 from hpcdem.physics.fdem.kernels.elements import BLOCK, PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
 from hpcdem.physics.fdem.kernels.plasticity import (
     CA,
@@ -53,13 +54,12 @@ from hpcdem.physics.fdem.kernels.plasticity import (
     S22,
     S33,
     SHEAR,
-    SHEAR_NOW,
-    TENSION_NOW,
     VOLUME,
     WORK,
     _measure,
     _return,
 )
+from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
 TILE = BLOCK // 4
 """Quads worked on together."""
@@ -196,7 +196,7 @@ _try_overlay_0, _try_overlay_1 = _try_overlay(0), _try_overlay(1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed, memory, s0):
+def _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, soft, step, flowed, memory, s0):
     """Add what has flowed to memory and s0; flowed (TILE, 2): scratch, zero between calls."""
     for k in range(m):
         e, at, p = U(k), who[k] % TILE, who[k] // TILE
@@ -212,6 +212,11 @@ def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed
         if bits[k] & TENSION_NOW:
             memory[j, o + IN_TENSION] = step + 1.0
         memory[j, o + WORK] += lanes[P_WORK + e]
+        if law[first + at, p] >= soft.first:
+            strength.flowed(
+                law[first + at, p], j, p, bits[k], lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
+                lanes[P_SHEAR + e], lanes[P_VOLUME + e], soft, table,
+            )  # fmt: skip
         flowed[at, p // 2] = 1
     for at in range(TILE):
         for overlay in range(2):
@@ -225,7 +230,7 @@ def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0):
+def _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
     lanes = np.zeros(LANES * CAPACITY)
     who, bits, flowed = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros((TILE, 2), np.int64)
     item, row = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
@@ -246,7 +251,7 @@ def _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, ste
         m = _return(BLOCK, lanes, 2.0, who, bits)
         if m > 0:
             _measure(m, lanes)
-            _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed, memory, s0)
+            _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, soft, step, flowed, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -262,10 +267,10 @@ def flows(threads, *args):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0):
+def flows_threaded(threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
     """The same on several threads."""
     for t in prange(threads):
-        _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0)
+        _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
