@@ -9,7 +9,8 @@ of its flow, and the forces would not be those of the elastic energy; FLAC takes
 reason. d is kept with the plastic strain that stresses depend on, and is not counted as plastic strain. As both
 triangles have one pressure the loop over quads is the elastic one.
 
-Sixteen quads are worked on together as 64 triangles: triangle p of quad e is entry 16 p + e of the lanes.
+`TILE` quads are worked on together as four times as many triangles: triangle p of quad e is entry p TILE + e of the
+lanes, corners and moduli are entry e.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
 from hpcdem.physics.fdem.kernels import strength
-from hpcdem.physics.fdem.kernels.elements import BLOCK, PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
+from hpcdem.physics.fdem.kernels.elements import PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
 from hpcdem.physics.fdem.kernels.plasticity import (
     CA,
     CB,
@@ -56,12 +57,13 @@ from hpcdem.physics.fdem.kernels.plasticity import (
     SHEAR,
     VOLUME,
     WORK,
+    _all_inside,
     _measure,
     _return,
 )
 from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
-TILE = BLOCK // 4
+TILE = 16
 """Quads worked on together."""
 _FOUR, _EIGHT, _TWELVE, _SIXTEEN, _QUAD = U(4), U(8), U(12), U(16), U(32)
 _NEXT = lane(1)
@@ -179,7 +181,6 @@ def _try_overlay(overlay):
                 lanes[S22 + g] + (pressure + two_mu * (b22 + shift)),
             )
             t12, t33 = lanes[S12 + g] + two_mu * b12, lanes[S33 + g] + pressure
-            lanes[LAM + f], lanes[MU2 + f], lanes[LAM + g], lanes[MU2 + g] = lame, two_mu, lame, two_mu
             lanes[S11 + f], lanes[S22 + f], lanes[S12 + f], lanes[S33 + f] = s11, s22, s12, s33
             lanes[S11 + g], lanes[S22 + g], lanes[S12 + g], lanes[S33 + g] = t11, t22, t12, t33
             lanes[OUTSIDE + f] = _outside(
@@ -232,7 +233,7 @@ def _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
     lanes = np.zeros(LANES * CAPACITY)
-    who, bits, flowed = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros((TILE, 2), np.int64)
+    who, bits, flowed = np.zeros(4 * TILE, np.int64), np.zeros(4 * TILE, np.int64), np.zeros((TILE, 2), np.int64)
     item, row = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
     flat_x, flat_q, flat_s0 = x.reshape(x.size), q.reshape(q.size), s0.reshape(s0.size)
     flat_law, flat_table = law.reshape(law.size), table.reshape(table.size)
@@ -245,10 +246,12 @@ def _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step
         _gather(TILE, item, row, flat_x, flat_q, flat_s0, flat_law, flat_table, lanes)
         _try_overlay_0(TILE, small, lanes)
         _try_overlay_1(TILE, small, lanes)
+        if _all_inside(4 * TILE, lanes) < 0:
+            continue
         for p in range(4):
             for e in range(n, TILE):
                 lanes[OUTSIDE + U(p * TILE + e)] = -1.0
-        m = _return(BLOCK, lanes, 2.0, who, bits)
+        m = _return(4 * TILE, lanes, 2.0, TILE, who, bits)
         if m > 0:
             _measure(m, lanes)
             _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, soft, step, flowed, memory, s0)

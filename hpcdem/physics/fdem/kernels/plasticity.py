@@ -182,15 +182,26 @@ def _try(n, small, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _return(n, lanes, shares, who, bits):
+def _all_inside(n, lanes):
+    """Negative if no stress is outside."""
+    bits = lanes.view(np.int64)
+    found = np.int64(-1)
+    for e in range(U(n)):
+        found &= bits[OUTSIDE + e]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _return(n, lanes, shares, solids, who, bits):
     """Plastic strains of those that are outside, one after the other from the first place; shares: of how many that
-    fill the same area they are one; who, bits (BLOCK,) i8: which they are and how they yield. Returns their number."""
+    fill the same area they are one; solids: after how many the lanes of moduli begin again; who, bits (BLOCK,) i8:
+    which they are and how they yield. Returns their number."""
     m = 0
     for k in range(n):
         e, at = U(k), U(m)
         if lanes[OUTSIDE + e] > 0.0:
             s11, s22, s12, s33 = lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e]
-            lame, two_mu = lanes[LAM + e], lanes[MU2 + e]
+            lame, two_mu = lanes[LAM + U(k % solids)], lanes[MU2 + U(k % solids)]
             e11, e22, e12, e33, how = plastic_strain(
                 s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_PSI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e],
                 lame, two_mu,
@@ -256,7 +267,9 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
         _try(n, small, lanes)
-        m = _return(n, lanes, 1.0, who, bits)
+        if _all_inside(n, lanes) < 0:
+            continue
+        m = _return(n, lanes, 1.0, BLOCK, who, bits)
         if m > 0:
             _measure(m, lanes)
             _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, soft, step, memory, s0)
