@@ -17,7 +17,7 @@ from hpcdem.lang.pcdc.lexer import short
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem import groups as g
-from hpcdem.physics.fdem.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 Where = str | g.Term | tuple[g.Term, ...] | None
 """The text of a RANGE, or terms of `hpcdem.physics.fdem.groups`, all of which must hold; None: everything."""
@@ -142,6 +142,8 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
     if isinstance(value, os.PathLike):
         value = os.fspath(value)
     if kind.varied and isinstance(value, (Over, Drawn)):
+        if isinstance(value, Over) and AXES[value.axis] not in kind.axes:
+            raise ValueError(f"{name}: a table over {AXES[value.axis]} cannot stand for it")
         return value
     if kind.varied and isinstance(value, np.ndarray) and value.ndim == 1:
         return np.array([_one(kind, item, name) for item in value.tolist()], np.float64)

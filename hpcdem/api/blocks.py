@@ -20,7 +20,7 @@ from hpcdem.commands import fdem
 from hpcdem.lang.pcdc.bindings import BINDINGS, Call
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
-from hpcdem.physics.fdem.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
@@ -517,7 +517,7 @@ class Tables(Words):
     _word = "tables"
 
     def create(self, name: str, values: Sequence[Point]) -> None:
-        """(time [s] or coordinate [m], value), the first ascending."""
+        """(time [s], coordinate [m] or plastic strain, value), the first ascending."""
         self._do("table create", {"name": name, "values": values})
 
     def delete(self, name: str) -> None:
@@ -525,10 +525,10 @@ class Tables(Words):
         self._do("table delete", {"name": name})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x" or "y" in the mesh."""
-        if axis not in ("x", "y"):
-            raise ValueError(f"axis: expected 'x' or 'y', got {axis!r}")
-        return Over(name, "xy".index(axis))
+        """For a property: the table over "x" or "y" in the mesh, or over "plastic-strain" (what softens or hardens)."""
+        if axis not in AXES:
+            raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
+        return Over(name, AXES.index(axis))
 
 
 @commands

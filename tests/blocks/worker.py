@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 
 COHESIVE = "classic_intrinsic_cohesive_interface"
@@ -85,13 +86,14 @@ def flight(sim: Blocks) -> None:
 
 
 def yielding(sim: Blocks) -> None:
-    """Two blocks of triangles and quads that yield, one of them jointed, hit each other while both fly to the right,
-    through the strips of all ranks; a part of the other is elastic."""
+    """Two blocks of triangles and quads that yield and soften, one of them jointed, hit each other while both fly to
+    the right, through the strips of all ranks; a part of the other is elastic."""
     one = shaken(rectangle(14, 7, 1.0, 0.5, kind="mixed"), 0.2)
     two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13, kind="mixed"), 0.2, seed=2)
     sim.take_mesh(joined(one, two))
     rock = {**ROCK, "friction": 25.0, "cohesion": 2e6, "tensile": 1e6, "dilation": 10.0, "damp_factor": 0.05}
-    changes.element_model(sim, None, "mech_mohr_coulomb", rock)
+    sim.table("softening", [(0.0, 2e6), (2e-3, 1.2e6)])
+    changes.element_model(sim, None, "mech_mohr_coulomb", {**rock, "cohesion": Over("softening", PLASTIC_STRAIN)})
     sim.element_property(np.arange(0, len(one.cells), 3), {"cohesion": 3e6, "dilation": 0.0})
     changes.element_model(sim, np.arange(len(one.cells), len(one.cells) + 6), "mech_iso_elastic", ROCK)
     edges = sim.mesh.edges()

@@ -13,7 +13,9 @@ from hpcdem.physics.fdem.tables import Drawn, Over
 
 SAMPLES: dict[str, tuple[str, object]] = {
     "<f>": ("0.25", 0.25), "<f>|table <s>": ("0.25", 0.25),
-    "<f>|table <s> over x|y|field <s>": ("0.25", 0.25), "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
+    "<f>|table <s> over x|y|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|plastic-strain|field <s>": ("0.25", 0.25),
+    "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
     "0|1|2": ("2", 2), "2|3": ("2", 2), "<s>": ("'a'", "a"),
     "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),
     "<v> <v> ...": ("(0,0) (1,0) (1,1)", [(0, 0), (1, 0), (1, 1)]), "<s> ...": ("'a' 'b'", ["a", "b"]),

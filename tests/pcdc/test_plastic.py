@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.fdem import Project
-from hpcdem.core.errors import ScriptError
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.fdem.simulation import Blocks
@@ -45,6 +45,17 @@ def test_a_pillar_yields_and_goes_on_from_a_file(tmp_path):
     assert whole.values("element", "stress_yy").mean() == pytest.approx(-2.0 * 3.45e6 * 3.0**0.5, rel=0.01)
     (frame,) = (tmp_path / "data").glob("end*.vtkhdf")
     assert np.array_equal(read_mesh_frame(frame).of_elements["plastic_state"], whole.values("element", "plastic_state"))
+
+
+def test_cohesion_that_softens(tmp_path):
+    """By a table over plastic strain: the pillar bears what is left in the end."""
+    soft = PILLAR.replace("coh 3.45e6", "coh table 'c' over plastic-strain")
+    text = "pcdc table create 'c' values (0,3.45e6) (1e-3,1e6)\n" + soft + "pcdc model step 800\n"
+    pcdc = run(tmp_path, text).namespace["pcdc"]
+    assert pcdc.values("element", "stress_yy").mean() == pytest.approx(-2.0 * 1e6 * 3.0**0.5, rel=0.05)
+    assert pcdc.values("element", "plastic_shear_strain").max() > 1e-3
+    with pytest.raises(HpcdemError, match="expected one of x, y for 'over'"):
+        run(tmp_path, text.replace("bulk 3.9e9", "bulk table 'c' over plastic-strain"))
 
 
 def test_frames_of_elastic_models_are_as_they_were(tmp_path):

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.lang.zdem.nearest import hint
+from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,19 @@ class Kind:
     """Words that are values."""
     varied: bool = False
     """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
+    softens: bool = False
+    """``table 'name' over plastic-strain`` may, too."""
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """What a table that stands for it can be over."""
+        return AXES if self.softens else AXES[:PLASTIC_STRAIN]
 
 
-def varied(kind: Kind) -> Kind:
+def varied(kind: Kind, softens: bool = False) -> Kind:
     """The same for a property of elements, faces or joints."""
-    return replace(kind, pattern=f"{kind.pattern}|table <s> over x|y|field <s>", varied=True)
+    made = replace(kind, varied=True, softens=softens)
+    return replace(made, pattern=f"{kind.pattern}|table <s> over {'|'.join(made.axes)}|field <s>")
 
 
 class Unfit(ValueError):

@@ -13,7 +13,7 @@ from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.physics.fdem.tables import Drawn, Over
+from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
 def parse(words: str, file: str, line: int, text: str, table: Table, last_line: int = 0) -> Statement:
@@ -240,7 +240,7 @@ class _Line:
             return found
         token = self.next(f"{kind.meaning} for {what}")
         if kind.varied and isinstance(token, Word) and matching(token.text, [_TABLE, _FIELD]):
-            return self._varied(token)
+            return self._varied(token, kind)
         if kind.tabled and isinstance(token, Word) and matching(token.text, [_TABLE]):
             name = kinds.read_value(
                 kinds.STRING, self.next("the name of a table in quotes"), "'table'", self.expressions
@@ -248,15 +248,16 @@ class _Line:
             return _later(kinds.TableName, name)
         return kinds.read_value(kind, token, what, self.expressions)
 
-    def _varied(self, token: Word) -> Any:
+    def _varied(self, token: Word, kind: kinds.Kind) -> Any:
         """What follows ``table`` or ``field`` in the place of a property."""
         if matching(token.text, [_FIELD]):
             return _later(Drawn, self.one(kinds.STRING, _FIELD))
         name = self.one(kinds.STRING, _TABLE)
         if self.take([_OVER]) is None:
-            word = self.next("'over x' or 'over y'")
-            raise ValueError(f"read {word}, expected 'over x' or 'over y' after the name of the table")
-        return _later(lambda name, axis: Over(name, "xy".index(axis)), name, self.one(_AXIS, _OVER))
+            over = " or ".join(f"'over {axis}'" for axis in kind.axes)
+            word = self.next(over)
+            raise ValueError(f"read {word}, expected {over} after the name of the table")
+        return _later(lambda name, axis: Over(name, AXES.index(axis)), name, self.one(kinds.choice(*kind.axes), _OVER))
 
     def _value_follows(self, ahead: int = 0) -> bool:
         at = self.at + ahead
@@ -281,7 +282,6 @@ class _Line:
 
 
 _TABLE, _FIELD, _OVER = Option("tab{le}", ()), Option("field", ()), Option("over", ())
-_AXIS = kinds.choice("x", "y")
 
 
 def _later(make: Callable[..., Any], *given: Any) -> Any:

@@ -169,13 +169,13 @@ def declared(
     `Option`; uniform: neither a table nor a field can stand for a number.
     """
     names = [Keyword(notation).name for notation in notations]
-    more = [name for one in model.properties if (name := one.name.replace("_", "-")) not in names]
+    more = [name for p in model.properties if (name := p.name.replace("_", "-")) not in names and not p.internal]
     options = []
     for notation, name in zip((*notations, *more), (*names, *more)):
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
         kind = limited(one.low, one.high, one.low_itself, one.unit)
-        kind = kind if uniform else varied(kind)
+        kind = kind if uniform else varied(kind, one.softens)
         required = not (default or one.optional)
         options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
     return tuple(options)
@@ -431,9 +431,10 @@ def _properties(model: Model) -> tuple[Option, ...]:
     return tuple(Option(o.notation, o.values, o.doc, o.unit, also=o.also) for o in model.options if o.name != "np")
 
 
+_FRICTION = next(o.values for o in MOHR_COULOMB.options if o.name == "friction")
 _OF_SOLIDS = (
-    *(replace(o, doc=f"{o.doc}; the internal one of {MOHR_COULOMB.keyword.name}") if o.name == "friction" else o
-      for o in _properties(ISO_ELASTIC)),
+    *(replace(o, doc=f"{o.doc}; the internal one of {MOHR_COULOMB.keyword.name}", values=_FRICTION)
+      if o.name == "friction" else o for o in _properties(ISO_ELASTIC)),
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
 )  # fmt: skip
@@ -643,7 +644,9 @@ _OBJECTS = (
     _group_command("element", "el{ement}"),
     Command("el{ement} c-m{odel}", "The constitutive model of elements, with its properties.",
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
-             "pcdc element c-model null range group 'excav_1' set 'domain'"),
+             "pcdc element c-model null range group 'excav_1' set 'domain'",
+             "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
+             "1e5 cohesion table 'c_of_strain' over plastic-strain"),
             models=(ISO_ELASTIC, NULL, MOHR_COULOMB, BURGERS, ISO_HEAT), ranged="element", manual=True),
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
@@ -734,7 +737,8 @@ _RECORDS = (
             "before and after.",
             ("pcdc table create 'blast' values (0,0) (5e-5,-60e6) (2e-4,0)",
              "pcdc table create 'blast' values [points]",
-             "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)"),
+             "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)",
+             "pcdc table create 'c_of_strain' values (0,2e6) (0.01,2e5)"),
             (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
                               required=True),)),
     Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,)),

@@ -25,10 +25,12 @@ from hpcdem.physics.fdem.properties import (
     JOINT,
     MECH_BURGERS,
     MECH_MOHR_COULOMB,
+    SOFTENS,
     Model,
     Rows,
+    softening_table,
 )
-from hpcdem.physics.fdem.tables import Drawn, Over, Table, Value
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Drawn, Over, Table, Value
 
 Numbers = np.ndarray | Sequence[int] | None
 """Numbers of elements, nodes, faces or joints; None: all."""
@@ -118,6 +120,8 @@ class ModelDefinition:
         self.fields: dict[str, RandomField] = {}
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
+        self.softening: list[Table] = []
+        """Tables over plastic strain, as they were when elements got them: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
@@ -293,6 +297,12 @@ class ModelDefinition:
         names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
         return self.alive & np.array([name == model.name for name in names])[self.element_row]
 
+    def softens(self) -> bool:
+        """Whether an element that is there has a property that follows a table over plastic strain."""
+        rows = self.element_rows
+        tables = np.any([rows.column(softening_table(name)) > 0.0 for name in SOFTENS], axis=0)
+        return bool(tables[self.element_row[self.alive]].any())
+
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
         new = at[self.stress0_row[at] == 0]
@@ -382,7 +392,7 @@ class ModelDefinition:
         for column, at in zip(columns[0::2], columns[1::2]):
             column[at] = number[which]
         for name, value in given.items():
-            if isinstance(value, (Over, Drawn)) and [on, name] not in self.varied:
+            if _differs(value) and [on, name] not in self.varied:
                 self.varied.append([on, name])
 
     def complete(
@@ -391,16 +401,17 @@ class ModelDefinition:
     ) -> np.ndarray:  # fmt: skip
         """Complete, checked properties of objects `of` (n,): (n, properties), or (1, properties) if none of them
         differs from object to object. CommandError names the first object whose value cannot be."""
+        given = self._with_softening(model, given)
         each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
             model.property(name)
         wanted: dict[str, Any] = keep(dict(before), new) if keep else {**before, **new}
         if not each and not before:
-            return np.array([list(model.complete(wanted).values())])
+            return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
         found = model.complete_each(wanted, len(of)) if all(map(_can_be_number, wanted.values())) else None
         if found is not None:
-            return found
+            return self._checked_softening(model, found)
         for i, number in enumerate(of.tolist()):
             try:
                 model.complete({name: v[i] if isinstance(v, np.ndarray) else v for name, v in wanted.items()})
@@ -409,6 +420,44 @@ class ModelDefinition:
                     raise
                 raise CommandError(f"{on} {number}: {error}") from None
         raise AssertionError("both ways to complete properties agree")
+
+    def _with_softening(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
+        """Properties of which those with a table over plastic strain have their value before any flow, and those that
+        can have one the number of their table."""
+        out = dict(given)
+        for name, value in given.items():
+            if isinstance(value, Over) and value.axis == PLASTIC_STRAIN:
+                if not model.property(name).softens:
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over plastic strain")
+                self._value(name, value.table)
+                table = self.tables[value.table]
+                if table.times[0] < 0.0:
+                    raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
+                for one in table.values.tolist():
+                    model.property(name).check(one)
+                known = [one.pairs() for one in self.softening]
+                if table.pairs() not in known:
+                    known.append(table.pairs())
+                    self.softening.append(table)
+                out[name], out[softening_table(name)] = table(0.0), 1.0 + known.index(table.pairs())
+            elif model.has(softening_table(name)):
+                out[softening_table(name)] = 0.0
+        return out
+
+    def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
+        """The complete sets of properties (n, k); CommandError if flow makes dilation larger than friction."""
+        if model.has(softening_table("dilation")):
+            place = {p.name: k for k, p in enumerate(model.properties)}
+            pair = [place[name] for one in ("dilation", "friction") for name in (one, softening_table(one))]
+            for row in np.unique(values[:, pair], axis=0):
+                tables = [self.softening[int(number) - 1] if number else None for number in row[[1, 3]]]
+                if any(tables):
+                    at = np.unique(np.concatenate([one.times for one in tables if one]))
+                    dilation, friction = (one.at(at) if one else value for one, value in zip(tables, row[[0, 2]]))
+                    above = np.flatnonzero(dilation > friction)
+                    if len(above):
+                        raise CommandError(f"dilation is above friction at a plastic strain of {at[above[0]]:g}")
+        return values
 
     def _spread(self, on: str, of: np.ndarray, name: str, value: Value) -> np.ndarray:
         """One number for each object."""
@@ -734,6 +783,7 @@ class ModelDefinition:
             "tables": {name: table.pairs() for name, table in self.tables.items()},
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
+            "softening": [table.pairs() for table in self.softening],
             "element_rows": self.element_rows.state(),
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
@@ -751,6 +801,7 @@ class ModelDefinition:
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]
+        self.softening = [Table.of(pairs) for pairs in state.get("softening", [])]
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
@@ -767,6 +818,11 @@ class ModelDefinition:
 
 def _is_number(value: Value) -> bool:
     return not isinstance(value, (Over, Drawn, np.ndarray))
+
+
+def _differs(value: Value) -> bool:
+    """From object to object."""
+    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis != PLASTIC_STRAIN)
 
 
 def _can_be_number(value: Any) -> bool:

@@ -95,7 +95,7 @@ PROPERTIES = {
         _STRENGTH.get(p.name, p.name): p.name
         for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)
         for p in m.properties
-        if p.name not in KELVIN_STRAIN  # what it is at a time is a quantity
+        if p.name not in KELVIN_STRAIN and not p.internal  # that strain at a time is a quantity
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }

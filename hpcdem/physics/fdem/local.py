@@ -13,11 +13,22 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
-from hpcdem.physics.fdem.kernels import creep, elements, energy, joints, laws, limits, plastic_quads, plasticity
+from hpcdem.physics.fdem.kernels import (
+    creep,
+    elements,
+    energy,
+    joints,
+    laws,
+    limits,
+    plastic_quads,
+    plasticity,
+    strength,
+)
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
-from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, Rows
+from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, SOFTENS, Rows, softening_table
+from hpcdem.physics.fdem.tables import Table
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
@@ -84,6 +95,20 @@ def creep_table(rows: Rows) -> np.ndarray:
     table[unit, creep.KELVIN], table[unit, creep.PER_KELVIN] = shear[unit], 1.0 / kelvin[unit]
     table[maxwell > 0.0, creep.PER_MAXWELL] = 1.0 / maxwell[maxwell > 0.0]
     return table
+
+
+def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np.ndarray) -> strength.Strength:
+    """The arrays of strength.py; of (own rows,): the row of the model of each."""
+    pieces = [np.column_stack([one.times, one.values]) for one in tables]
+    return strength.Strength(
+        len(rows),
+        of.astype(np.int64),
+        np.column_stack([rows.column(name) for name in SOFTENS]),
+        np.column_stack([rows.column(softening_table(name)) for name in SOFTENS]).astype(np.int64),
+        np.cumsum([0, *map(len, pieces)]),
+        np.concatenate([np.empty((0, 2)), *pieces]),
+        history,
+    )
 
 
 @dataclass
@@ -173,16 +198,16 @@ class Local:
         self.said = self.s0[:count].copy()
         self.uncrept = self.said
         if self.creeps:
-            self.creep_table = creep_table(sim.element_rows)
+            self.creep_table, self.creep_law = creep_table(sim.element_rows), self.law.copy()
             self.creeping = np.flatnonzero(sim.creeping()[sim.number[rows]])
             self._relieve_crept(np.arange(count))
         self.initial = self.s0[:count].copy()
         if self.plastic:
-            self.yield_table = yield_table(sim.element_rows)
             memory, own = sim.cold["plastic"], self.quad_rows
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, memory, self.s0)
             self.quad_initial = self.quad_s0[:, :4].copy()
             self.quad_law = np.repeat(sim.element_row[sim.number[own]].astype(np.int32)[:, None], 4, axis=1)
+            self._make_strength(rows)
             if len(own):
                 plastic_quads.relieve_all(own, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
@@ -194,6 +219,27 @@ class Local:
         """Stress without strain of the triangles `who`, less that of their creep strain."""
         sim = self.sim
         creep.relieve_all(who, self.triangle_rows, sim.n_left, self.c, self.uncrept, sim.cold["creep"], self.s0)
+
+    def _make_strength(self, rows: np.ndarray) -> None:
+        """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
+        rows of the triangles."""
+        sim = self.sim
+        of_models = yield_table(sim.element_rows)
+        history = sim.cold.get("softening", np.zeros((0, strength.HISTORY)))
+        tables = [sim.element_rows.column(softening_table(name)) > 0.0 for name in SOFTENS]
+        softens = np.any(tables, axis=0) if len(history) else np.zeros(len(of_models), bool)
+        law = self.law[: self.count, None]
+        of, first = [], len(of_models)
+        for laws_ in (law, self.quad_law):
+            own = softens[laws_]
+            of.append(laws_[own])
+            laws_[own] = first + np.arange(int(own.sum()))
+            first += int(own.sum())
+        self.strength = strength_tables(sim.element_rows, np.concatenate(of), sim.softening, history)
+        self.yield_table = np.concatenate([of_models, np.zeros((first - len(of_models), plasticity.YIELD))])
+        if len(history):
+            strength.renew_all(rows, sim.n_left, 1, law, self.strength, self.yield_table)
+            strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -489,7 +535,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self._flow(sim.cold["plastic"], self.s0, self.quad_s0)
+            self._flow(*self._plastic_state())
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
         self._triangles(
@@ -498,21 +544,29 @@ class Local:
         if len(self.quad_rows):
             self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
 
-    def _flow(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
-        """Elements outside their yield surface at the present positions flow: memory (n_own, 9 or 36), s0 (count + 3,
-        4) and quad_s0 (quads, 16) [Pa] become those after it."""
+    def _plastic_state(self) -> tuple[np.ndarray, ...]:
+        """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
+        (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""
+        return self.sim.cold["plastic"], self.s0, self.quad_s0, self.yield_table, self.strength.history
+
+    def _flow(
+        self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, table: np.ndarray, history: np.ndarray
+    ) -> None:
+        """Elements outside their yield surface at the present positions flow: the arrays of `_plastic_state`, or copies
+        of them, become those after it."""
         sim, one = self.sim, self.sim.threads == 1
         small, step = not sim.options.large_strain, sim.clock.step
+        soft = self.strength._replace(history=history)
         kernel = plasticity.flows if one else plasticity.flows_threaded
         kernel(
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            self.yield_table, small, step, memory, s0,
+            soft, small, step, memory, s0, table,
         )  # fmt: skip
         if len(self.quad_rows):
             of_quads = plastic_quads.flows if one else plastic_quads.flows_threaded
             of_quads(
                 sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
-                self.quad_law, self.yield_table, small, step, memory, quad_s0,
+                self.quad_law, soft, small, step, memory, quad_s0, table,
             )  # fmt: skip
 
     def _creeps_now(self) -> bool:
@@ -526,7 +580,7 @@ class Local:
         sim = self.sim
         kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
         kernel(
-            sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.law,
+            sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.creep_law,
             self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory, s0,
         )  # fmt: skip
 
@@ -545,7 +599,7 @@ class Local:
             return self.c, self.s0
         c, s0 = self.c.copy(), self.s0.copy()
         creep.as_elastic(
-            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.law, self.creep_table,
+            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, self.creep_table,
             sim.creep.passed, sim.cold["creep"], c, s0,
         )  # fmt: skip
         return c, s0
@@ -561,10 +615,10 @@ class Local:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], after the flow of this moment, which the next forces will see:
         copies."""
-        memory, s0, quad_s0 = self.sim.cold["plastic"].copy(), self.s0.copy(), self.quad_s0.copy()
+        after = tuple(part.copy() for part in self._plastic_state())
         if self.yields:
-            self._flow(memory, s0, quad_s0)
-        return memory, s0, quad_s0
+            self._flow(*after)
+        return after[0], after[1], after[2]
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
         """Columns `plasticity.MEMORY` (n, 9) of what owned elements remember of yielding, after the flow of this
@@ -623,7 +677,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *((sim.cold["plastic"], self.s0, self.quad_s0) if self.yields else ()),
+                *(self._plastic_state() if self.yields else ()),
                 *((sim.cold["creep"], self.s0) if self._creeps_now() else ()),
             )
         ]  # fmt: skip
@@ -728,7 +782,7 @@ class Local:
         if energies and (memory is not None or crept is not None):
             more, triangles = np.zeros(sim.n_own), self.triangle_rows[: self.count]
             if crept is not None:
-                creep.stored(triangles, sim.n_left, self.c, self.said, self.law, self.creep_table, crept, more)
+                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, self.creep_table, crept, more)
             if memory is not None:
                 initial = self.initial
                 if crept is not None:

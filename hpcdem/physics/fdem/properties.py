@@ -33,6 +33,10 @@ class Property:
     """The lowest value is allowed itself."""
     optional: bool = False
     """May be left out without a default: it then follows from others."""
+    softens: bool = False
+    """A table over plastic strain may stand for it."""
+    internal: bool = False
+    """Given by the program, not by name."""
     otherwise: str = ""
     """What counts where it is left out, if that is no number; commands see to what does not follow from others."""
 
@@ -74,7 +78,7 @@ class Model:
         for one in self.properties:
             if one.name == name:
                 return one
-        known = ", ".join(p.name for p in self.properties)
+        known = ", ".join(p.name for p in self.properties if not p.internal)
         raise CommandError(f"model {self.name} has no property {name}; it has {known}")
 
     def complete(self, given: Mapping[str, float]) -> dict[str, float]:
@@ -155,8 +159,17 @@ def _penalties(values: dict[str, Any]) -> None:
     values.setdefault("penalty_shear", values["penalty_normal"])
 
 
-def _friction(doc: str) -> Property:
-    return Property("friction", "degrees", doc, 0.0, high=89.0)
+def _friction(doc: str, softens: bool = False) -> Property:
+    return Property("friction", "degrees", doc, 0.0, high=89.0, softens=softens)
+
+
+SOFTENS = ("cohesion", "friction", "dilation", "tensile")
+"""Properties for which a table over plastic strain may stand. `softening_table` of them is its number, 0: none."""
+
+
+def softening_table(name: str) -> str:
+    """The internal property that holds the number of a property's table over plastic strain."""
+    return f"{name}_table"
 
 
 def _strength(values: dict[str, Any]) -> None:
@@ -229,10 +242,12 @@ MECH_MOHR_COULOMB = Model(
     "elastic up to the strength of Mohr and Coulomb or in tension, then plastic",
     (
         *_SOLID,
-        _friction("internal friction angle; also that of its surfaces where they have no contact model"),
-        Property("cohesion", "Pa", "cohesion"),
-        Property("tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts"),
-        Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0),
+        _friction("internal friction angle; also that of its surfaces where they have no contact model", softens=True),
+        Property("cohesion", "Pa", "cohesion", softens=True),
+        Property("tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True),
+        Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0, softens=True),
+        *(Property(softening_table(name), "", f"table of {name} over plastic strain", 0.0, internal=True)
+          for name in SOFTENS),
     ),
     _strength,
 )  # fmt: skip

@@ -35,6 +35,7 @@ from hpcdem.physics.fdem.kernels import creep as creeping
 from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
+from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
@@ -439,6 +440,9 @@ class Blocks(State):
             wanted = plasticity.MEMORY * (4 if self.wide else 1)
             if known.shape[1] < wanted:  # those of a file from before quads could yield have nine columns
                 self.cold["plastic"] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
+            if "softening" not in self.cold and self.softens():
+                columns = STRENGTH_HISTORY * (4 if self.wide else 1)
+                self.cold["softening"] = np.zeros((len(self.number), columns))
         creeps = self.creeping().any()
         if self.creep.on and not creeps and self.log is not None:
             self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")

@@ -8,6 +8,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
 
 ROCK = {"density": 2700.0, "young": 1e9, "poisson_ratio": 0.25, "damp_factor": 0.1, "friction": 20.0}
 JOINT = {
@@ -65,7 +66,9 @@ def _flow(mesh: Mesh, threads: int) -> None:
     """Elements of which some yield."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_mohr_coulomb", {**ROCK, "dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
+    weak: dict[str, Value] = {**ROCK, "dilation": 10.0, "cohesion": Over("c", PLASTIC_STRAIN), "tensile": 1.0}
+    changes.element_model(sim, None, "mech_mohr_coulomb", weak)
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
     diagnostics.account_energy(sim)

@@ -9,7 +9,8 @@ of its flow, and the forces would not be those of the elastic energy; FLAC takes
 reason. d is kept with the plastic strain that stresses depend on, and is not counted as plastic strain. As both
 triangles have one pressure the loop over quads is the elastic one.
 
-Sixteen quads are worked on together as 64 triangles: triangle p of quad e is entry 16 p + e of the lanes.
+`TILE` quads are worked on together as four times as many triangles: triangle p of quad e is entry p TILE + e of the
+lanes, corners and moduli are entry e.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
-from hpcdem.physics.fdem.kernels.elements import BLOCK, PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
+from hpcdem.physics.fdem.kernels import strength
+from hpcdem.physics.fdem.kernels.elements import PARTS, Q_AREA, Q_LAMBDA, Q_TWO_MU, _part
 from hpcdem.physics.fdem.kernels.plasticity import (
     CA,
     CB,
@@ -53,15 +55,15 @@ from hpcdem.physics.fdem.kernels.plasticity import (
     S22,
     S33,
     SHEAR,
-    SHEAR_NOW,
-    TENSION_NOW,
     VOLUME,
     WORK,
+    _all_inside,
     _measure,
     _return,
 )
+from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
-TILE = BLOCK // 4
+TILE = 16
 """Quads worked on together."""
 _FOUR, _EIGHT, _TWELVE, _SIXTEEN, _QUAD = U(4), U(8), U(12), U(16), U(32)
 _NEXT = lane(1)
@@ -179,7 +181,6 @@ def _try_overlay(overlay):
                 lanes[S22 + g] + (pressure + two_mu * (b22 + shift)),
             )
             t12, t33 = lanes[S12 + g] + two_mu * b12, lanes[S33 + g] + pressure
-            lanes[LAM + f], lanes[MU2 + f], lanes[LAM + g], lanes[MU2 + g] = lame, two_mu, lame, two_mu
             lanes[S11 + f], lanes[S22 + f], lanes[S12 + f], lanes[S33 + f] = s11, s22, s12, s33
             lanes[S11 + g], lanes[S22 + g], lanes[S12 + g], lanes[S33 + g] = t11, t22, t12, t33
             lanes[OUTSIDE + f] = _outside(
@@ -196,7 +197,7 @@ _try_overlay_0, _try_overlay_1 = _try_overlay(0), _try_overlay(1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed, memory, s0):
+def _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, soft, step, flowed, memory, s0):
     """Add what has flowed to memory and s0; flowed (TILE, 2): scratch, zero between calls."""
     for k in range(m):
         e, at, p = U(k), who[k] % TILE, who[k] // TILE
@@ -212,6 +213,11 @@ def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed
         if bits[k] & TENSION_NOW:
             memory[j, o + IN_TENSION] = step + 1.0
         memory[j, o + WORK] += lanes[P_WORK + e]
+        if law[first + at, p] >= soft.first:
+            strength.flowed(
+                law[first + at, p], j, p, bits[k], lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
+                lanes[P_SHEAR + e], lanes[P_VOLUME + e], soft, table,
+            )  # fmt: skip
         flowed[at, p // 2] = 1
     for at in range(TILE):
         for overlay in range(2):
@@ -225,9 +231,9 @@ def _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0):
+def _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
     lanes = np.zeros(LANES * CAPACITY)
-    who, bits, flowed = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64), np.zeros((TILE, 2), np.int64)
+    who, bits, flowed = np.zeros(4 * TILE, np.int64), np.zeros(4 * TILE, np.int64), np.zeros((TILE, 2), np.int64)
     item, row = np.empty(TILE, np.int64), np.empty(TILE, np.int64)
     flat_x, flat_q, flat_s0 = x.reshape(x.size), q.reshape(q.size), s0.reshape(s0.size)
     flat_law, flat_table = law.reshape(law.size), table.reshape(table.size)
@@ -240,13 +246,15 @@ def _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, ste
         _gather(TILE, item, row, flat_x, flat_q, flat_s0, flat_law, flat_table, lanes)
         _try_overlay_0(TILE, small, lanes)
         _try_overlay_1(TILE, small, lanes)
+        if _all_inside(4 * TILE, lanes) < 0:
+            continue
         for p in range(4):
             for e in range(n, TILE):
                 lanes[OUTSIDE + U(p * TILE + e)] = -1.0
-        m = _return(BLOCK, lanes, 2.0, who, bits)
+        m = _return(4 * TILE, lanes, 2.0, TILE, who, bits)
         if m > 0:
             _measure(m, lanes)
-            _remember(m, first, first_row, rows, who, bits, lanes, q, base, step, flowed, memory, s0)
+            _remember(m, first, first_row, rows, who, bits, lanes, q, base, law, table, soft, step, flowed, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -262,10 +270,10 @@ def flows(threads, *args):
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0):
+def flows_threaded(threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table):
     """The same on several threads."""
     for t in prange(threads):
-        _flow(t, threads, count, rows, first_row, x, q, base, law, table, small, step, memory, s0)
+        _flow(t, threads, count, rows, first_row, x, q, base, law, soft, small, step, memory, s0, table)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

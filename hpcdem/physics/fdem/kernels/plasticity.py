@@ -35,11 +35,12 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, two_columns
-from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels import laws, strength
 from hpcdem.physics.fdem.kernels.elements import BLOCK, LAMBDA, TWO_MU
+from hpcdem.physics.fdem.kernels.strength import SHEAR_NOW, TENSION_NOW
 
-SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
-"""Bits of the state of an element."""
+SHEAR_PAST, TENSION_PAST = 4, 8
+"""Bits of the state of an element, besides SHEAR_NOW, TENSION_NOW."""
 
 # Columns of the table of element models (rows, 4): N_phi, N_psi, 2 c sqrt(N_phi) [Pa], tensile strength [Pa]; infinite
 # strength: this model does not yield.
@@ -181,15 +182,26 @@ def _try(n, small, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _return(n, lanes, shares, who, bits):
+def _all_inside(n, lanes):
+    """Negative if no stress is outside."""
+    bits = lanes.view(np.int64)
+    found = np.int64(-1)
+    for e in range(U(n)):
+        found &= bits[OUTSIDE + e]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _return(n, lanes, shares, solids, who, bits):
     """Plastic strains of those that are outside, one after the other from the first place; shares: of how many that
-    fill the same area they are one; who, bits (BLOCK,) i8: which they are and how they yield. Returns their number."""
+    fill the same area they are one; solids: after how many the lanes of moduli begin again; who, bits (BLOCK,) i8:
+    which they are and how they yield. Returns their number."""
     m = 0
     for k in range(n):
         e, at = U(k), U(m)
         if lanes[OUTSIDE + e] > 0.0:
             s11, s22, s12, s33 = lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e]
-            lame, two_mu = lanes[LAM + e], lanes[MU2 + e]
+            lame, two_mu = lanes[LAM + U(k % solids)], lanes[MU2 + U(k % solids)]
             e11, e22, e12, e33, how = plastic_strain(
                 s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_PSI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e],
                 lame, two_mu,
@@ -219,7 +231,7 @@ def _measure(m, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0):
+def _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, soft, step, memory, s0):
     """Add what has flowed to memory and s0."""
     for k in range(m):
         e, i = U(k), first + who[k]
@@ -235,11 +247,16 @@ def _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory
         if bits[k] & TENSION_NOW:
             memory[j, IN_TENSION] = step + 1.0
         memory[j, WORK] += lanes[P_WORK + e]
+        if law[i] >= soft.first:
+            strength.flowed(
+                law[i], j, 0, bits[k], lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
+                lanes[P_SHEAR + e], lanes[P_VOLUME + e], soft, table,
+            )  # fmt: skip
         relieve(i, j, c, base, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
+def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table):
     lanes = np.zeros(LANES * CAPACITY)
     who, bits = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
     flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
@@ -250,10 +267,12 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, smal
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
         _try(n, small, lanes)
-        m = _return(n, lanes, 1.0, who, bits)
+        if _all_inside(n, lanes) < 0:
+            continue
+        m = _return(n, lanes, 1.0, BLOCK, who, bits)
         if m > 0:
             _measure(m, lanes)
-            _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0)
+            _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, soft, step, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -262,18 +281,19 @@ def flows(threads, *args):
 
     count: triangles; rows (count + 3,) i4: their rows of x, of which the first owned one is `first_row`; wide: x is
     (n, 12); c (count + 3, 12), see `elements.TRIANGLE`; base (count, 4) [Pa]: initial stress; law (count + 3,): row of
-    the table (rows, 4) of models, see `YIELD`; small: small strains; step: number of this step; memory (n_own, 9), see
-    `MEMORY`; s0 (count + 3, 4) [Pa]: stress without strain.
+    `table`; soft: see strength.py; small: small strains; step: number of this step. They become those after the flow:
+    memory (n_own, 9), see `MEMORY`; s0 (count + 3, 4) [Pa]: stress without strain; table (rows, 4) of yield surfaces,
+    see `YIELD`.
     """
     for t in range(threads):
         _flow(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0):
+def flows_threaded(threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table):
     """The same on several threads."""
     for t in prange(threads):
-        _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, small, step, memory, s0)
+        _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -1,0 +1,104 @@
+"""Strength that follows tables of plastic strain: elements that soften or harden as they flow.
+
+Cohesion, friction and dilation follow k_s, tensile strength follows k_t, each triangle (of a quad too) for itself:
+
+    k_s = sum sqrt(e : e / 2) of the deviator of the plastic strain of flow in shear,   k_t = sum of l_t
+
+(l: multipliers of plasticity.py; both as in FLAC's softening model). Where a triangle flows in shear and in tension in
+one step, the multipliers follow from the principal plastic strains: dilation and tension only lengthen, so l_s = -sum
+of those below zero, l_t = volume - (N_psi - 1) l_s, and k_s grows by l_s sqrt((1 + N_psi + N_psi^2) / 3), as on the
+plane f_s. What flows in a step flows with the strength before it; the new one holds from the next forces on. At rest
+the stress is on the surface of the strength that belongs to its k.
+
+A triangle with such a table has a row of its own in the table of yield surfaces, behind those of the models.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+HISTORY = 2
+"""Columns of what a triangle remembers besides (n, 2), or (n, 8) where there are quads: k_s, k_t."""
+COHESION, FRICTION, DILATION, TENSILE = range(4)
+SHEAR_NOW, TENSION_NOW = 1, 2
+"""Bits of the flow of a step, see plasticity.py."""
+DEGREE = math.pi / 180.0
+
+
+class Strength(NamedTuple):
+    """What kernels need: first own row of the table of yield surfaces; of (own rows,): the row of the model; values
+    (rows, 4): cohesion, friction, dilation [degrees], tensile strength before any flow; number (rows, 4): of their
+    tables, from 1 on, 0: none; begin (tables + 1,), points (m, 2): the tables, one behind the other; history (n_own, 2
+    or 8), see `HISTORY`."""
+
+    first: int
+    of: np.ndarray
+    values: np.ndarray
+    number: np.ndarray
+    begin: np.ndarray
+    points: np.ndarray
+    history: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def _at(strain, number, otherwise, begin, points):
+    """Value of a table, or `otherwise` if there is none; it is constant beyond its ends."""
+    if number == 0:
+        return otherwise
+    k, end = begin[number - 1], begin[number] - 1
+    if strain <= points[k, 0]:
+        return points[k, 1]
+    while k < end and points[k + 1, 0] < strain:
+        k += 1
+    if k == end:
+        return points[k, 1]
+    part = (strain - points[k, 0]) / (points[k + 1, 0] - points[k, 0])
+    return points[k, 1] + part * (points[k + 1, 1] - points[k, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def renew(row, j, part, strength, table):
+    """The row of a triangle in the table of yield surfaces (rows, 4) as it is after its flow; j, part: row of the
+    history and which triangle of the element it is."""
+    of = strength.of[row - strength.first]
+    shear, tension = strength.history[j, 2 * part], strength.history[j, 2 * part + 1]
+    values, number, begin, points = strength.values, strength.number, strength.begin, strength.points
+    cohesion = _at(shear, number[of, COHESION], values[of, COHESION], begin, points)
+    friction = DEGREE * _at(shear, number[of, FRICTION], values[of, FRICTION], begin, points)
+    dilation = DEGREE * _at(shear, number[of, DILATION], values[of, DILATION], begin, points)
+    tensile = _at(tension, number[of, TENSILE], values[of, TENSILE], begin, points)
+    root = math.tan(0.25 * math.pi + 0.5 * friction)
+    table[row, 0], table[row, 1] = root * root, math.tan(0.25 * math.pi + 0.5 * dilation) ** 2
+    table[row, 2] = 2.0 * cohesion * root
+    table[row, 3] = min(tensile, cohesion / math.tan(friction)) if friction > 0.0 else tensile
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def renew_all(rows, first, parts, law, strength, table):
+    """`renew` for elements in these storage rows (n,); first: storage row of the first owned one; law (n, parts)."""
+    for i in range(len(rows)):
+        for part in range(parts):
+            if law[i, part] >= strength.first:
+                renew(law[i, part], rows[i] - first, part, strength, table)
+
+
+@njit(cache=True, error_model="numpy")
+def flowed(row, j, part, bits, e11, e22, e12, e33, shear, volume, strength, table):
+    """A triangle has flowed by this plastic strain, `shear` and `volume` of it: its strength afterwards."""
+    if bits == SHEAR_NOW:
+        tension = 0.0
+    elif bits == TENSION_NOW:
+        shear, tension = 0.0, volume
+    else:
+        mean, half = 0.5 * (e11 + e22), 0.5 * (e11 - e22)
+        radius = math.sqrt(half * half + e12 * e12)
+        low, high, m = mean - radius, mean + radius, table[row, 1]
+        l_s = -(min(low, 0.0) + min(high, 0.0) + min(e33, 0.0))
+        shear, tension = l_s * math.sqrt((1.0 + m + m * m) / 3.0), max(volume - (m - 1.0) * l_s, 0.0)
+    strength.history[j, 2 * part] += shear
+    strength.history[j, 2 * part + 1] += tension
+    renew(row, j, part, strength, table)
