@@ -1,0 +1,171 @@
+"""A tunnel in rock that yields, supported by bolts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import model_validator
+
+from hpcdem.cases.base import Case, choice, quantity
+
+
+@dataclass(frozen=True)
+class Supported:
+    """convergence [m]: mean displacement of the wall towards the centre, at_support: when the bolts were put in; crown
+    [m]: displacement of the crown into the tunnel; plastic_radius [m]: of a circle with the area of the tunnel and of
+    the rock that has yielded; axial_force [N]: largest of a bolt, tension positive; yielded, broken: elements of bolts;
+    slipping: nodes of bolts whose grout slips; ratio: unbalanced forces over all at the end."""
+
+    convergence: float
+    at_support: float
+    crown: float
+    plastic_radius: float
+    axial_force: float
+    yielded: int
+    broken: int
+    slipping: int
+    ratio: float
+
+
+class Support(Case):
+    """A circular tunnel in Mohr-Coulomb rock under stress. Bolts are put in when a part of the stress is released."""
+
+    name: ClassVar[str] = "support"
+    title: ClassVar[str] = "A tunnel in rock that yields, supported by bolts"
+    needs: ClassVar[str] = "mesh"
+    result: ClassVar[type] = Supported
+
+    elements: Literal["tri", "quad"] = choice("quad", "triangles or quads")
+    plates: bool = choice(True, "face plates, which tie the heads of the bolts to the wall")
+    radius: float = quantity(3.0, "m", "radius of the tunnel", gt=0)
+    reach: float = quantity(10.0, "1", "from the centre to the sides of the model, over radius", ge=4)
+    size: float = quantity(0.25, "m", "edges of the elements at the tunnel", gt=0)
+    coarse: float = quantity(4.0, "m", "edges of the elements at the sides of the model", gt=0)
+    stress_xx: float = quantity(-10e6, "Pa", "horizontal stress before the excavation, compression negative", le=0)
+    stress_yy: float = quantity(-10e6, "Pa", "vertical stress before the excavation", le=0)
+    density: float = quantity(2500.0, "kg/m3", "density", gt=0)
+    young: float = quantity(2e9, "Pa", "Young's modulus", gt=0)
+    poisson: float = quantity(0.25, "1", "Poisson's ratio", ge=0, lt=0.5)
+    cohesion: float = quantity(1e6, "Pa", "cohesion", gt=0)
+    friction: float = quantity(30.0, "degrees", "friction angle", gt=0, lt=90)
+    dilation: float = quantity(5.0, "degrees", "dilation angle", ge=0, lt=90)
+    tensile_strength: float = quantity(0.2e6, "Pa", "tensile strength", ge=0)
+    release: float = quantity(0.6, "1", "part of the stress at the wall that is released before the bolts are put in",
+                              ge=0, le=1)  # fmt: skip
+    stages: int = quantity(8000, "1", "steps in which the stress at the wall is released", ge=100)
+    bolts: int = quantity(16, "1", "number of bolts, 0: none", ge=0, le=1000)
+    around: float = quantity(360.0, "degrees", "angle around the crown over which bolts are spread", gt=0, le=360)
+    bolt_length: float = quantity(4.0, "m", "length of a bolt", gt=0)
+    bolt_spacing: float = quantity(1.0, "m", "from bolt to bolt along the tunnel", gt=0)
+    bolt_diameter: float = quantity(0.025, "m", "diameter of a bolt", gt=0)
+    bolt_young: float = quantity(200e9, "Pa", "Young's modulus of a bolt", gt=0)
+    bolt_yield: float = quantity(250e3, "N", "axial force at which a bolt yields", gt=0)
+    pretension: float = quantity(0.0, "N", "tension with which a bolt is put in", ge=0)
+    bond_stiffness: float = quantity(1e9, "N/m/m", "stiffness of the grout along a bolt", gt=0)
+    bond_cohesion: float = quantity(2e6, "Pa", "cohesion between grout and bolt, and grout and rock", gt=0)
+    grout: float = quantity(0.0125, "m", "thickness of the grout", ge=0)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Support:
+        if self.size > 0.5 * self.radius:
+            raise ValueError(f"size is {self.size:g}, expected at most half of radius, {0.5 * self.radius:g} m")
+        if self.coarse < self.size:
+            raise ValueError(f"coarse is {self.coarse:g}, expected at least size, {self.size:g} m")
+        if self.dilation > self.friction:
+            raise ValueError(f"dilation is {self.dilation:g}, expected at most friction, {self.friction:g} degrees")
+        if self.radius + self.bolt_length > 0.9 * self.reach * self.radius:
+            raise ValueError(f"bolt_length is {self.bolt_length:g}: bolts would come near the sides of the model")
+        if self.stress_xx == 0.0 and self.stress_yy == 0.0:
+            raise ValueError("stress_xx and stress_yy are both 0, expected a stress")
+        if self.pretension > self.bolt_yield:
+            raise ValueError(f"pretension is {self.pretension:g}, expected at most bolt_yield, {self.bolt_yield:g} N")
+        return self
+
+    def model(self) -> str:
+        return GROUND.replace("KIND", "type quad" if self.elements == "quad" else "irregular")
+
+    def loading(self) -> str:
+        return EXCAVATED.replace(" PLATE", " plate" if self.plates else "") + MEASURED
+
+
+GROUND = """
+side = reach * radius
+
+pcdc model new
+# Corners in the middle of the sides: points of the mesh that can be held.
+pcdc geometry create polygon ([-side],[-side]) (0,[-side]) ([side],[-side]) ([side],0) ([side],[side]) \\
+    (0,[side]) ([-side],[side]) ([-side],0) as-layer 'outline'
+pcdc geometry create circle (0,0) [radius] as-layer 'wall'
+pcdc mesh create from-layer 'outline' size [coarse] refine-layer 'wall' size [size] distance [0.8*side] \\
+    region 'wall' group 'core' KIND group 'rock'
+pcdc element c-model mech-m-c property density [density] young [young] poisson-r [poisson] friction [friction] \\
+    cohesion [cohesion] tensile [tensile_strength] dilation [dilation]
+
+# The stress that was there before, held by the same stress on the sides.
+pcdc element initial stress-xx [stress_xx] stress-yy [stress_yy] stress-zz [poisson*(stress_xx + stress_yy)]
+pcdc element-face boundary m-s-b-c stress-xx [stress_xx] stress-yy [stress_yy] range geometry 'outline'
+near = 1e-6 * side
+for name, x, y, way in (('left', -side, 0, Vector(1,0)), ('right', side, 0, Vector(1,0)),
+                        ('below', 0, -side, Vector(0,1)), ('above', 0, side, Vector(0,1))):
+    pcdc node group '[name]' set 'held' range x [x - near] [x + near] y [y - near] [y + near]
+    pcdc node boundary mech-m-b-c type 2 [way] range group '[name]' set 'held'
+"""
+EXCAVATED = """
+import numpy as np
+def into():
+    # mean displacement of the wall towards the centre, and that of the crown
+    ux, uy, px, py = (pcdc.values('node', name, geometry='wall')
+                      for name in ('displacement-x', 'displacement-y', 'position-x', 'position-y'))
+    px, py = px - ux, py - uy
+    return float(np.nanmean(-(ux * px + uy * py) / radius)), -float(uy[np.hypot(px, py - radius).argmin()])
+
+# In balance before; then what the core did to the rock dies down, and on the way bolts are put in.
+pcdc model option dynamic off
+pcdc model option collision off
+pcdc model solve ratio 1e-7 cycles 1000
+pcdc node reset displacement
+pcdc element c-model null relax [stages] range group 'core'
+curve, done = [(0.0, 1.0)], 0
+for part in sorted({k / 20 for k in range(21)} | {release}):
+    goes_to = round(part * stages)
+    if goes_to > done:
+        pcdc model step [goes_to - done]
+        curve.append((1e3 * into()[0], 1 - part))
+    done = goes_to
+    if part != release:
+        continue
+    at_support = into()[0]
+    for k in range(bolts):
+        angle = math.radians(90 + around * ((k + 0.5) / bolts - 0.5))
+        way = Vector(math.cos(angle), math.sin(angle))
+        head, tail = radius * way, (radius + bolt_length) * way
+        pcdc bolt create polyline [head] [tail] length [size] PLATE group 'bolts'
+    if bolts:
+        pcdc bolt c-model mech-e-p property density 7850 young [bolt_young] diameter [bolt_diameter] \\
+            t-y-f [bolt_yield] s-s-r-b [bond_stiffness] g-t [grout] c-r-g [bond_cohesion] c-g-b [bond_cohesion] \\
+            spacing [bolt_spacing] pre-f [pretension]
+pcdc model solve ratio 1e-6
+"""
+MEASURED = """
+pcdc output vtk 'support'
+convergence, crown = into()
+ratio = pcdc.ratio
+flowed = pcdc.values('element', 'area')[pcdc.values('element', 'plastic-state') > 0]
+plastic_radius = math.sqrt(radius**2 + math.fsum(flowed) / math.pi)
+axial_force, yielded, broken, slipping = 0.0, 0, 0, 0
+if bolts:
+    force, state = pcdc.values('bolt-element', 'axial-force'), pcdc.values('bolt-element', 'bolt-state').astype(int)
+    axial_force = float(force[np.abs(force).argmax()])
+    yielded, broken = int((state & 15 > 0).sum()), int((state & 16 > 0).sum())
+    slipping = int((pcdc.values('bolt-node', 'bond-state').astype(int) & 1 > 0).sum())
+print('into the tunnel: mean %.4g mm (%.4g before the bolts), crown %.4g mm; plastic to %.4g m'
+      % (1e3*convergence, 1e3*at_support, 1e3*crown, plastic_radius))
+print('bolts: largest force %.4g kN, %d elements yielded, %d broken, grout slips at %d nodes'
+      % (axial_force/1e3, yielded, broken, slipping))
+curve.append((1e3 * convergence, 0.0))
+pcdc chart create 'support' x-label 'convergence (mm)' y-label 'stress at the wall over that before'
+pcdc chart add 'support' values [curve] label 'release'
+pcdc chart add 'support' values [[(1e3 * at_support, 1 - release)]] label 'bolts put in' style points
+pcdc chart export 'support' 'support.png' plastic
+"""
