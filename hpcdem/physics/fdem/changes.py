@@ -13,6 +13,7 @@ from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
 from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
+from hpcdem.physics.fdem.user_laws import MARK
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 
@@ -68,8 +69,13 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if name == MECH_MOHR_COULOMB.name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
-        raise CommandError(f"element {quads[0]} is a quad: {name} is for triangles")
+    if (name == MECH_MOHR_COULOMB.name or MARK in name) and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
+        raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
+    if MARK in name and sim.budget is not None:
+        raise CommandError(
+            f"an energy budget is kept, but what the law {name.partition(MARK)[0]} stores and loses is not known: "
+            "model option energy off comes first"
+        )
     if elements is not None:
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]

@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.kernels import elements, plasticity
@@ -469,6 +469,11 @@ def account_energy(sim: Blocks, on: bool = True) -> None:
     """Keep the energy budget from now on. In dynamic mode only. Collective."""
     if on and not sim.options.dynamic:
         raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
+    if on and (laws := user_laws.in_use(sim)):
+        raise CommandError(
+            f"no energy budget can be kept: what the law {laws[0].title} of {user_laws.some(sim)} stores and loses is "
+            "not known"
+        )
     sim.open_model()
     sim.cold.pop("work", None)
     sim.budget = Budget() if on else None

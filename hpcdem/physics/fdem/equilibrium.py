@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics
+from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
@@ -87,6 +87,11 @@ def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: s
         raise CommandError(
             f"element {yielding[0]} can yield ({len(yielding)} have the model {MECH_MOHR_COULOMB.name}): the static "
             "solve takes elastic elements; model solve relaxes others to equilibrium"
+        )
+    if laws := user_laws.in_use(sim):
+        raise CommandError(
+            f"{user_laws.some(sim)} has the law {laws[0].title}: the static solve takes elastic elements; model solve "
+            "relaxes others to equilibrium"
         )
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):

@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, connectivity
+from hpcdem.physics.fdem import build, connectivity, user_laws
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plasticity
 from hpcdem.physics.fdem.kernels import nodes as moving
@@ -162,6 +162,33 @@ class Local:
             self.law[:count] = sim.element_row[sim.number[rows]]
             self.yield_table = yield_table(sim.element_rows)
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, sim.cold["plastic"], self.s0)
+        self._make_laws(models)
+
+    def _make_laws(self, models: np.ndarray) -> None:
+        """Elements with a law of the user have no moduli in the table of forces, see kernels/user_laws.py; stiff: the
+        table by which the time step is found, with moduli in the ratio of those of the element."""
+        sim, count = self.sim, self.count
+        self.stiff, self.laws = self.c, []
+        numbers = user_laws.numbers(sim)[sim.number[self.triangle_rows[:count]]]
+        if not user_laws.of_rows(sim.element_rows):
+            return
+        of = np.flatnonzero(numbers)
+        self.law_row = np.zeros(count + 3, np.int32)
+        self.law_row[:count] = sim.element_row[sim.number[self.triangle_rows[:count]]]
+        self.law_base = np.zeros((count + 3, 4))
+        if sim.stress0 is not None:
+            self.law_base[of] = sim.initial_stresses(sim.number[self.triangle_rows[of]])
+        self.stiff = self.c.copy()
+        bound, row = sim.element_rows.column(user_laws.BOUND), self.law_row[of]
+        part = bound[row] / (models[row, build.LAME] + models[row, build.MU2])
+        self.stiff[of, elements.LAMBDA] *= part
+        self.stiff[of, elements.TWO_MU] *= part
+        self.c[of, elements.LAMBDA] = self.c[of, elements.TWO_MU] = 0.0
+        for k, law in enumerate(user_laws.of_rows(sim.element_rows)):
+            at = np.flatnonzero(numbers == 1 + k)
+            if len(at):
+                which = np.concatenate([at, np.repeat(at[-1:], 3)]).astype(np.int32)
+                self.laws.append((law, which, law.table(sim.element_rows)))
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -364,7 +391,7 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = limits.time_step(
-            self.c, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
             o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
@@ -383,7 +410,7 @@ class Local:
         own = sim.owned
         if not o.dynamic:
             limits.static_masses(
-                self.c, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
+                self.stiff, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
@@ -422,7 +449,7 @@ class Local:
         small = not o.large_strain
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic, small, self.slot_at, self.slot_law, self.slot_kind,
+            sim.stress0 is not None or self.plastic or bool(self.laws), small, self.slot_at, self.slot_law, self.slot_kind,
             self.slot_state, self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond,
             pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
@@ -453,6 +480,8 @@ class Local:
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
             self._flow(sim.cold["plastic"], self.s0)
+        if self.laws:
+            self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
             *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
         )
@@ -468,6 +497,25 @@ class Local:
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
             self.yield_table, not sim.options.large_strain, sim.clock.step, memory, s0,
         )  # fmt: skip
+
+    def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
+        """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0
+        (count + 3, 4) [Pa] the stress."""
+        sim = self.sim
+        dt = sim.clock.dt if sim.options.dynamic else 0.0
+        for law, which, table in self.laws:
+            loop = law.loop if sim.threads == 1 else law.loop_threaded
+            loop(
+                sim.threads, len(which) - 3, which, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c,
+                self.law_base, self.law_row, table, dt, not sim.options.large_strain, memory, s0,
+            )  # fmt: skip
+
+    def obeyed(self, s0: np.ndarray) -> np.ndarray:
+        """State variables of laws of the user (n_own, 1 + states) after this moment, which the next forces will see;
+        s0 (count + 3, 4) [Pa] becomes their stress. The model stays as it is."""
+        memory = self.sim.cold[user_laws.COLUMN].copy()
+        self._obey(memory, s0)
+        return memory
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray]:
         """What elements remember of yielding (n_own, 9) and the stress of triangles without strain (count + 3, 4) [Pa],
@@ -519,7 +567,9 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *((sim.cold["plastic"], self.s0) if self.yields else ()),
+                *((sim.cold["plastic"],) if self.yields else ()),
+                *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
+                *((self.s0,) if self.yields or self.laws else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -603,6 +653,9 @@ class Local:
         owned elements, or of some of them (at: the how-manieth)."""
         sim = self.sim
         memory, s0 = self.flowed() if self.plastic else (None, self.s0)
+        if self.laws:
+            s0 = s0.copy()
+            self.obeyed(s0)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, self.quad_s0
             n, first = sim.n_own, sim.n_left
@@ -620,6 +673,9 @@ class Local:
             more = np.zeros(sim.n_own)
             plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, self.initial, memory, more)
             energy += more if at is None else more[at]
+        if self.laws and energies:  # what such a law stores is not known
+            rows = slice(None) if at is None else at
+            energy[user_laws.numbers(sim)[sim.number[sim.owned]][rows] > 0] = math.nan
         return stress, energy
 
     def stored_in_joints(self) -> np.ndarray:

@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, overlaps
+from hpcdem.physics.fdem import build, connectivity, overlaps, user_laws
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, plasticity
@@ -401,6 +401,7 @@ class Blocks(State):
         mesh = self.the_mesh()
         if "plastic" not in self.cold and self.yielding().any():
             self.cold["plastic"] = np.zeros((len(self.number), plasticity.MEMORY))
+        user_laws.begin(self)
         with self.timers("neighbour"):
             if self._topology_stale:
                 self.renew_topology()

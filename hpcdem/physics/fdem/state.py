@@ -63,7 +63,7 @@ class State(ModelDefinition, Model):
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
     """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
-    "plastic" (what is remembered of yielding, see plasticity.py)."""
+    "plastic" (what is remembered of yielding, see plasticity.py), "law" (state variables, see user_laws.py)."""
     histories: Histories
     surface_loads: SurfaceLoads
     n_left: int
