@@ -316,7 +316,8 @@ class _Modelled(Objects):
     """With a constitutive model."""
 
     def model(self, name: str, *, where: Where = None, **properties: Value) -> None:
-        """The constitutive model, with its properties: docs/pcdc_reference.md lists them; `young`, `poisson_ratio`."""
+        """The constitutive model, with its properties: docs/pcdc_reference.md lists them; `young`, `poisson_ratio`.
+        Of a law of the user: "user", law="file.py:law", parameter=[("limit", 2e5)], see docs/user_laws.md."""
         self._carry_out("c-model", properties, where, name)
 
     def property(self, *, where: Where = None, **properties: Value) -> None:
@@ -329,6 +330,10 @@ class Elements(_Modelled):
     """Elements: `sim.elements["stress-xx"]`, see `Objects`."""
 
     _word, kind, pcdc = "elements", g.ELEMENT, "element"
+
+    def law(self, law: str) -> None:
+        """Read, check and compile a law of a Python file, "file.py:law", before `sim.restore`."""
+        self._do("element law", {"law": law})
 
     def null(self, *, relax: float | None = None, where: Where = None) -> None:
         """Take elements out; relax: time [s] (static runs: steps) over which their forces on the others die down."""
@@ -524,13 +529,16 @@ class Histories(Words):
         nearest: Point | None = None,
         how: str | None = None,
         every: int | None = None,
+        variable: str | None = None,
         where: Where = None,
     ) -> None:
         """Follow a value of a "node", "element", "joint" or of the "model": of one (id, or nearest to a point), or of
-        those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps."""
+        those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable: which state
+        variable of laws of the user, with the value "law-state"."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
-        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every}
+        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
+                 "variable": variable}  # fmt: skip
         if how is not None and how not in ways:
             raise ValueError(f"how: expected one of {', '.join(ways)}, got {how!r}")
         if how is not None:

@@ -11,9 +11,10 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem import changes, user_laws
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.user_laws import UserLaw
 
 Number = float | str
 """A number, or the name of a table of time."""
@@ -33,6 +34,17 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True
+
+
+def user_law(project: Project, law: str) -> UserLaw:
+    """Read, check and compile a law 'file.py:function' of the user. Collective."""
+    return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
+
+
+def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """The same, and elements get it, with its properties. Collective."""
+    project.ready()
+    element_model(project, user_law(project, law).name, properties, where)
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:

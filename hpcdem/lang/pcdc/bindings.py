@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands import fdem
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import TableName
 from hpcdem.lang.pcdc.trial import python
@@ -40,9 +41,14 @@ class Call:
         """The arguments as keyword arguments of Python."""
         return {python(name): value for name, value in self.arguments.items() if name not in left_out}
 
+    def given_only(self, *names: str) -> dict[str, Any]:
+        """Those of these names that were given."""
+        return {python(name): self.arguments[name] for name in names if name in self.arguments}
+
     def properties(self) -> dict[str, Any]:
         """Those of a model, tables by their name."""
-        return {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
+        given = {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
+        return with_parameters(given)
 
     def group(self) -> dict[str, Any]:
         """`group 'g' set 's'` of a mesh."""
@@ -50,6 +56,16 @@ class Call:
         if given is None:
             return {}
         return {"group": given["value"], "set_name": given.get("set", g.DEFAULT)}
+
+
+def with_parameters(given: dict[str, Any]) -> dict[str, Any]:
+    """Properties, with those that a law of the user declares under their names. CommandError if one is given twice."""
+    found = {name: value for name, value in given.items() if name != "parameter"}
+    for name, value in given.get("parameter", ()):
+        if name in found:
+            raise CommandError(f"'{name}' is given twice")
+        found[name] = value
+    return found
 
 
 def _plain(value: Any) -> Any:
@@ -140,6 +156,8 @@ def _group(kind: str) -> Callable[[Call], None]:
 def _element_model(call: Call) -> None:
     if call["model"] == "null":
         fdem.assignments.null(call.project, **call.properties(), where=call.where)
+    elif call["model"] == "user":
+        fdem.assignments.user_model(call.project, call["law"], call.properties(), call.where)
     else:
         name = trial.MODELS[call["model"]].name
         fdem.assignments.element_model(call.project, name, call.properties(), call.where)
@@ -204,7 +222,7 @@ def _history(call: Call) -> None:
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
     fdem.histories.create(
         call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
-        call.get("every", 1), call.where,
+        call.get("every", 1), call.where, **call.given_only("variable"),
     )  # fmt: skip
 
 
@@ -252,7 +270,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
-    "element property": lambda c: fdem.assignments.element_property(c.project, c.given(), c.where),
+    "element law": lambda c: fdem.assignments.user_law(c.project, c["law"]),
+    "element property": lambda c: fdem.assignments.element_property(c.project, with_parameters(c.given()), c.where),
     "element initial": _initial_stress,
     "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),
     "element-face group": _group(g.FACE),

@@ -78,6 +78,15 @@ class Interpreter:
         self.project.inputs[os.path.realpath(script.file)] = "the script that runs"
         self._execute(script, "exec")
 
+    def load_laws(self, script: Source) -> None:
+        """Read, check and compile the laws that commands of a script name, before it runs or goes on. ScriptError."""
+        for statement in script.statements:
+            if "law" in statement.arguments:
+                try:
+                    fdem.assignments.user_law(self.project, statement.arguments["law"])
+                except CommandError as error:
+                    raise statement.error(str(error)) from None
+
     def line(self, script: Source) -> None:
         """The same for what was typed: the value of an expression is shown."""
         self._execute(script, "single")

@@ -101,6 +101,8 @@ class _Line:
         if command.models:
             model = self.model(command)
             arguments["model"] = model.keyword.name
+            for leading in model.leading:
+                self.leading(leading, arguments)
             self.take([PROPERTY])
             given: dict[str, Any] = {}
             terms = self.options(command, model.options, given)

@@ -7,12 +7,12 @@ from typing import Any
 
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import Pending, TableName
-from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, Command
+from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, USER, Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
-    model.keyword.name: model.of for model in (ISO_ELASTIC, MOHR_COULOMB, CONTACT, COHESIVE) if model.of is not None
+    model.keyword.name: model.of for model in (ISO_ELASTIC, MOHR_COULOMB, USER, CONTACT, COHESIVE) if model.of is not None
 }
 """Models of the language by their names in full."""
 _OF_COMMAND = {
@@ -29,6 +29,8 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         for name, value in terms or ():
             if name in ("id", "x", "y") and known(value):
                 _ascending(name, value)
+        if isinstance(arguments.get("law"), Pending):
+            raise CommandError("the file of a law is plain text: it is read and checked before the script runs")
         if "model" in arguments:
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
@@ -83,7 +85,7 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
 
 def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     """Properties of a model, some of them perhaps left out or not known yet."""
-    given = {name: value for name, value in given.items() if name != "np"}
+    given = {name: value for name, value in given.items() if name not in ("np", "parameter")}
     for name, value in given.items():
         model.property(name).check(value)
     moduli = {name: value for name, value in given.items() if name in properties.MODULI}

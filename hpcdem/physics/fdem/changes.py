@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics
+from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
@@ -288,8 +288,8 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
 
 def reset_state(sim: Blocks, elements: Numbers = None) -> None:
     """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on. Stresses
-    stay, and so does the plastic strain that they depend on. Where no element has a model that yields the log says
-    that nothing was changed."""
+    stay, and so does the plastic strain that they depend on. State variables of laws of the user take their initial
+    values. Where no element has a model that remembers something the log says that nothing was changed."""
     at = sim.numbers_of_elements(elements)
     if "plastic" in sim.cold:
         sim.before_change()
@@ -297,7 +297,13 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
         for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
             sim.cold["plastic"][mine, column] = 0.0
         sim.changed(stiffness=False)
-    if sim.log is not None and not sim.yielding()[at].any():
+    remember = [1 + k for k, law in enumerate(user_laws.of_rows(sim.element_rows)) if law.states]
+    of_users = np.isin(user_laws.numbers(sim)[at], remember)
+    if of_users.any():
+        sim.before_change()
+        user_laws.forget(sim, np.isin(sim.number, at[of_users]))
+        sim.changed(stiffness=False)
+    if sim.log is not None and not sim.yielding()[at].any() and not of_users.any():
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
         sim.log.warn_once(
             f"reset state {names}",

@@ -730,7 +730,7 @@ class ModelDefinition:
         }
 
     def take_definition_state(self, state: dict[str, Any]) -> None:
-        """Inverse of `definition_state`. CommandError without the laws of the user that it names."""
+        """Inverse of `definition_state`."""
         self._closed = None
         self.options = Options(**state["options"])
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}

@@ -129,6 +129,8 @@ def total(sim: Blocks, name: str, numbers: Numbers = None) -> float:
 
 def quantity(sim: Blocks, name: str) -> Quantity:
     """The quantity of this name. CommandError if there is none. Not collective."""
+    if name not in QUANTITIES and name in user_laws.quantities(sim):
+        return Quantity("element", user_laws.unit(name), "state variable of a law of the user")
     if name not in QUANTITIES:
         raise CommandError(f"there is no quantity {name}; there are {', '.join(QUANTITIES)}")
     return QUANTITIES[name]
@@ -214,6 +216,9 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
     if any(name.startswith("plastic") for name in wanted):
         columns |= _plastic_columns(sim, some)
+    if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
+        memory = local.obeyed(local.s0.copy()) if local.laws else sim.cold[user_laws.COLUMN]
+        columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
     columns["area"] = sim.areas[number]

@@ -57,6 +57,8 @@ COLUMN = "law"
 """Of `State.cold`: 1 + the place of the element's law among `names`, then its state variables."""
 STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
+OF_LAW = "law_"
+"""How state variables are called as quantities."""
 MARK = "#"
 """Between the name of a law and the digest of its text."""
 
@@ -170,8 +172,9 @@ def _made(text: str, path: str, name: str, function: str) -> UserLaw:
         raise _Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
     declared = names[function]
     if not isinstance(declared, _Declared):
-        line = getattr(getattr(declared, "__code__", None), "co_firstlineno", 0)
-        raise _Wrong(line, f"'{function}' is not declared as a law: @element_law(...) stands before it")
+        code = getattr(declared, "__code__", None)
+        line = code.co_firstlineno if code is not None and code.co_filename == path else 0
+        raise _Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
     return _checked(declared, name, path)
 
 
@@ -254,7 +257,8 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
 
     def derive(values: dict[str, Any]) -> None:
         known._elastic(values)
-        _derive(declared, title, evaluate, columns, values)
+        file, _, function = title.rpartition(":")
+        _derive(declared, f"{file}:{line}: law '{function}'", evaluate, columns, values)
 
     return UserLaw(
         name, ELEMENT, f"the law of {title}", (*USER.properties, *declared.properties, bound), derive, title=title,
@@ -262,8 +266,9 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     )  # fmt: skip
 
 
-def _derive(declared: _Declared, title: str, evaluate: Any, columns: Sequence[str], values: dict[str, Any]) -> None:
-    """The stiffness bound of properties (numbers or arrays), and a look at the law at zero strain. CommandError."""
+def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str], values: dict[str, Any]) -> None:
+    """The stiffness bound of properties (numbers or arrays), and a look at the law at zero strain. law: its place and
+    name. CommandError."""
     shape = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
     full = {name: np.broadcast_to(np.asarray(value, float), shape).reshape(-1) for name, value in values.items()}
     n = full["bulk"].size
@@ -275,12 +280,12 @@ def _derive(declared: _Declared, title: str, evaluate: Any, columns: Sequence[st
             try:
                 bound[i] = float(declared.stiffness(**{name: float(full[name][i]) for name in of}))
             except Exception as error:  # the user's own code
-                raise CommandError(f"law {title}: its stiffness fails: {type(error).__name__}: {error}") from None
+                raise CommandError(f"{law}: its stiffness fails: {type(error).__name__}: {error}") from None
     else:
         bound = modulus if declared.stiffness is None else np.full(n, float(declared.stiffness))
     wrong = ~(np.isfinite(bound) & (bound > 0.0))
     if wrong.any():
-        raise CommandError(f"law {title}: its stiffness must be a number above 0 (Pa), got {bound[wrong][0]:g}")
+        raise CommandError(f"{law}: its stiffness must be a number above 0 (Pa), got {bound[wrong][0]:g}")
     table = np.ascontiguousarray(np.array([full[name] for name in columns]).T)
     begin = np.array([state.initial for state in declared.state])
     width = len(STRESS) + len(begin)
@@ -297,7 +302,7 @@ def _derive(declared: _Declared, title: str, evaluate: Any, columns: Sequence[st
     if wrong.any():
         i, k = np.argwhere(wrong)[0]
         told = ", ".join(f"{name} {full[name][i]:g}" for name in dict.fromkeys(columns))
-        raise CommandError(f"law {title}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
+        raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
     for k in range(2):
         for way in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
             slope = (at(k, way)[:, k] - rest[:, k]) / way
@@ -305,7 +310,7 @@ def _derive(declared: _Declared, title: str, evaluate: Any, columns: Sequence[st
             if steep.any():
                 i = int(np.flatnonzero(steep)[0])
                 raise CommandError(
-                    f"law {title}: d{what[k]}/d{STRAIN[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
+                    f"{law}: d{what[k]}/d{STRAIN[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
                     f"{bound[i]:g} Pa, by which the time step is found: stiffness= of element_law says more"
                 )
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
@@ -325,7 +330,7 @@ def _numba_message(error: Any) -> str:
     """Without colours, its first lines in one."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
     told = [line for line in lines if line and not line.startswith(("File ", "Failed in nopython", "During:", "^"))]
-    return "numba: " + " ".join(told[:3])
+    return "numba: " + " ".join(told[:2]).partition(" def ")[0].replace(">>> ", "")
 
 
 def _compile(law: UserLaw, threads: int) -> None:
@@ -387,14 +392,50 @@ def forget(sim: State, mine: np.ndarray) -> None:
         sim.cold[COLUMN][mine, 0] = 0.0
 
 
+def quantity(sim: State, variable: str) -> str:
+    """The name as quantity of a state variable. CommandError unless a law that elements have has one of this name."""
+    found = quantities(sim)
+    if OF_LAW + variable not in found:
+        known_ = ", ".join(name.removeprefix(OF_LAW) for name in found) or "none"
+        raise CommandError(f"no law of the user that elements have has a state variable '{variable}'; there is {known_}")
+    return OF_LAW + variable
+
+
+def quantities(sim: State) -> list[str]:
+    """State variables of the laws that elements have, as quantities."""
+    return list(dict.fromkeys(OF_LAW + state.name for law in in_use(sim) for state in law.states))
+
+
+def unit(name: str) -> str:
+    """Of such a quantity."""
+    laws = [law for law in MODELS.values() if isinstance(law, UserLaw)]
+    return next(state.unit for law in reversed(laws) for state in law.states if OF_LAW + state.name == name)
+
+
+def values(sim: State, name: str, memory: np.ndarray) -> np.ndarray:
+    """Such a quantity of the owned elements (n_own,), NaN for those whose law has no such variable; memory (n_own, 1 +
+    states): see `begin`."""
+    out = np.full(len(memory), math.nan)
+    for k, law in enumerate(of_rows(sim.element_rows)):
+        names = [OF_LAW + state.name for state in law.states]
+        if name in names:
+            mine = memory[:, 0] == 1 + k
+            out[mine] = memory[mine, 1 + names.index(name)]
+    return out
+
+
+class UnknownLaw(CommandError):
+    """A checkpoint has a law that was not named before."""
+
+
 def check_restored(state: Mapping[str, Any]) -> None:
-    """CommandError unless the laws that rows of a checkpoint name are there, with the same texts."""
+    """UnknownLaw unless the laws that rows of a checkpoint name are there, with the same texts."""
     for name, _ in state["element_rows"]:
         if MARK not in name or name in MODELS:
             continue
         title = name.partition(MARK)[0]
         other = any(one.partition(MARK)[0] == title for one in MODELS)
-        raise CommandError(
+        raise UnknownLaw(
             f"the checkpoint has elements with the law {title}, "
             + (f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on" if other else
                "which this script has not named: element law 'FILE:FUNCTION' before model restore does")
