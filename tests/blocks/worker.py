@@ -251,8 +251,8 @@ def nothing(sim: Blocks) -> None:
 
 
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
-         "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up), "backfill": (backfill, fill_up),
-         "borders": (report_borders, nothing)}  # fmt: skip
+         "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up),
+         "backfill": (backfill, fill_up), "borders": (report_borders, nothing)}  # fmt: skip
 
 
 def main() -> None:

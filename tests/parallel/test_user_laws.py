@@ -36,7 +36,7 @@ def test_ranks_and_threads_do_not_change_a_bit(folder, launch, ranks, threads):
     out = equal(launch, WORKER, "obeying", STEPS, folder, ranks, threads)
     if ranks > 1:
         with np.load(out) as found:
-            assert found["about"][3] > 10  # elements that came from another rank, with their states
+            assert found["about"][3] > 3  # elements that came from another rank, with their states
 
 
 @pytest.mark.mpi
@@ -96,12 +96,14 @@ def test_an_error_stops_all_ranks_before_the_run(launch, tmp_path):
     script = SCRIPT.replace("tresca", "elastic").replace("parameter 'limit' 1e6", "")
     found = run(launch, tmp_path, 2, "wrong", "print('it runs')\n" + script)
     assert found.returncode != 0 and "it runs" not in found.stdout
-    assert "wrong.sc:4: pcdc element c-model user" in found.stderr and f"rock.py:{line}: numba: NameError" in found.stderr
+    assert (
+        "wrong.sc:4: pcdc element c-model user" in found.stderr and f"rock.py:{line}: numba: NameError" in found.stderr
+    )
 
 
 @pytest.mark.mpi
 def test_resume_takes_the_law_of_the_script(launch, tmp_path):
-    """The law is compiled before the checkpoint is read; with another text the run does not begin again from nothing."""
+    """The law is compiled before the checkpoint is read; with another text the run stops."""
     shutil.copy(LAWS / "rock.py", tmp_path)
     (tmp_path / "job.sc").write_text(SCRIPT.replace("pcdc model save 'a.sav'", ""))
     job = ("job.sc", "--no-figure", "--outdir")

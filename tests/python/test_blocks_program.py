@@ -98,6 +98,12 @@ SAME: list[tuple[str, str]] = [
     ("pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2 y 1 3",
      "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
      "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
+    ("pcdc element c-model user 'a.py:clay' property density 2500 young 50e9 poisson-ratio 0.25 parameter 'limit' 2e6 "
+     "parameter 'slope' field 'rho' range x 0 1",
+     "sim.elements.model('user', law='a.py:clay', density=2500, young=50e9, poisson_ratio=0.25, "
+     "parameter=[('limit', 2e6), ('slope', sim.fields.drawn('rho'))], where='x 0 1')"),
+    ("pcdc element property parameter 'limit' 3e6", "sim.elements.property(parameter=[('limit', 3e6)])"),
+    ("pcdc element law 'a.py:clay'", "sim.elements.law('a.py:clay')"),
     ("pcdc element initial stress-xy 1 stress-zz 2", "sim.elements.initial_stress(xy=1, zz=2)"),
     ("pcdc element reset state range set 'd'", "sim.elements.reset_state(where=g.InSet('d'))"),
     ("pcdc element-face group 'a' set 's' range boundary", "sim.faces.group('a', 's', where='boundary')"),
@@ -136,6 +142,8 @@ SAME: list[tuple[str, str]] = [
      "sim.histories.create('h', 'node', 'reaction-y', how='sum', every=100, where=\"group 'p' set 'bc'\")"),
     ("pcdc history create 'h' joint value normal-stress-largest max range crack",
      "sim.histories.create('h', 'joint', 'normal_stress_largest', how='maximum', where='crack')"),
+    ("pcdc history create 'h' element id 3 value law-state variable 'slip'",
+     "sim.histories.create('h', 'element', 'law-state', variable='slip', id=3)"),
     ("pcdc history create 'h' element value stress-yy min",
      "sim.histories.create('h', 'element', 'stress-yy', how='minimum')"),
     ("pcdc history create 'h' node value velocity-x mean",

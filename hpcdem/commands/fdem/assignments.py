@@ -36,15 +36,19 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
         project.alive[elements] = True
 
 
-def user_law(project: Project, law: str) -> UserLaw:
+def load_law(project: Project, law: str) -> None:
     """Read, check and compile a law 'file.py:function' of the user. Collective."""
+    _law(project, law)
+
+
+def _law(project: Project, law: str) -> UserLaw:
     return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
 
 
 def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """The same, and elements get it, with its properties. Collective."""
     project.ready()
-    element_model(project, user_law(project, law).name, properties, where)
+    element_model(project, _law(project, law).name, properties, where)
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:

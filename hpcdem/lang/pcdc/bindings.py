@@ -270,7 +270,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
-    "element law": lambda c: fdem.assignments.user_law(c.project, c["law"]),
+    "element law": lambda c: fdem.assignments.load_law(c.project, c["law"]),
     "element property": lambda c: fdem.assignments.element_property(c.project, with_parameters(c.given()), c.where),
     "element initial": _initial_stress,
     "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),

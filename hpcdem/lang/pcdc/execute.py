@@ -83,7 +83,7 @@ class Interpreter:
         for statement in script.statements:
             if "law" in statement.arguments:
                 try:
-                    fdem.assignments.user_law(self.project, statement.arguments["law"])
+                    fdem.assignments.load_law(self.project, statement.arguments["law"])
                 except CommandError as error:
                     raise statement.error(str(error)) from None
 

@@ -84,8 +84,8 @@ class Option:
 @dataclass(frozen=True)
 class Model:
     """A constitutive model or boundary condition with its properties. number: of the manual's table; leading: values
-    that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be given; of: the model of the
-    simulation."""
+    that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be
+    given; of: the model of the simulation."""
 
     notation: str
     number: str
@@ -212,7 +212,10 @@ MOHR_COULOMB = Model(
 _LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
               required=True)  # fmt: skip
 _PARAMETER = Option(
-    "par{ameter}", (STRING, varied(FLOAT)), "a property that the law declares, by its name, and its value", repeated=True
+    "par{ameter}",
+    (STRING, varied(FLOAT)),
+    "a property that the law declares, by its name, and its value",
+    repeated=True,
 )
 USER = Model(
     "user", "", "A law in a Python file of the user, see docs/user_laws.md. For triangles.",
@@ -371,7 +374,8 @@ RECORDED = {
     },
     "element": {
         "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
-        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "law-state": "that of the law",
+        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m",
+        "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",

@@ -12,7 +12,9 @@ from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
-    model.keyword.name: model.of for model in (ISO_ELASTIC, MOHR_COULOMB, USER, CONTACT, COHESIVE) if model.of is not None
+    model.keyword.name: model.of
+    for model in (ISO_ELASTIC, MOHR_COULOMB, USER, CONTACT, COHESIVE)
+    if model.of is not None
 }
 """Models of the language by their names in full."""
 _OF_COMMAND = {

@@ -13,9 +13,9 @@ from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
 from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
-from hpcdem.physics.fdem.user_laws import MARK
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"
 TORN = 0.1

@@ -449,9 +449,9 @@ class Local:
         small = not o.large_strain
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic or bool(self.laws), small, self.slot_at, self.slot_law, self.slot_kind,
-            self.slot_state, self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond,
-            pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic or bool(self.laws), small, self.slot_at, self.slot_law,
+            self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow, self.joint_table,
+            self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
@@ -674,8 +674,8 @@ class Local:
             plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, self.initial, memory, more)
             energy += more if at is None else more[at]
         if self.laws and energies:  # what such a law stores is not known
-            rows = slice(None) if at is None else at
-            energy[user_laws.numbers(sim)[sim.number[sim.owned]][rows] > 0] = math.nan
+            of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0
+            energy[of_users if at is None else of_users[at]] = math.nan
         return stress, energy
 
     def stored_in_joints(self) -> np.ndarray:

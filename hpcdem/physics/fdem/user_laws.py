@@ -186,11 +186,14 @@ def _last_line(error: BaseException, path: str) -> int:
 def _checked(declared: _Declared, name: str, path: str) -> UserLaw:
     line = declared.function.__code__.co_firstlineno
     base, own, states = USER.properties, declared.properties, declared.state
-    for kind, things in (("property", own), ("state variable", states)):
-        wanted = Property if kind == "property" else StateVariable
-        for one in things:
-            if not isinstance(one, wanted):
-                raise _Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {one!r}")
+    declarations: tuple[tuple[str, type, tuple[Any, ...]], ...] = (
+        ("property", Property, own),
+        ("state variable", StateVariable, states),
+    )
+    for kind, wanted, things in declarations:
+        for thing in things:
+            if not isinstance(thing, wanted):
+                raise _Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {thing!r}")
     every = [*(p.name for p in base), *(p.name for p in own), *(s.name for s in states), *STRAIN, *INITIAL, STEP]
     for one in (*own, *states):
         if not isinstance(one.name, str) or not one.name.isidentifier():
@@ -233,7 +236,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
         raise _Wrong(_numba_line(error, path) or line, _numba_message(error)) from None
     except Exception as error:  # numba hands on what its passes meet in the user's own code
         raise _Wrong(line, f"numba: {type(error).__name__}: {error}") from None
-    found = kernel.nopython_signatures[0].return_type
+    found: Any = kernel.nopython_signatures[0].return_type
     wanted = [*STRESS, *(s.name for s in declared.state)]
     given = list(found) if isinstance(found, types.BaseTuple) else [found]
     if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
@@ -397,7 +400,9 @@ def quantity(sim: State, variable: str) -> str:
     found = quantities(sim)
     if OF_LAW + variable not in found:
         known_ = ", ".join(name.removeprefix(OF_LAW) for name in found) or "none"
-        raise CommandError(f"no law of the user that elements have has a state variable '{variable}'; there is {known_}")
+        raise CommandError(
+            f"no law of the user that elements have has a state variable '{variable}'; there is {known_}"
+        )
     return OF_LAW + variable
 
 
@@ -437,6 +442,9 @@ def check_restored(state: Mapping[str, Any]) -> None:
         other = any(one.partition(MARK)[0] == title for one in MODELS)
         raise UnknownLaw(
             f"the checkpoint has elements with the law {title}, "
-            + (f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on" if other else
-               "which this script has not named: element law 'FILE:FUNCTION' before model restore does")
+            + (
+                f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on"
+                if other
+                else "which this script has not named: element law 'FILE:FUNCTION' before model restore does"
+            )
         )
