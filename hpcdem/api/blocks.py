@@ -585,9 +585,9 @@ class Charts(Words):
         }  # fmt: skip
         self._do("chart add", given)
 
-    def export(self, name: str, file: File, cracks: bool = False) -> None:
-        """Write a diagram as figure and CSV; cracks: beside it the model as it is now."""
-        self._do("chart export", {"name": name, "file": file, "cracks": cracks})
+    def export(self, name: str, file: File, cracks: bool = False, plastic: bool = False) -> None:
+        """Write a diagram as figure and CSV; cracks, plastic: beside it the model as it is now, with one of them."""
+        self._do("chart export", {"name": name, "file": file, "cracks": cracks, "plastic": plastic})
 
 
 @commands

@@ -96,7 +96,7 @@ class Case(BaseModel):
     def _head(self) -> Iterator[str]:
         yield f"{self.title}."
         yield ""
-        yield f"  hpcdem {self.name}.sc       figure, histories and frames in data/, {self.name}.png beside the script"
+        yield f"  hpcdem {self.name}.sc       figures, histories and frames in data/"
         yield "  hpcdem movie data"
         yield ""
         yield f"Written by: {self.command()}"

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from hpcdem.post.series import Job
     from hpcdem.runtime.progress import Log
 
+PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic")} | {"both": ("cracks", "stress")}
+"""By words of --show."""
 PAGE = 17.0
 """Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
 
@@ -31,8 +33,8 @@ PAGE = 17.0
 @click.option("--format", "kind", type=click.Choice(["gif", "mp4", "both"]), help="[gif, and mp4 where ffmpeg is].")
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
 @click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
-@click.option("--show", type=click.Choice(["cracks", "stress", "both"]), default="both", help="Of blocks: cracks by "
-              "the way they broke, compressive stress [both].")  # fmt: skip
+@click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
+              "they broke, compressive stress, plastic strain; both: the first two [what there is].")  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @looks
 def movie(**options: Any) -> None:
@@ -149,17 +151,21 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
 
 
 def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) -> list[Job]:
-    """What is to be drawn of frames of blocks: one view and one range of stress for all."""
+    """What is to be drawn of frames of blocks: one view and one range of stress and of strain for all."""
     from hpcdem.io.axes import View
     from hpcdem.io.vtkhdf_mesh import read_mesh_frame
     from hpcdem.post import blocks
     from hpcdem.post.series import Job
 
-    views, spans = [], []
+    views = []
+    spans: dict[str, list[tuple[float, float]]] = {name: [] for name in blocks.CONTOURS}
+    panels: set[str] = set()
     for file in files:
         state = read_mesh_frame(file)
         views.append(blocks.view(state))
-        spans.append(blocks.stress_range(state))
+        panels.update(blocks.panels_of(state))
+        for name, shown in blocks.CONTOURS.items():
+            spans[name].append(shown.range(state))
     limits = [
         bound if options[name] is None else options[name]
         for name, bound in (
@@ -168,8 +174,9 @@ def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) ->
         )
     ]  # fmt: skip
     looks = blocks.Looks(
-        blocks.PANELS if options["show"] == "both" else (options["show"],), PAGE, options["fontsize"],
+        PANELS_SHOWN.get(options["show"]) or tuple(name for name in blocks.PANELS if name in panels), PAGE,
+        options["fontsize"],
         2.0 * options["size"] * 2.54 / PAGE, style_of(options, options["folder"], PAGE, 1.0).title,
-        (min(span[0] for span in spans), max(span[1] for span in spans)),
+        {name: (min(low for low, _ in them), max(high for _, high in them)) for name, them in spans.items()},
     )  # fmt: skip
     return [Job(file, scratch / f"{k:06d}.png", looks, View(*limits)) for k, file in enumerate(files)]

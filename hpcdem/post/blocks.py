@@ -1,4 +1,4 @@
-"""Pictures of blocks: cracks coloured by the way they broke, and contours of the compressive stress.
+"""Pictures of blocks: cracks coloured by the way they broke, contours of the compressive stress and of plastic strain.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
 """
@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,8 @@ from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 
-CRACKS, STRESS = "cracks", "stress"
-PANELS = (CRACKS, STRESS)
+CRACKS, STRESS, PLASTIC = "cracks", "stress", "plastic"
+PANELS = (CRACKS, STRESS, PLASTIC)
 CM = 1.0 / 2.54
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
@@ -42,15 +42,16 @@ _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the pa
 
 @dataclass(frozen=True)
 class Looks:
-    """panels: of PANELS; page: width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with
-    {step} and {time}; stress: range of the colours [Pa], None: of the frame."""
+    """panels: of PANELS, none: cracks, stress, and plastic strain where there is some; page: width [cm]; font and lines
+    in points; dpi: dots per inch; title: in the corner, with {step} and {time}; ranges: of the colours of panels, SI;
+    those that are not given are those of the frame."""
 
-    panels: tuple[str, ...] = PANELS
+    panels: tuple[str, ...] = ()
     page: float = 17.0
     font: float = 9.0
     dpi: float = 300.0
     title: str | None = None
-    stress: tuple[float, float] | None = None
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 USUAL = Looks()
@@ -72,6 +73,11 @@ def compression(state: MeshState) -> np.ndarray:
     return -(mean - np.hypot(half, s["stress_xy"]))
 
 
+def plastic_shear(state: MeshState) -> np.ndarray:
+    """(ne,) shear of the plastic strain along its way; 0 where the frame has none."""
+    return state.of_elements.get("plastic_shear_strain", np.zeros(len(state.cells)))
+
+
 def stress_range(state: MeshState) -> tuple[float, float]:
     """Least and greatest compressive stress [Pa] without the extreme percent of the elements."""
     values = compression(state)
@@ -80,6 +86,31 @@ def stress_range(state: MeshState) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = np.percentile(values, (1.0, 99.0))
     return float(min(low, 0.0) if low > -0.05 * abs(high) else low), float(high)
+
+
+def plastic_range(state: MeshState) -> tuple[float, float]:
+    """From 0 to the greatest plastic strain without the extreme percent of the elements that have some."""
+    values = plastic_shear(state)
+    values = values[values > 0.0]
+    return 0.0, float(np.percentile(values, 99.0)) if len(values) else 0.0
+
+
+@dataclass(frozen=True)
+class Contours:
+    """A panel with contours of what elements have; units: from the largest value to size and name of the unit."""
+
+    values: Callable[[MeshState], np.ndarray]
+    range: Callable[[MeshState], tuple[float, float]]
+    units: Sequence[tuple[float, str]]
+    title: str
+    colours: str
+
+
+def panels_of(state: MeshState) -> tuple[str, ...]:
+    """The panels that show what there is."""
+    if plastic_range(state)[1] > 0.0:
+        return PANELS if len(state.joints) else (STRESS, PLASTIC)
+    return CRACKS, STRESS
 
 
 def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
@@ -114,7 +145,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
     from matplotlib.figure import Figure
 
     seen = view(state) if seen is None else seen
-    panels = looks.panels
+    panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width
     beside = len(panels) > 1 and ratio > 0.7
     across = len(panels) if beside else 1
@@ -136,14 +167,16 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         if panel == CRACKS:
             cracks(axes, state, looks.font, width / seen.width)
         else:
-            span = looks.stress or stress_range(state)
-            filled = stress(axes, state, span)
+            shown = CONTOURS[panel]
+            span = looks.ranges.get(panel) or shown.range(state)
+            filled = contours(axes, state, shown, span)
             colours = figure.add_axes(
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
             _bar(figure, colours, filled, looks.font)
-            told = f"compressive stress ({pressure_unit(span)[1]})"
-            axes.set_title(told, loc="right", fontsize=0.9 * looks.font, pad=3.0)
+            axes.set_title(
+                f"{shown.title} ({unit_of(shown, span)[1]})", loc="right", fontsize=0.9 * looks.font, pad=3.0
+            )
         label = f"({'abcdefgh'[number]})" if len(panels) > 1 else ""
         axes.set_title(label, loc="left", fontsize=looks.font, pad=3.0)
     if looks.title is not None:
@@ -252,31 +285,36 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
     )
 
 
-# ---- stress --------------------------------------------------------------------------------------------------------
+# ---- contours --------------------------------------------------------------------------------------------------------
 
 
-def stress(axes: Any, state: MeshState, span: tuple[float, float]) -> Any:
-    """Contours of the larger compressive stress, colours from ... to ... [Pa]; returns what the colour bar is made of.
-    Broken joints are drawn over them."""
+CONTOURS = {
+    STRESS: Contours(compression, stress_range, PRESSURES, "compressive stress", "YlOrBr"),
+    PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGnBu"),
+}
+
+
+def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, float]) -> Any:
+    """Contours, colours from ... to ...; returns what the colour bar is made of. Broken joints are drawn over them."""
     from matplotlib.tri import Triangulation
 
     if not len(state.cells):
         return None
-    unit, _ = pressure_unit(span)
+    unit, _ = unit_of(shown, span)
     levels = nice_levels(span[0] / unit, span[1] / unit)
-    points, triangles, values = smoothed(state)
+    points, triangles, values = smoothed(state, shown.values(state))
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
-    filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap="YlOrBr", extend="both", zorder=1)
+    filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap=shown.colours, extend="both", zorder=1)
     joints = state.of_joints.get("state", np.empty(0))
     broken = (joints == BROKEN) | (joints == FREE)
     lines(axes, state.points[state.joints[broken]], INK, 0.5)
     return filled
 
 
-def pressure_unit(span: Sequence[float]) -> tuple[float, str]:
-    """The unit in which a stress is read best, in Pa, and its name."""
+def unit_of(shown: Contours, span: Sequence[float]) -> tuple[float, str]:
+    """The unit in which values of this range are read best, in SI, and its name."""
     largest = max(abs(value) for value in span)
-    return next(((size, name) for size, name in PRESSURES if largest >= size), PRESSURES[-1])
+    return next(((size, name) for size, name in shown.units if largest >= size), shown.units[-1])
 
 
 def nice_levels(low: float, high: float) -> np.ndarray:
@@ -288,9 +326,9 @@ def nice_levels(low: float, high: float) -> np.ndarray:
     return step * np.arange(first, max(last, first + 1) + 1)
 
 
-def smoothed(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (n, 2) at which corners meet, triangles (m, 3), and the stress there: the mean of the elements around,
-    weighted by area."""
+def smoothed(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (n, 2) at which corners meet, triangles (m, 3), and the values (ne,) of elements there: the mean of the
+    elements around, weighted by area."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -305,7 +343,7 @@ def smoothed(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     owner = np.concatenate([np.arange(len(cells)), np.flatnonzero(cells[:, 3] >= 0)])
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = 0.5 * np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
-    value = np.nan_to_num(compression(state))[owner]
+    value = np.nan_to_num(values)[owner]
     corner = place[triangles]
     weight = np.bincount(corner.reshape(-1), np.repeat(area, 3), count)
     total = np.bincount(corner.reshape(-1), np.repeat(area * value, 3), count)

@@ -26,9 +26,10 @@ def draw(
     y_label: str,
     curves: Sequence[tuple[str, str, Points]],
     model: MeshState | None = None,
+    plastic: bool = False,
 ) -> None:
     """Draw (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks that are drawn
-    beside the diagram, with their cracks."""
+    beside the diagram, with their cracks or with contours of plastic shear strain."""
     try:
         import matplotlib
     except ImportError:
@@ -40,7 +41,7 @@ def draw(
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
     else:
-        figure, axes = _beside(model)
+        figure, axes = _beside(model, plastic)
     for label, style, points in curves:
         x, y = [p[0] for p in points], [p[1] for p in points]
         if style == "points":
@@ -57,7 +58,7 @@ def draw(
     figure.savefig(path, format=kind, dpi=200)
 
 
-def _beside(model: MeshState) -> tuple[Any, Any]:
+def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
     """A figure with a model on the left, and the axes for a diagram on the right."""
     from matplotlib.figure import Figure
 
@@ -72,7 +73,25 @@ def _beside(model: MeshState) -> tuple[Any, Any]:
     right = figure.add_axes(
         ((0.7 + width + 0.75) / page[0], 0.5 / page[1], (SIZE[0] - 1.4) / page[0], height / page[1])
     )
-    modes = blocks.panel(left, model, seen, 2.54 * width)
+    modes: list[Any] = []
+    if plastic:
+        shown = blocks.CONTOURS[blocks.PLASTIC]
+        blocks.frame(left, seen, blocks.USUAL, first=True, last=True)
+        filled = blocks.contours(left, model, shown, shown.range(model))
+        left.apply_aspect()
+        box = left.get_position()
+        bar = figure.add_axes((box.x0 + 0.55 * box.width, box.y1 + 0.1 / page[1], 0.45 * box.width, 0.07 / page[1]))
+        if filled is None:
+            bar.set_axis_off()
+        else:
+            figure.colorbar(filled, cax=bar, orientation="horizontal", ticks=filled.levels[::4])
+        bar.tick_params(labelsize=0.8 * FONT, width=0.5, length=2.0, labelbottom=False, labeltop=True, bottom=False,
+                        top=True, pad=1.0)  # fmt: skip
+        unit = blocks.unit_of(shown, shown.range(model))[1]
+        bar.text(-0.05, 0.5, f"{shown.title} ({unit})", fontsize=0.9 * FONT, ha="right", va="center",
+                 transform=bar.transAxes)  # fmt: skip
+    else:
+        modes = blocks.panel(left, model, seen, 2.54 * width)
     for axes, label in ((left, "(a)"), (right, "(b)")):
         axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
     if modes:  # over the diagram there is room for all of them in one line

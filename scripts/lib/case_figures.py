@@ -1,4 +1,4 @@
-"""Figures of docs/cases.md and docs/validation.md: beam, tunnel and slope as their scripts make them.
+"""Figures of docs/cases.md and docs/validation.md: beam, tunnel and slopes as their scripts make them.
 
 `python scripts/lib/case_figures.py [FOLDER]` runs the three scripts (some minutes) and draws into docs/figures.
 """
@@ -49,7 +49,7 @@ def _seen(axes: Any, x: tuple[float, float], y: tuple[float, float], size: float
 def bend(folder: Path, case: ThreePointBend) -> Any:
     """The cracked middle of the beam at the end, and the load over the deflection."""
     state = frames(folder, case)[-1]
-    curve = np.loadtxt(folder / "bend.csv", delimiter=",", skiprows=1, usecols=(1, 2))
+    curve = np.loadtxt(folder / "data" / "bend.csv", delimiter=",", skiprows=1, usecols=(1, 2))
     figure, (left, right) = plt.subplots(1, 2, figsize=(17 * CM, 7 * CM), layout="constrained")
     wide = 0.8 * case.height
     blocks.cracks(left, state, FONT, 7.0 / (2 * wide))
@@ -74,7 +74,9 @@ def tunnel(folder: Path, case: Tunnel) -> Any:
     figure, (left, right) = plt.subplots(1, 2, figsize=(17 * CM, 7.8 * CM), layout="constrained")
     wide = case.zone * case.radius * 1.05
     blocks.cracks(left, state, FONT, 7.0 / (2 * wide))
-    filled = blocks.stress(right, state, (0.0, 2.0 * max(-case.stress_xx, -case.stress_yy)))
+    filled = blocks.contours(
+        right, state, blocks.CONTOURS["stress"], (0.0, 2.0 * max(-case.stress_xx, -case.stress_yy))
+    )
     bar = figure.colorbar(filled, ax=right, shrink=0.8)
     bar.set_label("larger compressive stress (MPa)")
     for axes, label in ((left, "(a)"), (right, "(b)")):
@@ -90,10 +92,11 @@ def slope(folder: Path, case: Slope) -> Any:
     figure, panels = plt.subplots(len(chosen), 1, figsize=(12 * CM, 4.6 * CM * len(chosen)), layout="constrained",
                                   sharex=True)  # fmt: skip
     depth = case.benches * case.bench_height + case.below
+    shown = blocks.CONTOURS["stress"]
     span = (0.0, case.density * case.gravity * depth)
     for axes, k, letter in zip(np.atleast_1d(panels), chosen, "abcdefgh", strict=False):
         state = states[k]
-        filled = blocks.stress(axes, state, span)
+        filled = blocks.contours(axes, state, shown, span)
         low, high = state.points.min(axis=0), state.points.max(axis=0)
         x, y = (float(low[0]), float(high[0])), (-case.below, case.benches * case.bench_height + 1.0)
         _seen(axes, x, y, 1.0, "m")
@@ -101,7 +104,7 @@ def slope(folder: Path, case: Slope) -> Any:
         told = "before the excavation" if k == 0 else f"bench {k} taken out"
         axes.set_title(f"({letter}) {told}", loc="left", fontsize=FONT)
     bar = figure.colorbar(filled, ax=list(np.atleast_1d(panels)), shrink=0.6)
-    bar.set_label(f"larger compressive stress ({blocks.pressure_unit(span)[1]})")
+    bar.set_label(f"larger compressive stress ({blocks.unit_of(shown, span)[1]})")
     return figure
 
 

@@ -10,17 +10,19 @@ from tests.conftest import ROOT, run
 
 PROGRAM = """
 import numpy as np
-from hpcdem.physics.fdem import saved_state
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem import build, histories, pairs
 from hpcdem.physics.fdem.warm_up import warm_up
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, stiffness
+from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, plasticity, softening
+from hpcdem.physics.fdem.kernels import stiffness
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():
-    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, stiffness)
+    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, plasticity,
+               softening, stiffness)
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 
@@ -28,32 +30,47 @@ warm_up(1)
 before = compiled()
 for kind in ("cross", "quad", "mixed"):
     sim = model(rectangle(4, 4, 1.0, 1.0, kind=kind))
-    sim.advance(3)
-    sim.unbalanced_ratio()
+    convergence.advance(sim, 3)
+    diagnostics.unbalanced_ratio(sim)
     saved_state.save(sim, "x.sav")
     saved_state.restore(Blocks(), "x.sav")
     sim = jointed(model(rectangle(4, 4, 1.0, 1.0, kind=kind)))
     sim.option(dynamic=False)
     sim.gravity(0.0, -1.0)
-    sim.advance(3)
-    sim.null([3], relax=3)
-    sim.advance(2)
-    sim.crack(sim.numbers_of_joints(None)[:3])
+    convergence.advance(sim, 3)
+    changes.null(sim, [3], relax=3)
+    convergence.advance(sim, 2)
+    changes.crack(sim, sim.numbers_of_joints(None)[:3])
     sim.option(dynamic=True)
-    sim.account_energy()
+    diagnostics.account_energy(sim)
     sim.time_step(mass_scaling=1e-5)
     sim.initial_stress(None, xx=-1.0)
-    sim.advance(10)
+    convergence.advance(sim, 10)
     sim.time_step(auto=True)
-    sim.advance(110)
-    sim.energies(), sim.contacts(), sim.total("opening"), sim.reset_displacement(), sim.values("displacement_x")
+    convergence.advance(sim, 110)
+    diagnostics.energies(sim)
+    diagnostics.contacts(sim)
+    diagnostics.total(sim, "opening")
+    changes.reset_displacement(sim)
+    diagnostics.values(sim, "displacement_x")
+rock = {"density": 2500.0, "young": 1e6,
+        "poisson_ratio": 0.2, "friction": 30.0, "cohesion": 1.0, "tensile": 1.0, "dilation": 0.0}
+for dynamic in (True, False):
+    sim = model(rectangle(4, 4, 1.0, 1.0, kind="cross"))
+    changes.element_model(sim, None, "mech_mohr_coulomb", rock)
+    sim.option(dynamic=dynamic)
+    sim.gravity(0.0, -1.0)
+    convergence.advance(sim, 20)
+    changes.reset_state(sim)
+    saved_state.save(sim, "x.sav")
+    saved_state.restore(Blocks(), "x.sav")
 square = rectangle(2, 2, 1.0, 1.0)
 for kind in ("cross", "quad", "mixed"):
     for sim in (model(rectangle(2, 2, 1.0, 1.0, kind=kind)), jointed(model(rectangle(2, 2, 1.0, 1.0, kind=kind)))):
         sim.velocity_condition([0, 1, 2], vx=0.0, vy=0.0)
         sim.gravity(0.0, -1.0)
         sim.option(dynamic=False)
-        sim.solve_elastic()
+        equilibrium.solve_elastic(sim)
 sim = model(Mesh.of(np.asfortranarray(square.points), np.asfortranarray(square.cells)))
 sim.step()
 after = compiled()

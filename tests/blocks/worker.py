@@ -93,10 +93,10 @@ def flight(sim: Blocks) -> None:
 
 
 def yielding(sim: Blocks) -> None:
-    """Two blocks that yield, one of them jointed, hit each other while both fly to the right, through the strips of all
-    ranks; a part of the other is elastic."""
-    one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
-    two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13), 0.2, seed=2)
+    """Two blocks of triangles and quads that yield, one of them jointed, hit each other while both fly to the right,
+    through the strips of all ranks; a part of the other is elastic."""
+    one = shaken(rectangle(14, 7, 1.0, 0.5, kind="mixed"), 0.2)
+    two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13, kind="mixed"), 0.2, seed=2)
     sim.take_mesh(joined(one, two))
     rock = {**ROCK, "friction": 25.0, "cohesion": 2e6, "tensile": 1e6, "dilation": 10.0, "damp_factor": 0.05}
     changes.element_model(sim, None, "mech_mohr_coulomb", rock)

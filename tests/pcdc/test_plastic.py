@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.fdem import Project
+from hpcdem.core.errors import ScriptError
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.fdem.simulation import Blocks
@@ -62,3 +63,22 @@ def test_changed_properties(tmp_path):
         ("damp_factor", 0.1), ("density", 2100.0), ("bulk", 3.9e9),
     ):  # fmt: skip
         assert pcdc.values("element", name) == pytest.approx(np.full(64, value)), name
+
+
+def test_a_diagram_beside_the_plastic_strain(tmp_path):
+    """The word `plastic` alone puts contours beside the curve, where the elements have flowed."""
+    imread = pytest.importorskip("matplotlib.image").imread
+    chart = "pcdc chart create 'c'\npcdc chart add 'c' y 'flow'\npcdc chart export 'c' 'c.png' {}\n"
+    pictures = {}
+    for word in ("", "cracks", "plastic"):
+        folder = tmp_path / f"with {word}"
+        folder.mkdir()
+        run(folder, PILLAR + "pcdc model step 500\n" + chart.format(word))
+        pictures[word] = imread(folder / "data" / "c.png")
+    sizes = {word: picture.shape[1] for word, picture in pictures.items()}
+    assert sizes[""] < sizes["cracks"] == sizes["plastic"]
+    left = pictures["plastic"][:, : sizes["plastic"] // 3, :3]
+    coloured = (left.max(axis=2) - left.min(axis=2) > 0.1).mean()
+    assert coloured > 0.1 and not np.array_equal(pictures["plastic"], pictures["cracks"])
+    with pytest.raises(ScriptError, match="room for one of them"):
+        run(tmp_path, PILLAR + "pcdc model step 50\n" + chart.format("cracks plastic"))

@@ -161,6 +161,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc chart add 'c' values (0,0) (1,1) style points",
      "sim.charts.add('c', values=[(0, 0), (1, 1)], style='points')"),
     ("pcdc chart export 'c' 'c.png' cracks", "sim.charts.export('c', 'c.png', cracks=True)"),
+    ("pcdc chart export 'c' 'c.png' plastic", "sim.charts.export('c', 'c.png', plastic=True)"),
     ("pcdc output vtk 'f' every 10", "sim.output.vtk('f', every=10)"),
     ("pcdc output vtk 'f'", "sim.output.vtk('f')"),
     ("pcdc output vtk 'f' off", "sim.output.vtk('f', off=True)"),

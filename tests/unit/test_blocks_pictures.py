@@ -128,13 +128,14 @@ def test_compression_is_the_principal_stress():
 
 def test_stress_is_averaged_over_what_hangs_together():
     state = state_of(strip())
-    points, triangles, values = blocks.smoothed(state)
+    points, triangles, values = blocks.smoothed(state, blocks.compression(state))
     assert len(points) == 14 and len(triangles) == 12  # 7 x 2 points, each once
     at = {(float(x), float(y)): v for (x, y), v in zip(points.round(9), values)}
     # Around (3, 0): one triangle of 1 MPa on the left, two of 3 MPa on the right; around (3, 1) the other way round.
     assert at[3.0, 0.0] == pytest.approx((1 + 2 * 3) / 3 * 1e6) and at[3.0, 1.0] == pytest.approx((2 + 3) / 3 * 1e6)
     assert at[1.0, 0.0] == pytest.approx(1e6) and at[5.0, 1.0] == pytest.approx(3e6)
-    points, _, values = blocks.smoothed(state_of(strip(tear=0.1)))
+    state = state_of(strip(tear=0.1))
+    points, _, values = blocks.smoothed(state, blocks.compression(state))
     assert len(points) == 16 and set(np.round(values / 1e6, 6)) == {1.0, 3.0}  # nothing goes across the gap
 
 
@@ -168,7 +169,8 @@ def test_levels_are_round_and_hold_the_range(low, high):
 
 
 def test_units_of_stress():
-    assert [blocks.pressure_unit((0, v))[1] for v in (2e9, 5e6, -3e4, 7.0, 0.0)] == ["GPa", "MPa", "kPa", "Pa", "Pa"]
+    stress = blocks.CONTOURS["stress"]
+    assert [blocks.unit_of(stress, (0, v))[1] for v in (2e9, 5e6, -3e4, 7.0, 0.0)] == ["GPa", "MPa", "kPa", "Pa", "Pa"]
 
 
 @pytest.mark.figures
@@ -216,11 +218,22 @@ class TestPictures:
         assert not (tmp_path / "a.tiff").exists()
 
     def test_stress_is_shaded_by_its_amount(self, tmp_path):
-        looks = blocks.Looks(panels=("stress",), dpi=100, stress=(0.0, 4e6))
+        looks = blocks.Looks(panels=("stress",), dpi=100, ranges={"stress": (0.0, 4e6)})
         seen = self.pixels(blocks.plot(state_of(strip()), tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0)))
         width = seen.shape[1]
         row = seen[seen.shape[0] // 2].sum(axis=1)
         assert row[int(0.25 * width)] > row[int(0.7 * width)] + 60  # 1 MPa is paler than 3
+
+    def test_plastic_strain_has_a_panel_where_there_is_some(self, tmp_path):
+        state = state_of(strip())
+        assert blocks.panels_of(state) == ("cracks", "stress")
+        state.of_elements["plastic_shear_strain"] = np.where(np.arange(12) < 6, 0.0, 0.02)
+        assert blocks.panels_of(state) == blocks.PANELS and blocks.plastic_range(state) == (0.0, 0.02)
+        assert len(blocks.draw(state).axes) == 5  # three panels, two of them with a bar of colours
+        looks = blocks.Looks(panels=("plastic",), dpi=100)
+        seen = self.pixels(blocks.plot(state, tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0)))
+        row = seen[seen.shape[0] // 2].sum(axis=1)
+        assert row[int(0.25 * seen.shape[1])] > row[int(0.7 * seen.shape[1])] + 60
 
     def test_a_film_keeps_the_colours_of_thin_lines(self, tmp_path, monkeypatch):
         from hpcdem.cli.common import read_command_line

@@ -45,13 +45,16 @@ def figure_name(path: str) -> None:
         raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
 
 
-def export(project: Project, name: str, path: str, cracks: bool = False) -> None:
+def export(project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False) -> None:
     """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
-    row per point. cracks: the figure also shows the model at this moment. Collective."""
+    row per point. cracks, plastic: the figure also shows the model at this moment, with the one or the other.
+    Collective."""
     from hpcdem.post.charts import draw
 
     chart, figure = _chart(project, name), project.result(path)
     figure_name(path)
+    if cracks and plastic:
+        raise CommandError("cracks and plastic: beside a diagram there is room for one of them")
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]
     if not any(points for _, _, points in curves):
         raise CommandError(f"chart '{name}' has no points yet")
@@ -62,14 +65,14 @@ def export(project: Project, name: str, path: str, cracks: bool = False) -> None
         project.to_write(file)
     project.folder()
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])
-    if cracks:
+    if cracks or plastic:
         project.ready(use=False)
-    model = frames.whole(project) if cracks else None
+    model = frames.whole(project) if cracks or plastic else None
 
     def picture() -> None:
         with atomic_path(figure) as temporary:
             draw(Path(temporary), figure.suffix[1:].lower(), chart.title, _x_label(project, chart),
-                 _y_label(project, chart), curves, model)  # fmt: skip
+                 _y_label(project, chart), curves, model, plastic)  # fmt: skip
 
     on_first(project.comm, picture)
 

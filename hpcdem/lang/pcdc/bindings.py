@@ -298,7 +298,9 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "history export": lambda c: fdem.histories.export(c.project, c["file"], c.get("names", ())),
     "chart create": lambda c: fdem.charts.create(c.project, **c.given()),
     "chart add": lambda c: fdem.charts.add(c.project, **c.given()),
-    "chart export": lambda c: fdem.charts.export(c.project, c["name"], c["file"], "cracks" in c.arguments),
+    "chart export": lambda c: fdem.charts.export(
+        c.project, c["name"], c["file"], "cracks" in c.arguments, "plastic" in c.arguments
+    ),
     "output vtk": _output,
 }
 

@@ -202,7 +202,7 @@ NULL = Model(
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",
-    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations. For triangles.",
+    "Elastic up to the strength of Mohr and Coulomb, or in tension, then plastic, for large rotations.",
     declared(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
@@ -735,9 +735,11 @@ _RECORDS = (
              Option("lab{el}", (STRING,), "in the legend"),
              Option("style", (choice("line", "points"),), "how it is drawn", default="line"))),
     Command("chart exp{ort}", "Writes a diagram as CSV and as a figure of the same name.",
-            ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks"),
+            ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks",
+            "pcdc chart export 'slope' 'slope.png' plastic"),
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
-            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),)),
+            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
+             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),

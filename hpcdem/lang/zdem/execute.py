@@ -152,7 +152,7 @@ class Interpreter:
     def carry_out(self, sim: Any, index: int) -> None:
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
-        self._guarded(statement, lambda: _VERBS[statement.command](_Call(self, sim, statement)))
+        self._guarded(statement, lambda: _COMMANDS[statement.command](_Call(self, sim, statement)))
 
     @staticmethod
     def _guarded(statement: Statement, work: Callable[[], None]) -> None:
@@ -355,7 +355,7 @@ def _say(call: _Call, text: str) -> None:
         call.sim.log.info(f"line {call.sim.line}: {call.statement.command}: {text}")
 
 
-_VERBS: dict[str, Callable[[_Call], None]] = {
+_COMMANDS: dict[str, Callable[[_Call], None]] = {
     "START": _start,
     "RESTORE": _restore,
     "LOAD": _load,

@@ -145,7 +145,7 @@ class Budget:
             in_joints = local.stored_in_joints()
             half = np.zeros((sim.n_own, energy.WORK))
             if local.plastic:
-                half[:, WORK.index("plastic")] = -local.flowed()[0][:, plasticity.WORK]
+                half[:, WORK.index("plastic")] = -local.plastic_columns(slice(None))[:, plasticity.WORK]
             self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}

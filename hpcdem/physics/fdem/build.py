@@ -303,7 +303,7 @@ def edges_now(slots, face, at, kind, history, where, cells, x, table, beyond, ou
 @njit(cache=True, nogil=True, error_model="numpy")
 def stresses(x, triangle_rows, quad_rows, c, q, s0, quad_s0, small, first, stress, energy):
     """Stress (n_own, 4) [Pa] and elastic energy (n_own,) [J/m], or (0,): not wanted, of the owned elements; first:
-    storage row of the first.
+    storage row of the first; s0 (count, 4), quad_s0 (count, 16) [Pa], see elements.py.
 
     Energy: (s0 + sigma / 2) : epsilon A, of a quad the mean of its overlays.
     """

@@ -10,9 +10,9 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
-from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
+from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, MECH_MOHR_COULOMB, model
+from hpcdem.physics.fdem.properties import ELEMENT, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import MARK
@@ -69,7 +69,7 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if (name == MECH_MOHR_COULOMB.name or MARK in name) and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
+    if MARK in name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
         raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
     if MARK in name and sim.budget is not None:
         raise CommandError(
@@ -294,8 +294,10 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
     if "plastic" in sim.cold:
         sim.before_change()
         mine = np.isin(sim.number, at)
-        for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
-            sim.cold["plastic"][mine, column] = 0.0
+        plastic = sim.cold["plastic"]
+        for part in range(0, plastic.shape[1], MEMORY):
+            for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
+                plastic[mine, part + column] = 0.0
         sim.changed(stiffness=False)
     remember = [1 + k for k, law in enumerate(user_laws.of_rows(sim.element_rows)) if law.states]
     of_users = np.isin(user_laws.numbers(sim)[at], remember)

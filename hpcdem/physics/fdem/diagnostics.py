@@ -230,7 +230,7 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
     """What elements remember of yielding; zero for those that never had a model that yields. They yield now if they
     did in the last step or do at the present positions."""
     if "plastic" in sim.cold:
-        memory = sim.local.flowed()[0][some]
+        memory = sim.local.plastic_columns(some)
     else:
         memory = np.zeros((sim.n_own, plasticity.MEMORY))[some]
     state = np.zeros(len(memory))

@@ -13,7 +13,7 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity, user_laws
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
-from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plasticity
+from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plastic_quads, plasticity
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
@@ -149,10 +149,10 @@ class Local:
             self.triangle_rows[:count], self.quad_rows, self.true_mass, self.c, self.q,
         )  # fmt: skip
         self.c[count:] = self.c[count - 1] if count else 1.0
-        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 4))
+        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 16))
         if sim.stress0 is not None:
             self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
-            self.quad_s0[:] = sim.initial_stresses(sim.number[self.quad_rows])
+            self.quad_s0[:] = np.tile(sim.initial_stresses(sim.number[self.quad_rows]), 4)
         self.plastic = "plastic" in sim.cold
         self.yields = bool(sim.yielding().any())
         if self.plastic:
@@ -161,7 +161,12 @@ class Local:
             self.law = np.zeros(count + 3, np.int32)
             self.law[:count] = sim.element_row[sim.number[rows]]
             self.yield_table = yield_table(sim.element_rows)
-            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, sim.cold["plastic"], self.s0)
+            memory, own = sim.cold["plastic"], self.quad_rows
+            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, memory, self.s0)
+            self.quad_initial = self.quad_s0[:, :4].copy()
+            self.quad_law = np.repeat(sim.element_row[sim.number[own]].astype(np.int32)[:, None], 4, axis=1)
+            if len(own):
+                plastic_quads.relieve_all(own, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
         self._make_laws(models)
 
     def _make_laws(self, models: np.ndarray) -> None:
@@ -455,8 +460,9 @@ class Local:
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None, small, self.slots_of_triangles, self.slot_at, self.slot_law, self.slot_kind,
-            self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic, small, self.slots_of_triangles, self.slot_at, self.slot_law,
+            self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot,
+            pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -479,7 +485,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self._flow(sim.cold["plastic"], self.s0)
+            self._flow(sim.cold["plastic"], self.s0, self.quad_s0)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
@@ -488,15 +494,22 @@ class Local:
         if len(self.quad_rows):
             self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
 
-    def _flow(self, memory: np.ndarray, s0: np.ndarray) -> None:
-        """Elements outside their yield surface at the present positions flow: memory (n_own, 9) and s0 (count + 3, 4)
-        [Pa] become those after it."""
-        sim = self.sim
-        kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
+    def _flow(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
+        """Elements outside their yield surface at the present positions flow: memory (n_own, 9 or 36), s0 (count + 3,
+        4) and quad_s0 (quads, 16) [Pa] become those after it."""
+        sim, one = self.sim, self.sim.threads == 1
+        small, step = not sim.options.large_strain, sim.clock.step
+        kernel = plasticity.flows if one else plasticity.flows_threaded
         kernel(
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            self.yield_table, not sim.options.large_strain, sim.clock.step, memory, s0,
+            self.yield_table, small, step, memory, s0,
         )  # fmt: skip
+        if len(self.quad_rows):
+            of_quads = plastic_quads.flows if one else plastic_quads.flows_threaded
+            of_quads(
+                sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
+                self.quad_law, self.yield_table, small, step, memory, quad_s0,
+            )  # fmt: skip
 
     def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
         """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0
@@ -517,13 +530,29 @@ class Local:
         self._obey(memory, s0)
         return memory
 
-    def flowed(self) -> tuple[np.ndarray, np.ndarray]:
-        """What elements remember of yielding (n_own, 9) and the stress of triangles without strain (count + 3, 4) [Pa],
-        after the flow of this moment, which the next forces will see: copies."""
-        memory, s0 = self.sim.cold["plastic"].copy(), self.s0.copy()
+    def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
+        (count + 3, 4) and of quads (quads, 16) [Pa], after the flow of this moment, which the next forces will see:
+        copies."""
+        memory, s0, quad_s0 = self.sim.cold["plastic"].copy(), self.s0.copy(), self.quad_s0.copy()
         if self.yields:
-            self._flow(memory, s0)
-        return memory, s0
+            self._flow(memory, s0, quad_s0)
+        return memory, s0, quad_s0
+
+    def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
+        """Columns `plasticity.MEMORY` (n, 9) of what owned elements remember of yielding, after the flow of this
+        moment: of quads the mean of the strains of their triangles by area, the latest steps, the sum of the work."""
+        memory = self.flowed()[0]
+        found = memory[:, : plasticity.MEMORY].copy()
+        quads = self.quad_rows - self.sim.n_left
+        if len(quads):
+            parts = memory[quads].reshape(len(quads), 4, plasticity.MEMORY)
+            areas = self.q[:, elements.Q_AREA : elements.Q_AREA + 4, None]
+            found[quads] = (areas * parts).sum(axis=1) / areas.sum(axis=1)
+            latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]
+            found[np.ix_(quads, latest)] = parts[:, :, latest].max(axis=1)
+            found[quads, plasticity.WORK] = parts[:, :, plasticity.WORK].sum(axis=1)
+        return found[at]
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
@@ -567,7 +596,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *((sim.cold["plastic"],) if self.yields else ()),
+                *((sim.cold["plastic"], self.quad_s0) if self.yields else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
                 *((self.s0,) if self.yields or self.laws else ()),
             )
@@ -652,12 +681,12 @@ class Local:
         """Stress (n_own, 4) xx, yy, xy, zz [Pa] and, unless they are not wanted, elastic energies (n_own,) [J/m] of the
         owned elements, or of some of them (at: the how-manieth)."""
         sim = self.sim
-        memory, s0 = self.flowed() if self.plastic else (None, self.s0)
+        memory, s0, quad_s0 = self.flowed() if self.plastic else (None, self.s0, self.quad_s0)
         if self.laws:
             s0 = s0.copy()
             self.obeyed(s0)
         if at is None:
-            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, self.quad_s0
+            rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0
             n, first = sim.n_own, sim.n_left
         else:
             triangle = self.triangle_of_row[at]
@@ -665,13 +694,15 @@ class Local:
             triangle, quad = triangle[three], np.searchsorted(self.quad_rows, at[~three] + sim.n_left)
             places = np.flatnonzero(three).astype(np.int32), np.flatnonzero(~three).astype(np.int32)
             rows = (
-                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], s0[triangle], self.quad_s0[quad],
+                sim.x[at + sim.n_left], *places, self.c[triangle], self.q[quad], s0[triangle], quad_s0[quad],
             )  # fmt: skip
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
         if memory is not None and energies:
             more = np.zeros(sim.n_own)
             plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, self.initial, memory, more)
+            if len(self.quad_rows):
+                plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
             energy += more if at is None else more[at]
         if self.laws and energies:  # what such a law stores is not known
             of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0

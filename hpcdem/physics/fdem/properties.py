@@ -195,7 +195,7 @@ MECH_ISO_ELASTIC = Model(
 MECH_MOHR_COULOMB = Model(
     "mech_mohr_coulomb",
     ELEMENT,
-    "elastic up to the strength of Mohr and Coulomb or in tension, then plastic; triangles",
+    "elastic up to the strength of Mohr and Coulomb or in tension, then plastic",
     (
         *_SOLID,
         _friction("internal friction angle; also that of its surfaces where they have no contact model"),

@@ -137,6 +137,36 @@ def returned_stress(trial: np.ndarray, rock: MohrCoulomb) -> np.ndarray:
     return (turn * best) @ turn.T
 
 
+def yielded_quad(
+    mesh: np.ndarray, x: np.ndarray, stress0: np.ndarray, zz: float, rock: MohrCoulomb, small: bool
+) -> list[tuple[Deformation, np.ndarray, bool]]:
+    """Of the four triangles of a quad that has not flowed before, the deformation, the stress (3, 3) [Pa] after its
+    flow, and whether it flowed; stress0 (2, 2), zz: initial stress [Pa].
+
+    The pressure in the plane is the mean of the two triangles of an overlay, by volumes that change against each other.
+    """
+    found = []
+    lame = rock.bulk - 2.0 / 3.0 * rock.shear
+    for overlay in (PARTS[:2], PARTS[2:]):
+        parts = [deformation(mesh[k], x[k], np.zeros((3, 2)), small) for k in overlay]
+        areas = [0.5 * float(np.linalg.det(mesh[k][1:] - mesh[k][0])) for k in overlay]
+        volume = np.average([np.trace(d.strain) for d in parts], weights=areas)
+        ends, flowed = [], []
+        for d in parts:
+            trial = np.zeros((3, 3))
+            strain = d.strain + 0.5 * (volume - np.trace(d.strain)) * ONE
+            trial[:2, :2] = stress0 + lame * volume * ONE + 2.0 * rock.shear * strain
+            trial[2, 2] = zz + lame * volume
+            ends.append(returned_stress(trial, rock))
+            flowed.append(bool(yield_functions(np.linalg.eigvalsh(trial), rock).max() > 0.0))
+        pressures = [0.5 * np.trace(s[:2, :2]) for s in ends]
+        for d, s, p, yes in zip(parts, ends, pressures, flowed):
+            more = np.average(pressures, weights=areas) - p
+            s = s + more * np.diag([1.0, 1.0, lame / (lame + rock.shear)])
+            found.append((d, s, yes))
+    return found
+
+
 def joint_forces(
     a: np.ndarray, b: np.ndarray, p: np.ndarray, q: np.ndarray, stresses: Callable[[int, float, float, float], tuple]
 ) -> np.ndarray:

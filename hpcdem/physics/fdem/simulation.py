@@ -399,8 +399,11 @@ class Blocks(State):
         """From open to closed. frozen: keep the rebuild_state as it is (restart)."""
         self._check_ready()
         mesh = self.the_mesh()
-        if "plastic" not in self.cold and self.yielding().any():
-            self.cold["plastic"] = np.zeros((len(self.number), plasticity.MEMORY))
+        if self.yielding().any():
+            known = self.cold.get("plastic", np.empty((len(self.number), 0)))
+            wanted = plasticity.MEMORY * (4 if self.wide else 1)
+            if known.shape[1] < wanted:  # those of a file from before quads could yield have nine columns
+                self.cold["plastic"] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
         user_laws.begin(self)
         with self.timers("neighbour"):
             if self._topology_stale:

@@ -26,8 +26,11 @@ from hpcdem.io.frames import list_frames, read_frame
 from tests.conftest import ROOT, Launcher
 
 PUBLISHED = {0.0: 1.4, 0.1: 10.0, 0.2: 26.0, 0.3: 40.0, 0.4: 48.5, 0.5: 54.8}
-OURS = {0.0: 8.6, 0.1: 12.1, 0.2: 27.1, 0.3: 41.7, 0.4: 51.0, 0.5: 56.4}
-"""Found here [degrees]; the tests allow 3 degrees beside these."""
+OURS = {0.0: 8.5, 0.1: 11.5, 0.2: 27.1, 0.3: 41.6, 0.4: 48.5, 0.5: 55.5}
+"""Found here [degrees]: means of six columns, seeds 1 to 6. Their standard deviations are 1.4, 0.4, 1.2, 1.3, 3.5, 6.4:
+with much friction a column comes down in a few slides, one unlike the other."""
+COLUMNS = {0.4: 6, 0.5: 6}
+"""Columns that are made here; of the others two."""
 RUNS = {0.0: (10e-3, 15000), 0.1: (40e-3, 25000), 0.2: (40e-3, 5000)}
 """Way of the wall [m] and steps of rest until the slope does not change; from 0.3 on the least is enough."""
 COLUMN = 0.6e-3
@@ -47,10 +50,14 @@ def slope(x: np.ndarray, y: np.ndarray, r: np.ndarray) -> float:
     return -math.degrees(math.atan(np.polyfit(centre[middle], top[middle], 1)[0]))
 
 
-def heap(launch: Launcher, folder: Path, friction: float, way: float, rest: int, damp: float = 0.4) -> float:
-    """The example with another friction: the wall goes `way` [m], then `rest` steps; the angle [degrees]."""
+def heap(launch: Launcher, folder: Path, friction: float, seed: int) -> float:
+    """The example with another friction and other random numbers: the wall goes its way [m], then so many steps of
+    rest; the angle [degrees]."""
+    way, rest = RUNS.get(friction, (20e-3, 5000))
+    damp = 0.4 if friction else 0.05
     text = (ROOT / "examples" / "angle_of_repose.py").read_text()
     changes = {
+        r"^SET seed 3": f"SET seed {seed}",
         r"^PROP fric 0\.3": f"PROP fric {friction} damp {damp}",
         r"^WALL id 2 fric 0\.3": f"WALL id 2 fric {friction}",
         r"^CYC 18000": "CYC 14000",
@@ -67,7 +74,9 @@ def heap(launch: Launcher, folder: Path, friction: float, way: float, rest: int,
     done = launch(1, "--no-figure", folder / "heap.py")
     assert done.returncode == 0, done.stdout + done.stderr
     columns = read_frame(list_frames(folder / "data")[-1].path).tables["particles"].columns
-    return slope(columns["x"], columns["y"], columns["radius"])
+    inside = columns["x"] > 0.0  # the topmost grain may fall over the wall when that is made lower
+    assert inside.sum() >= len(inside) - 2
+    return slope(*(columns[name][inside] for name in ("x", "y", "radius")))
 
 
 def test_slope_of_known_heaps() -> None:
@@ -81,15 +90,17 @@ def test_slope_of_known_heaps() -> None:
 
 @pytest.mark.slow
 def test_angles_of_repose(launch: Launcher, tmp_path: Path) -> None:
-    """Six frictions: near the published angle (not without friction, see above), and steeper with friction."""
+    """Six frictions: means of columns, near the published angle (not without friction, see above), steeper with
+    friction. The mean of n columns may lie three of its standard errors beside that of six, and a degree."""
+    spread = {0.0: 1.4, 0.1: 0.4, 0.2: 1.2, 0.3: 1.3, 0.4: 3.5, 0.5: 6.4}
     angles = {}
-    for friction in PUBLISHED:
-        way, rest = RUNS.get(friction, (20e-3, 5000))
-        damp = 0.4 if friction else 0.05
-        angles[friction] = heap(launch, tmp_path / f"{friction}", friction, way, rest, damp)
-        print(f"friction {friction}: {angles[friction]:.1f} degrees, published {PUBLISHED[friction]}")
-    for friction, angle in angles.items():
+    for friction, published in PUBLISHED.items():
+        count = COLUMNS.get(friction, 2)
+        found = [heap(launch, tmp_path / f"{friction} {seed}", friction, seed) for seed in range(1, count + 1)]
+        angles[friction] = float(np.mean(found))
+        print(f"friction {friction}: {np.round(found, 1)}, mean {angles[friction]:.1f} degrees, published {published}")
+        error = spread[friction] / math.sqrt(count)
         if friction:
-            assert angle == pytest.approx(PUBLISHED[friction], abs=4.0), friction
-        assert angle == pytest.approx(OURS[friction], abs=3.0), friction
+            assert angles[friction] == pytest.approx(published, abs=2.0 + 2.0 * error), friction
+        assert angles[friction] == pytest.approx(OURS[friction], abs=1.0 + 3.0 * error), friction
     assert np.all(np.diff(list(angles.values())) > 0.0)

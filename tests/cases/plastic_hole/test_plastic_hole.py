@@ -11,7 +11,8 @@ from equilibrium d s_r / dr = (s_t - s_r) / r and s_t = N s_r - q, whatever the 
 there.
 
 Where psi < phi the answer is not the only one: finer meshes than this one, or a hole that is made in fewer stages,
-leave bands that flow and parts between them that unload. Stresses are compared as means of cells of four triangles.
+leave bands that flow and parts between them that unload. Stresses are compared as means of cells: four triangles, or a
+quad.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ ROCK = {
 EDGE = (2.0 * P0 - Q) / (N + 1.0)
 OUTSIDE, AROUND, ALONG = 10.0, 20, 30
 STAGES = 40
+LITTLE = 1e-4
+"""Plastic shear strain that cells on the boundary of the zone do not reach; at the hole it is 0.06."""
 
 
 def radius(pressure: float) -> float:
@@ -48,8 +51,8 @@ def exact(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def quarter() -> Mesh:
-    """A quarter of a ring from 1 to 10 m; cells of four triangles, which grow outwards by 8 %."""
+def quarter(each: int) -> Mesh:
+    """A quarter of a ring from 1 to 10 m; cells, each of four triangles or one quad, which grow outwards by 8 %."""
     steps = 1.08 ** np.arange(ALONG)
     r = 1.0 + np.concatenate([[0.0], np.cumsum(steps)]) * (OUTSIDE - 1.0) / steps.sum()
     t = np.linspace(0.0, 0.5 * math.pi, AROUND + 1)
@@ -59,16 +62,19 @@ def quarter() -> Mesh:
         for j in range(AROUND):
             a = i * (AROUND + 1) + j
             corners = (a, a + AROUND + 1, a + AROUND + 2, a + 1)
+            if each == 1:
+                cells.append(corners)
+                continue
             middle = len(points)
             points.append(tuple(np.mean([points[k] for k in corners], axis=0)))
             cells += [(corners[k], corners[(k + 1) % 4], middle, -1) for k in range(4)]
     return Mesh.of(np.array(points), cells)
 
 
-def hole(dilation: float) -> Blocks:
+def hole(dilation: float, each: int) -> Blocks:
     """The pressure in the hole is lowered in stages, and the one outside follows the exact solution."""
     sim = Blocks()
-    sim.take_mesh(quarter())
+    sim.take_mesh(quarter(each))
     changes.element_model(sim, None, "mech_mohr_coulomb", {**ROCK, "dilation": dilation})
     sim.option(dynamic=False, collision=False, large_strain=False)
     sim.initial_stress(None, xx=-P0, yy=-P0, zz=-P0)
@@ -91,21 +97,23 @@ def hole(dilation: float) -> Blocks:
     return sim
 
 
+@pytest.mark.parametrize("each", [4, 1])
 @pytest.mark.parametrize("dilation", [30.0, 0.0])
-def test_stresses_and_plastic_zone(dilation):
-    sim = hole(dilation)
+def test_stresses_and_plastic_zone(dilation, each):
+    sim = hole(dilation, each)
     areas, centres = sim.mesh.areas(), sim.mesh.centroids()
     c, s = centres.T / np.hypot(*centres.T)
     xx, yy, xy = (diagnostics.values(sim, f"stress_{name}") for name in ("xx", "yy", "xy"))
     found = xx * c * c + yy * s * s + 2.0 * xy * c * s, xx * s * s + yy * c * c - 2.0 * xy * c * s
-    cells = areas.reshape(-1, 4).sum(axis=1)
-    means = [(areas * part).reshape(-1, 4).sum(axis=1) / cells for part in found]
-    wanted = [(areas * part).reshape(-1, 4).sum(axis=1) / cells for part in exact(np.hypot(*centres.T))]
-    r = np.hypot(*centres.T).reshape(-1, 4).mean(axis=1)
+    cells = areas.reshape(-1, each).sum(axis=1)
+    means = [(areas * part).reshape(-1, each).sum(axis=1) / cells for part in found]
+    wanted = [(areas * part).reshape(-1, each).sum(axis=1) / cells for part in exact(np.hypot(*centres.T))]
+    r = np.hypot(*centres.T).reshape(-1, each).mean(axis=1)
     near = np.where(r < 5.0, cells, 0.0)
     for mean, want in zip(means, wanted):
         assert math.sqrt((near * (mean - want) ** 2).sum() / (near * want**2).sum()) < 0.01
-    zone = math.sqrt(1.0 + 4.0 / math.pi * areas[diagnostics.values(sim, "plastic_state") > 0].sum())
+    flowed = diagnostics.values(sim, "plastic_shear_strain") > LITTLE
+    zone = math.sqrt(1.0 + 4.0 / math.pi * areas[flowed].sum())
     assert zone == pytest.approx(radius(0.0), rel=0.02) and radius(0.0) == pytest.approx(1.735, abs=5e-4)
     rings = means[0].reshape(ALONG, AROUND).mean(axis=1)
     there = np.interp(radius(0.0), r.reshape(ALONG, AROUND).mean(axis=1), rings)

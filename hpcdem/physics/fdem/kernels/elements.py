@@ -54,7 +54,7 @@ EDGE_FORCE = 50
 LEFT0, LEFT1, LEFT2 = (lane(62 + k) for k in range(3))
 LANES = 65
 A0, A1, A2, A3 = (lane(EDGE_FORCE + 4 * k) for k in range(4))
-_1, _2, _3, _FOUR, _SIX, _EIGHT, _TWELVE, _QUAD = U(1), U(2), U(3), U(4), U(6), U(8), U(12), U(QUAD)
+_1, _2, _3, _FOUR, _SIX, _EIGHT, _TWELVE, _SIXTEEN, _QUAD = U(1), U(2), U(3), U(4), U(6), U(8), U(12), U(16), U(QUAD)
 _NEXT = lane(1)
 _B = lane(2)
 """From the force on the first corner of an edge to that on its last."""
@@ -386,10 +386,12 @@ QUAD_ROW = 66
 """First lane of the row of the table of quads, of which seven times four columns are needed."""
 Q_C, Q_LAM, Q_MU2, Q_VISC = (lane(QUAD_ROW + k) for k in (Q_INVERSE, Q_LAMBDA, Q_TWO_MU, Q_ETA))
 Q_M1, Q_M2, Q_M3, Q_M4 = (lane(QUAD_ROW + Q_WEIGHT + k) for k in range(4))
-Q_S11, Q_S22, Q_S12, _, Q_LEFT0, Q_LEFT1, Q_LEFT2, Q_LEFT3 = (lane(QUAD_ROW + 28 + k) for k in range(8))
-B1, B2, B3, B4 = (lane(QUAD_ROW + 36 + 2 * k) for k in range(4))
+Q_LEFT0, Q_LEFT1, Q_LEFT2, Q_LEFT3 = (lane(QUAD_ROW + 28 + k) for k in range(4))
+B1, B2, B3, B4 = (lane(QUAD_ROW + 32 + 2 * k) for k in range(4))
 """Forces of joints on the corners."""
-QUAD_LANES = QUAD_ROW + 44
+Q_S0 = lane(QUAD_ROW + 40)
+"""First lane of the stresses without strain: 11, 22, 12, 33 of each triangle."""
+QUAD_LANES = QUAD_ROW + 56
 QUAD_BLOCK = 48
 """Quads worked on together; they have fewer joints than `CAPACITY`."""
 
@@ -455,6 +457,7 @@ def _overlay_loop(overlay):
     )
     c1, c2 = (Q_C + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     area1, area2 = (lane(QUAD_ROW + Q_AREA + part) for part in (2 * overlay, 2 * overlay + 1))
+    z1, z2 = (Q_S0 + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     first = overlay == 0
 
     @njit(cache=True, nogil=True, error_model="numpy")
@@ -470,12 +473,14 @@ def _overlay_loop(overlay):
             one, two = lanes[area1 + e], lanes[area2 + e]
             mean = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
             pressure = lame * mean
-            z11, z22, z12 = lanes[Q_S11 + e], lanes[Q_S22 + e], lanes[Q_S12 + e]
+            z11, z22, z12 = lanes[z1 + e], lanes[z1 + _NEXT + e], lanes[z1 + _B + e]
             shift = 0.5 * (mean - (a11 + a22))
             s11, s22 = z11 + (pressure + two_mu * (a11 + shift)), z22 + (pressure + two_mu * (a22 + shift))
+            s12 = z12 + two_mu * a12
+            z11, z22, z12 = lanes[z2 + e], lanes[z2 + _NEXT + e], lanes[z2 + _B + e]
             shift = 0.5 * (mean - (b11 + b22))
             t11, t22 = z11 + (pressure + two_mu * (b11 + shift)), z22 + (pressure + two_mu * (b22 + shift))
-            s12, t12 = z12 + two_mu * a12, z12 + two_mu * b12
+            t12 = z12 + two_mu * b12
             x1, y1, x2, y2 = lanes[vi + e], lanes[vi + _NEXT + e], lanes[vj + e], lanes[vj + _NEXT + e]
             x3, y3, x4, y4 = lanes[vk + e], lanes[vk + _NEXT + e], lanes[vl + e], lanes[vl + _NEXT + e]
             a11, a22, a12 = _rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
@@ -518,7 +523,8 @@ def _mean_trace(overlay, xy, c, small):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def quad_stress(xy, c, s0, small, stress):
-    """Mean stress (4,) xx, yy, xy, zz [Pa] of a quad over its four triangles by area, without the viscous part."""
+    """Mean stress (4,) xx, yy, xy, zz [Pa] of a quad over its four triangles by area, without the viscous part; s0
+    (16,) [Pa]: their stresses without strain."""
     stress[:] = 0.0
     areas = 0.0
     for overlay in range(2):
@@ -526,15 +532,15 @@ def quad_stress(xy, c, s0, small, stress):
         for p in (2 * overlay, 2 * overlay + 1):
             _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c, small)
             shift, m = 0.5 * (mean - (e11 + e22)), c[Q_TWO_MU]
-            s11 = s0[0] + (c[Q_LAMBDA] * mean + m * (e11 + shift))
-            s22 = s0[1] + (c[Q_LAMBDA] * mean + m * (e22 + shift))
-            xx, yy, xy_ = laws.turned(s11, s22, s0[2] + m * e12, cs, sn)
+            s11 = s0[4 * p] + (c[Q_LAMBDA] * mean + m * (e11 + shift))
+            s22 = s0[4 * p + 1] + (c[Q_LAMBDA] * mean + m * (e22 + shift))
+            xx, yy, xy_ = laws.turned(s11, s22, s0[4 * p + 2] + m * e12, cs, sn)
             share = c[Q_AREA + p]
             areas += share
             stress[0] += share * xx
             stress[1] += share * yy
             stress[2] += share * xy_
-            stress[3] += share * (s0[3] + c[Q_LAMBDA] * mean)
+            stress[3] += share * (s0[4 * p + 3] + c[Q_LAMBDA] * mean)
     for q in range(4):
         stress[q] /= areas
 
@@ -548,7 +554,7 @@ def quad_energy(xy, c, s0, small):
         for p in (2 * overlay, 2 * overlay + 1):
             _, _, _, _, _, _, e11, e22, e12 = _part_stretch(p, xy, c, small)
             shift = 0.5 * (mean - (e11 + e22))
-            density = _energy(e11 + shift, e22 + shift, e12, c[Q_LAMBDA], c[Q_TWO_MU], s0)
+            density = _energy(e11 + shift, e22 + shift, e12, c[Q_LAMBDA], c[Q_TWO_MU], s0[4 * p : 4 * p + 4])
             total += 0.5 * c[Q_AREA + p] * density
     return total
 
@@ -583,7 +589,10 @@ def _gather_quads(n, item, row, x, v, c, s0, stressed, lanes):
         four_columns(lanes, VX3 + e, v, at)
         i0, i1, i2, i3 = U(item[e]), U(item[e + _1]), U(item[e + _2]), U(item[e + _3])
         if stressed:
-            four_columns(lanes, Q_S11 + e, s0, (i0 * _FOUR, i1 * _FOUR, i2 * _FOUR, i3 * _FOUR))
+            at = (i0 * _SIXTEEN, i1 * _SIXTEEN, i2 * _SIXTEEN, i3 * _SIXTEEN)
+            for k in range(U(0), _SIXTEEN, _FOUR):
+                to = Q_S0 + k * U(CAPACITY) + e
+                four_columns(lanes, to, s0, (at[0] + k, at[1] + k, at[2] + k, at[3] + k))
         at = (i0 * _QUAD, i1 * _QUAD, i2 * _QUAD, i3 * _QUAD)
         for k in range(U(0), U(28), _FOUR):
             to = Q_C + k * U(CAPACITY) + e
@@ -728,9 +737,9 @@ def _quads(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def quads(threads, *args):
-    """Forces on the corners of all owned quads, stored. Arguments as for `triangles`; c (count, 32), see `QUAD`; the
-    slots of the quads' edges follow those of the triangles from `base` on, four each; slot_of (count,) i4: row of
-    `pushed`, or -1."""
+    """Forces on the corners of all owned quads, stored. Arguments as for `triangles`; c (count, 32), see `QUAD`; s0
+    (count, 16) [Pa]: stress without strain 11, 22, 12, 33 of each of their triangles; the slots of the quads' edges
+    follow those of the triangles from `base` on, four each; slot_of (count,) i4: row of `pushed`, or -1."""
     for t in range(threads):
         _quads(t, threads, *args)
 

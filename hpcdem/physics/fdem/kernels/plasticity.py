@@ -45,9 +45,10 @@ SHEAR_NOW, TENSION_NOW, SHEAR_PAST, TENSION_PAST = 1, 2, 4, 8
 # strength: this model does not yield.
 N_PHI, N_PSI, STRENGTH, TENSILE = range(4)
 YIELD = 4
-# Columns of what an element remembers (n, 9): plastic strain 11, 22, 12, 33 in the frame that turns with it; shear and
-# volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0: never);
-# plastic work [J/m].
+# Columns of what an element remembers (n, 9), or (n, 36) where there are quads: for each of their four triangles
+# (plastic_quads.py), triangles have the first nine; plastic strain 11, 22, 12, 33 in the frame that turns with it;
+# shear and volume of the plastic strain along the way; 1 + the last step in which it yielded in shear, in tension (0:
+# never); plastic work [J/m].
 E11, E22, E12, E33, SHEAR, VOLUME, IN_SHEAR, IN_TENSION, WORK = range(9)
 MEMORY = 9
 
@@ -180,9 +181,9 @@ def _try(n, small, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _return(n, lanes, who, bits):
-    """Plastic strains of those that are outside, one after the other from the first place; who, bits (BLOCK,) i8: which
-    they are and how they yield. Returns their number."""
+def _return(n, lanes, shares, who, bits):
+    """Plastic strains of those that are outside, one after the other from the first place; shares: of how many that
+    fill the same area they are one; who, bits (BLOCK,) i8: which they are and how they yield. Returns their number."""
     m = 0
     for k in range(n):
         e, at = U(k), U(m)
@@ -196,7 +197,7 @@ def _return(n, lanes, who, bits):
             lanes[P11 + at], lanes[P22 + at], lanes[P12 + at], lanes[P33 + at] = e11, e22, e12, e33
             lanes[T11 + at], lanes[T22 + at], lanes[T12 + at], lanes[T33 + at] = s11, s22, s12, s33
             lanes[P_LAM + at], lanes[P_MU2 + at] = lame, two_mu
-            lanes[P_PER_AREA + at] = 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
+            lanes[P_PER_AREA + at] = shares * 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
             who[m], bits[m] = k, how
             m += 1
     return m
@@ -249,7 +250,7 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, table, smal
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, flat_x, flat_c, flat_s0, law, flat_table, lanes)
         _try(n, small, lanes)
-        m = _return(n, lanes, who, bits)
+        m = _return(n, lanes, 1.0, who, bits)
         if m > 0:
             _measure(m, lanes)
             _remember(m, first, first_row, rows, who, bits, lanes, c, base, step, memory, s0)
