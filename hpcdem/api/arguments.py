@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.pcdc import bindings, parser, rules, trial
 from hpcdem.lang.pcdc.keywords import matching
-from hpcdem.lang.pcdc.kinds import Kind, TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, Kind, TableName
 from hpcdem.lang.pcdc.lexer import short
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.lang.zdem.nearest import hint
@@ -142,6 +142,8 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
         return value
     if kind.varied and isinstance(value, np.ndarray) and value.ndim == 1:
         return np.array([_one(kind, item, name) for item in value.tolist()], np.float64)
+    if kind.tabled and isinstance(value, FunctionName):
+        return value
     if kind.tabled and isinstance(value, str):
         return TableName(value)
     try:

@@ -18,6 +18,7 @@ from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
 from hpcdem.api.program import HELP, carried_out, place
 from hpcdem.commands import fdem
 from hpcdem.lang.pcdc.bindings import BINDINGS, Call
+from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import Drawn, Over
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 File = str | Path
-Number = float | str
-"""Of a condition: a number, or the name of a table of time."""
+Number = float | str | FunctionName
+"""Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
 OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT}
@@ -421,6 +422,12 @@ class Nodes(Objects):
         """Velocity [m/s] or acceleration [m/s2] that nodes have from now on; components left out stay free."""
         given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
         self._carry_out("boundary", given, where, "mechanical-velocity-boundary-condition")
+
+    def function(self, function: str) -> FunctionName:
+        """Read, check and compile a function of place and time in a Python file, "file.py:function"
+        (docs/user_laws.md): a value for conditions of nodes and faces. Before `sim.restore` it names the function."""
+        self._do("node function", {"function": function})
+        return FunctionName(function)
 
     def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
         """Force on each node [N per m of thickness]."""

@@ -13,7 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state, user_laws
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state, user_functions, user_laws
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 
@@ -35,6 +35,7 @@ def make(kind: str, threads: int) -> Blocks:
 
 
 LAWS: dict[str, user_laws.UserLaw] = {}
+FUNCTIONS: dict[str, str] = {}
 """Of laws/rock.py, compiled."""
 
 
@@ -44,6 +45,7 @@ def empty(kind: str, threads: int) -> Blocks:
     if kind == "obeying":
         file = Path(__file__).with_name("laws") / "rock.py"
         LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("elastic", "tresca")})
+        FUNCTIONS["beat"] = user_functions.load(sim, file, "rock.py:beat")
     return sim
 
 
@@ -135,6 +137,8 @@ def obeying(sim: Blocks) -> None:
     inner = edges.faces[edges.inner][:, 0]
     sim.joint_model(inner[inner < 4 * len(one.cells)], COHESIVE, WEAK)
     sim.initial_stress(None, xx=-1e5, yy=-5e6, zz=-1e5)
+    outside = edges.faces[~edges.inner][:, 0]
+    sim.stress_condition(outside[::7], normal=FUNCTIONS["beat"])
     sim.option(dynamic=False)
 
 

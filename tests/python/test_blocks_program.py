@@ -21,6 +21,7 @@ from hpcdem.core.errors import ScriptError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.lang.pcdc import bindings, execute
+from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
 from hpcdem.runtime.run_folder import RECORD
@@ -124,6 +125,9 @@ SAME: list[tuple[str, str]] = [
      "sim.nodes.velocity(vx=1, vy='v', where='id 1')"),
     ("pcdc node boundary mech-vel-b-c acceleration-x 1 acceleration-y -1", "sim.nodes.velocity(ax=1, ay=-1)"),
     ("pcdc node boundary mech-f-b-c force-x 1 force-y table 'v'", "sim.nodes.force(fx=1, fy='v')"),
+    ("pcdc node boundary mech-vel-b-c velocity-x function 'a.py:wave' range id 1",
+     "sim.nodes.velocity(vx=FunctionName('a.py:wave'), where='id 1')"),
+    ("pcdc node function 'a.py:wave'", "sim.nodes.function('a.py:wave')"),
     ("pcdc node boundary mech-m-b-c type 2 (1,1) range id 2", "sim.nodes.move(2, (1, 1), where='id 2')"),
     ("pcdc node boundary mech-m-b-c type 1", "sim.nodes.move(1)"),
     ("pcdc node boundary remove range id 0", "sim.nodes.remove_boundary(where='id 0')"),
@@ -200,7 +204,9 @@ def program(bench: Bench) -> Simulation:
 
 
 def carry_out(sim: Simulation, text: str) -> Any:
-    return eval(compile(text, "study.py", "eval"), {"sim": sim, "g": g, "np": np, "Path": Path})
+    return eval(
+        compile(text, "study.py", "eval"), {"sim": sim, "g": g, "np": np, "Path": Path, "FunctionName": FunctionName}
+    )
 
 
 @pytest.fixture

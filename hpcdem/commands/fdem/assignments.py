@@ -11,7 +11,7 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import changes, user_laws
+from hpcdem.physics.fdem import changes, user_functions, user_laws
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
@@ -43,6 +43,16 @@ def load_law(project: Project, law: str) -> None:
 
 def _law(project: Project, law: str) -> UserLaw:
     return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
+
+
+def load_function(project: Project, name: str) -> None:
+    """Read, check and compile a function 'file.py:function' of place and time. Collective."""
+    function(project, name)
+
+
+def function(project: Project, name: str) -> str:
+    """The same; returns its name as value of a condition. Collective."""
+    return user_functions.load(project.blocks, project.to_read(name.rpartition(":")[0]), name)
 
 
 def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -187,7 +197,7 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 
 def _known(project: Project, *values: Number | None) -> None:
     for value in values:
-        if isinstance(value, str) and value not in project.blocks.tables:
+        if isinstance(value, str) and value not in project.blocks.tables and value not in user_functions.FUNCTIONS:
             known = ", ".join(f"'{name}'" for name in project.blocks.tables) or "none so far"
             raise CommandError(f"there is no table '{value}'; there is {known}")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
-from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, TableName
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -46,9 +46,14 @@ class Call:
         return {python(name): self.arguments[name] for name in names if name in self.arguments}
 
     def properties(self) -> dict[str, Any]:
-        """Those of a model, tables by their name."""
-        given = {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
+        """Those of a model, tables and functions by their names."""
+        given = {python(name): self._plain(value) for name, value in self.arguments["properties"].items()}
         return with_parameters(given)
+
+    def _plain(self, value: Any) -> Any:
+        if isinstance(value, FunctionName):
+            return fdem.assignments.function(self.project, value.name)
+        return value.name if isinstance(value, TableName) else value
 
     def group(self) -> dict[str, Any]:
         """`group 'g' set 's'` of a mesh."""
@@ -66,10 +71,6 @@ def with_parameters(given: dict[str, Any]) -> dict[str, Any]:
             raise CommandError(f"'{name}' is given twice")
         found[name] = value
     return found
-
-
-def _plain(value: Any) -> Any:
-    return value.name if isinstance(value, TableName) else value
 
 
 def where(terms: Terms | None) -> g.Range | None:
@@ -285,6 +286,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "face-joint reset state": lambda c: fdem.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
+    "node function": lambda c: fdem.assignments.load_function(c.project, c["function"]),
     "node boundary remove": lambda c: fdem.assignments.remove_node_conditions(c.project, c.where),
     "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),

@@ -209,6 +209,7 @@ MOHR_COULOMB = Model(
     ),
     one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB,
 )  # fmt: skip
+_FUNCTION = Option("function", (FILE,), "'file.py:function', beside the script; plain text", required=True)
 _LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
               required=True)  # fmt: skip
 _PARAMETER = Option(
@@ -661,8 +662,12 @@ _OBJECTS = (
     _group_command("node", "node"),
     Command("node bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
+             "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1"),
             models=(VELOCITY, FORCE, MOVE, *_LATER_NODE), ranged="node"),
+    Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
+            "giving it to a condition: for a script that begins with model restore.", ("pcdc node function 'pump.py:wave'",),
+            (_FUNCTION,)),
     Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
     Command("node init{ial}", "The velocity of nodes now.", ("pcdc node initial velocity (1,0) range group 'block'",),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.lang.pcdc.kinds import Pending, TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
 from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, USER, Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
@@ -31,8 +31,8 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         for name, value in terms or ():
             if name in ("id", "x", "y") and known(value):
                 _ascending(name, value)
-        if isinstance(arguments.get("law"), Pending):
-            raise CommandError("the file of a law is plain text: it is read and checked before the script runs")
+        if isinstance(arguments.get("law", arguments.get("function")), Pending):
+            raise CommandError("the file of a law or function is plain text: it is read before the script runs")
         if "model" in arguments:
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
@@ -62,7 +62,7 @@ def _given(arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         python(name): value
         for name, value in arguments.items()
-        if known(value) and not isinstance(value, (TableName, Over, Drawn))
+        if known(value) and not isinstance(value, (TableName, FunctionName, Over, Drawn))
     }
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_laws
+from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
@@ -138,6 +138,11 @@ def _all_nodes(sim: Blocks) -> _Nodes:
 
 def _unknowns(sim: Blocks, nodes: _Nodes, cycles: int) -> Unknowns:
     """CommandError for conditions that have no equilibrium."""
+    for row in np.unique(sim.point_row).tolist():
+        for function in user_functions.used(sim.conditions[row]).values():
+            raise CommandError(
+                f"a condition of nodes follows the function {function.title}: the static solve takes numbers and tables"
+            )
     table = sim.conditions_at(sim.clock.time, sim.clock.time, 1.0)
     free, way, step = (np.empty((len(table), *shape)) for shape in ((2,), (2, 2), (2,)))
     for row, one in enumerate(table):

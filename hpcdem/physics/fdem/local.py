@@ -18,10 +18,14 @@ from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, Rows
+from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.definition import NodeCondition
     from hpcdem.physics.fdem.state import State
 
+_TRACTION = "xx", "yy", "xy", "normal"
+"""Columns of the table of tractions."""
 ALPHA = 0.8
 """Local damping of the static mode."""
 
@@ -254,7 +258,9 @@ class Local:
         self.special[i, k] = self.special[i, k2] = True
         self.load_edge = row * sim.x.shape[1] + 2 * k
         self.load_a, self.load_b = 8 * row + 2 * k, 8 * row + 2 * k2
-        self.load_of = sim.load_row[faces[i, k]].astype(np.int64)
+        places = mesh.points[connectivity.face_points(mesh.cells, faces[i, k])].mean(axis=1)
+        self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
+        self.load_of = self.load_functions.of
         self._make_dashpots(np.flatnonzero(sim.quiet_faces()[faces[i, k]]), row, k, k2)
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
@@ -320,7 +326,8 @@ class Local:
         rows = self.node_corner // 8
         self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
         lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
-        self.node_condition = sim.point_row[lead].astype(np.int64)
+        self.node_functions = Placed(sim.conditions, sim.point_row[lead].astype(np.int64), mesh.points[lead])
+        self.node_condition = self.node_functions.of
         self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
         self.outside, self.felt = np.zeros((n, 2)), np.zeros((n, 4))
         total = len(sim.number)
@@ -559,7 +566,9 @@ class Local:
         sim, clock = self.sim, self.sim.clock
         if self.some_applied:
             self.applied[:] = 0.0
-            loads = sim.loads_at(clock.time)
+            loads = self.load_functions.filled(
+                sim.loads_at(clock.time), lambda one, field: (_TRACTION.index(field), clock.time, 1.0)
+            )
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
             if len(self.quiet_edge):
                 moving.dashpots(
@@ -578,12 +587,23 @@ class Local:
         table = self._conditions
         if table is None:
             half = 0.5 * clock.dt if sim.options.dynamic else 0.0
-            table = sim.conditions_at(clock.time, clock.time + half, clock.dt)
+            table = self._conditions_now(clock.time, clock.time + half, clock.dt)
         self._move(
             sim.threads, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_kick,
             self.node_condition, self.node_share, table, self.some_applied, self.force, self.applied, sim.v,
             0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip
+
+    def _conditions_now(self, time: float, middle: float, dt: float) -> np.ndarray:
+        """The table of node conditions, with a row of its own for each node whose condition is a function."""
+
+        def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
+            if field in ("force_x", "force_y"):
+                return (moving.FORCE_X if field == "force_x" else moving.FORCE_Y), time, 1.0
+            column, does = (moving.AT_X, one.does_x) if field == "at_x" else (moving.AT_Y, one.does_y)
+            return (column, middle, 1.0) if does == moving.VELOCITY else (column, time, dt)
+
+        return self.node_functions.filled(self.sim.conditions_at(time, middle, dt), how)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 

@@ -134,6 +134,9 @@ class State(ModelDefinition, Model):
         """The mesh; CommandError if there is none."""
         return self._mesh()
 
+    def time_now(self) -> float:
+        return self.clock.time
+
     @property
     def owned(self) -> slice:
         """Storage rows of the owned elements."""

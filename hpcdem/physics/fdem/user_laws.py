@@ -37,7 +37,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -59,6 +59,8 @@ STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
 OF_LAW = "law_"
 """How state variables are called as quantities."""
+TOLD = 0.1
+"""Seconds of compiling that the log tells."""
 MARK = "#"
 """Between the name of a law and the digest of its text."""
 
@@ -110,7 +112,10 @@ def element_law(
     )
 
 
-class _Wrong(Exception):
+Made = TypeVar("Made")
+
+
+class Wrong(Exception):
     """What is wrong with a file; line: 0 if it has none."""
 
     def __init__(self, line: int, message: str) -> None:
@@ -121,9 +126,23 @@ class _Wrong(Exception):
 def load(sim: State, path: Path, law: str) -> UserLaw:
     """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
     text that rank 0 reads. CommandError with file and line. Collective."""
-    file, _, function = law.rpartition(":")
+
+    def take(text: str, path: str, name: str, function: str) -> UserLaw:
+        found = MODELS.get(name) or _made(text, path, name, function)
+        assert isinstance(found, UserLaw)
+        _compile(found, sim.threads)
+        MODELS[name] = found
+        return found
+
+    return agreed(sim, path, law, "law", take)
+
+
+def agreed(sim: State, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
+    """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
+    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
+    file, _, function = what.rpartition(":")
     if not file.endswith(".py") or not function.isidentifier():
-        raise CommandError(f"a law is named 'file.py:function', got '{law}'")
+        raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
     text, problem = "", ""
     if sim.comm.rank == 0:
         try:
@@ -133,48 +152,61 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
     text, problem = sim.comm.bcast((text, problem))
     if problem:
         raise CommandError(problem)
-    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-    name = f"{Path(file).name}:{function}{MARK}{digest}"
-    found = MODELS.get(name)
-    began, message = time.perf_counter(), None
+    name = f"{Path(file).name}:{function}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    began, message, made = time.perf_counter(), None, []
     try:
-        if found is None:
-            found = _made(text, str(path), name, function)
-        assert isinstance(found, UserLaw)
-        _compile(found, sim.threads)
-    except _Wrong as wrong:
+        made.append(take(text, str(path), name, function))
+    except Wrong as wrong:
         message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
     try:
         sim.comm.agree(message)
     except HpcdemError as error:
         raise CommandError(str(error)) from None
-    assert isinstance(found, UserLaw)
     spent = time.perf_counter() - began
-    if name not in MODELS and sim.log is not None:
-        sim.log.info(f"law {found.title} is compiled for this run: {spent:.1f} s on rank 0")
-    MODELS[name] = found
-    return found
+    if spent > TOLD and sim.log is not None:
+        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled for this run: {spent:.1f} s on rank 0")
+    return made[0]
 
 
-def _made(text: str, path: str, name: str, function: str) -> UserLaw:
-    """The law of a text. _Wrong."""
+def executed(text: str, path: str, name: str) -> dict[str, Any]:
+    """The names of a text of the user, after it ran. Wrong."""
+    code: Any
     try:
         code = compile(text, path, "exec")
     except (SyntaxError, ValueError) as error:
-        raise _Wrong(getattr(error, "lineno", 0) or 0, f"{getattr(error, 'msg', error)}") from None
+        raise Wrong(getattr(error, "lineno", 0) or 0, f"{getattr(error, 'msg', error)}") from None
     names: dict[str, Any] = {"__name__": f"law of {name}", "__file__": path}
     try:
         exec(code, names)
     except Exception as error:  # whatever the user's own code does
-        raise _Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
+        raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
+    return names
+
+
+def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
+    """Compile a kernel for arguments of these types; the type that it returns. Wrong, at `line` if numba knows none."""
+    from numba.core.errors import NumbaError
+
+    try:
+        kernel.compile(types)
+    except NumbaError as error:
+        raise Wrong(_numba_line(error, path) or line, _numba_message(error)) from None
+    except Exception as error:  # numba hands on what its passes meet in the user's own code
+        raise Wrong(line, f"numba: {type(error).__name__}: {error}") from None
+    return kernel.overloads[tuple(types)].signature.return_type
+
+
+def _made(text: str, path: str, name: str, function: str) -> UserLaw:
+    """The law of a text. Wrong."""
+    names = executed(text, path, name)
     if function not in names:
         laws = [key for key, value in names.items() if isinstance(value, _Declared)]
-        raise _Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
+        raise Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
     declared = names[function]
     if not isinstance(declared, _Declared):
         code = getattr(declared, "__code__", None)
         line = code.co_firstlineno if code is not None and code.co_filename == path else 0
-        raise _Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
+        raise Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
     return _checked(declared, name, path)
 
 
@@ -186,42 +218,38 @@ def _last_line(error: BaseException, path: str) -> int:
 def _checked(declared: _Declared, name: str, path: str) -> UserLaw:
     line = declared.function.__code__.co_firstlineno
     base, own, states = USER.properties, declared.properties, declared.state
-    declarations: tuple[tuple[str, type, tuple[Any, ...]], ...] = (
-        ("property", Property, own),
-        ("state variable", StateVariable, states),
-    )
-    for kind, wanted, things in declarations:
-        for thing in things:
-            if not isinstance(thing, wanted):
-                raise _Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {thing!r}")
+    for kind, things, wanted in (("property", own, Property), ("state variable", states, StateVariable)):
+        strange = [thing for thing in things if not isinstance(thing, wanted)]
+        if strange:
+            raise Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {strange[0]!r}")
     every = [*(p.name for p in base), *(p.name for p in own), *(s.name for s in states), *STRAIN, *INITIAL, STEP]
-    for one in (*own, *states):
-        if not isinstance(one.name, str) or not one.name.isidentifier():
-            raise _Wrong(line, f"{one.name!r} cannot be the name of an argument")
-        if every.count(one.name) > 1:
-            raise _Wrong(line, f"'{one.name}' stands for something already; a law may declare other names only")
+    for name_ in (*(p.name for p in own), *(s.name for s in states)):
+        if not isinstance(name_, str) or not name_.isidentifier():
+            raise Wrong(line, f"{name_!r} cannot be the name of an argument")
+        if every.count(name_) > 1:
+            raise Wrong(line, f"'{name_}' stands for something already; a law may declare other names only")
     for state in states:
         if not math.isfinite(state.initial):
-            raise _Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
+            raise Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
     arguments = inspect.signature(declared.function).parameters
     for argument in arguments.values():
         if argument.kind is not inspect.Parameter.POSITIONAL_OR_KEYWORD or argument.name not in every:
-            raise _Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
+            raise Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
         if argument.default is not inspect.Parameter.empty:
-            raise _Wrong(line, f"'{argument}': arguments of a law have no defaults; Property(..., default=) has")
+            raise Wrong(line, f"'{argument}': arguments of a law have no defaults; Property(..., default=) has")
     lost = [one for one in (*STRAIN, *(s.name for s in states)) if one not in arguments]
     if lost:
-        raise _Wrong(line, f"the law does not take {', '.join(lost)}")
+        raise Wrong(line, f"the law does not take {', '.join(lost)}")
     takes = set(arguments)
     if callable(declared.stiffness):
         of = inspect.signature(declared.stiffness).parameters
-        strange = [n for n in of if n not in {p.name for p in (*base, *own)}]
-        if strange:
-            raise _Wrong(line, f"stiffness takes properties, '{strange[0]}' is none")
+        others = [n for n in of if n not in {p.name for p in (*base, *own)}]
+        if others:
+            raise Wrong(line, f"stiffness takes properties, '{others[0]}' is none")
         takes |= set(of)
     idle = [p.name for p in own if p.name not in takes]
     if idle:
-        raise _Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
+        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
     return _compiled(declared, name, path, tuple(arguments), line)
 
 
@@ -230,20 +258,14 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     from numba.core.errors import NumbaError
 
     kernel = njit(error_model="numpy", nogil=True)(declared.function)
-    try:
-        kernel.compile((types.float64,) * len(names))
-    except NumbaError as error:
-        raise _Wrong(_numba_line(error, path) or line, _numba_message(error)) from None
-    except Exception as error:  # numba hands on what its passes meet in the user's own code
-        raise _Wrong(line, f"numba: {type(error).__name__}: {error}") from None
-    found: Any = kernel.nopython_signatures[0].return_type
+    found: Any = compiled(kernel, (types.float64,) * len(names), path, line)
     wanted = [*STRESS, *(s.name for s in declared.state)]
-    given = list(found) if isinstance(found, types.BaseTuple) else [found]
+    given = list(getattr(found, "types", [found]))
     if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
-        raise _Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
+        raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
     for what, type_ in zip(wanted, given):
         if type_ != types.float64:
-            raise _Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
+            raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
     from hpcdem.physics.fdem.kernels import user_laws as kernels
 
     columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names]
@@ -254,7 +276,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
         one, several = kernels.loops(kernel, names, states, columns)
         evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
     except NumbaError as error:
-        raise _Wrong(line, _numba_message(error)) from None
+        raise Wrong(line, _numba_message(error)) from None
     title, _, _ = name.partition(MARK)
     bound = Property(BOUND, "Pa", "what the slope of the law is never above", optional=True, low_itself=False)
 

@@ -33,3 +33,13 @@ def tresca(e11, e22, e12, g11, g12, slip, i11, i22, i12, bulk, shear, limit):
         g11, g12, slip = g11 + d11, g12 + d12, slip + math.sqrt(d11 * d11 + d12 * d12)
         s11, s22, s12 = s11 - over * half, s22 + over * half, s12 - over * across
     return s11, s22, s12, p, g11, g12, slip
+
+
+def lift(y):
+    """Velocity [m/s] of a plate that is drawn out evenly."""
+    return 0.1 * y
+
+
+def beat(x, y, t):
+    """Stress [Pa] of a wave that runs along y."""
+    return -2e6 * math.sin(3e4 * (t - 1e-4 * y) + x)
