@@ -666,8 +666,8 @@ _OBJECTS = (
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1"),
             models=(VELOCITY, FORCE, MOVE, *_LATER_NODE), ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
-            "giving it to a condition: for a script that begins with model restore.", ("pcdc node function 'pump.py:wave'",),
-            (_FUNCTION,)),
+            "giving it to a condition: for a script that begins with model restore.",
+            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
     Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
     Command("node init{ial}", "The velocity of nodes now.", ("pcdc node initial velocity (1,0) range group 'block'",),
