@@ -32,7 +32,8 @@ G = 9.81
 
 
 def make(kind: str, threads: int) -> Coupled:
-    """Both models. "drop": the block holds; "shatter": it falls apart; "flight": it also goes through many strips;
+    """Both models. "drop": the block holds; "shatter": it falls apart; "yield": it flows besides, as weak soil does;
+    "flight": it also goes through many strips;
     "clumps": it is hit by rigid bodies of discs; there is no account of energy for them."""
     comm = communicator()
     sim = Simulation(comm, threads, outdir=Path("."), balance_on=kind != "flight")
@@ -57,6 +58,11 @@ def make(kind: str, threads: int) -> Coupled:
     changes.element_model(
         blocks, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "friction": 25.0, "damp_factor": 0.05}
     )
+    if kind == "yield":
+        soil = {"friction": 25.0, "cohesion": 2e4, "tensile": 1e4, "dilation": 5.0}
+        changes.element_model(
+            blocks, None, "mech_mohr_coulomb", {**ROCK, "young": 1e8, "damp_factor": 0.05, **soil}
+        )
     if kind != "drop":
         blocks.joint_model(None, "classic_intrinsic_cohesive_interface", WEAK)
     changes.set_velocity(blocks, None, vx=6.0 if kind == "flight" else 0.5, vy=-5.0)
@@ -77,7 +83,7 @@ def state(both: Coupled) -> dict[str, np.ndarray]:
     sim, blocks = both.particles, both.blocks
     found = {
         name: of_blocks.values(blocks, name)
-        for name in ("position_x", "position_y", "velocity_x", "velocity_y", "stress_yy")
+        for name in ("position_x", "position_y", "velocity_x", "velocity_y", "stress_yy", "plastic_shear_strain")
     }
     found["broken"] = np.array(of_blocks.joint_counts(blocks))
     p = sim.particles
@@ -88,6 +94,8 @@ def state(both: Coupled) -> dict[str, np.ndarray]:
     found.update({f"clump_{name}": values for name, values in diagnostics.clumps(sim).items()})
     found.update({f"contact_{name}": values for name, values in both.contacts().items()})
     found.update({f"energy_{name}": np.array(value) for name, value in both.energies().items()})
+    if blocks.budget is not None:
+        found.update({f"blocks_{name}": np.array(value) for name, value in of_blocks.energies(blocks).items()})
     found["force"] = np.array(both.force_on_blocks())
     return found
 

@@ -54,6 +54,28 @@ def test_a_restart_does_not_change_a_bit(alone, launch, ranks, threads):
 
 
 @pytest.fixture(scope="module")
+def yielding(tmp_path_factory):
+    """Blocks of weak soil flow and fall apart on the discs, on one rank."""
+    folder = workers.alone(WORKER, "yield", STEPS, 701, tmp_path_factory.mktemp("yield"))
+    with np.load(folder / "alone.npz") as found:
+        flowed = found["plastic_shear_strain"]
+        assert (flowed > 1e-3).sum() > 10 and found["about"][0] > 10 and found["broken"][2] > 0
+        assert found["blocks_plastic_lost"] > 0.0 and found["energy_relative"] < 1e-3
+    return folder
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks, threads", [(3, 1), pytest.param(2, 2, marks=SLOW), pytest.param(4, 1, marks=SLOW)])
+def test_blocks_that_yield_are_the_same_on_any_ranks(yielding, launch, ranks, threads):
+    equal(launch, WORKER, "yield", STEPS, yielding, ranks, threads)
+
+
+@pytest.mark.mpi
+def test_blocks_that_yield_go_on_from_the_middle(yielding, launch):
+    equal(launch, WORKER, "yield", STEPS, yielding, 2, 1, "resume", "middle.sav")
+
+
+@pytest.fixture(scope="module")
 def hit_by_clumps(tmp_path_factory):
     """Rigid bodies of discs hit a jointed block, on one rank."""
     folder = workers.alone(WORKER, "clumps", STEPS, 601, tmp_path_factory.mktemp("clumps"))
