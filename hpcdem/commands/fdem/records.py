@@ -24,7 +24,7 @@ UNITS = {
     },
     ELEMENT: {
         "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
-        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m", LAW_STATE: "",
+        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m", LAW_STATE: "that of the law",
     },
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
