@@ -367,6 +367,10 @@ class Elements(_Modelled):
         """Plastic states are forgotten."""
         self._carry_out("reset state", {}, where)
 
+    def reset_kelvin_strain(self, *, where: Where = None) -> None:
+        """Kelvin units of elements that creep are without strain from here on."""
+        self._carry_out("reset kelvin-strain", {}, where)
+
 
 @commands
 class Faces(_Modelled):
@@ -669,6 +673,25 @@ class BlockCommands:
         given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling}
         self._blocks("model time-step", given)
 
+    def creep(
+        self,
+        on: bool = True,
+        *,
+        dt: float | None = None,
+        change: float | None = None,
+        least: float | None = None,
+        greatest: float | None = None,
+    ) -> None:
+        """Elements creep from now on, or no more. dt: creep step of static runs [s]; with change it follows the change
+        of stress, between least and greatest [s]."""
+        given = {"on": on, "dt": dt, "change": change, "least": least, "greatest": greatest}
+        self._blocks("model creep", given)
+
+    @property
+    def creep_time(self) -> float:
+        """Time that the elements have crept [s]."""
+        return float(self._blocks.project().blocks.creep.time)
+
     def step(self, n: int) -> None:
         """So many steps of the blocks, and of the particles that are coupled to them."""
         self._before_steps()
@@ -687,6 +710,7 @@ class BlockCommands:
         solver: str | None = None,
     ) -> None:
         """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium.
+        In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {

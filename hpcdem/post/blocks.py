@@ -151,16 +151,18 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
     across = len(panels) if beside else 1
     k = looks.font / 9.0
     left, bottom, top, gap, bar = (k * length for length in (_LEFT, _BOTTOM, _TOP, _GAP, _BAR))
-    room = (looks.page - left - bar - (across - 1) * gap) / across
+    after = [gap if panel == CRACKS else bar for panel in panels]  # room for colours, or none
+    between = sum(after[:-1]) if beside else 0.0
+    room = (looks.page - left - bar - between) / across
     if room < 1.0:
         raise UsageError(f"a page of {looks.page:g} cm is too small for letters of {looks.font:g} points")
     width = min(room, 21.0 / ratio)
     height = width * ratio
     down = 1 if beside else len(panels)
-    page = left + across * width + (across - 1) * gap + bar, down * (height + top) + (down - 1) * 0.3 * gap + bottom
+    page = left + across * width + between + bar, down * (height + top) + (down - 1) * 0.3 * gap + bottom
     figure = Figure(figsize=(page[0] * CM, page[1] * CM))
     for number, panel in enumerate(panels):
-        x = left + (width + gap) * (number if beside else 0)
+        x = left + (number * width + sum(after[:number]) if beside else 0.0)
         y = bottom + (0 if beside else (down - 1 - number) * (height + top + 0.3 * gap))
         axes = figure.add_axes((x / page[0], y / page[1], width / page[0], height / page[1]))
         frame(axes, seen, looks, first=number == 0 or not beside, last=beside or number == down - 1)

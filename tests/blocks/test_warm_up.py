@@ -13,16 +13,18 @@ import numpy as np
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem import build, histories, pairs
+from hpcdem.physics.fdem import creep as clock
 from hpcdem.physics.fdem.warm_up import warm_up
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.kernels import contact, detect, elements, energy, limits, nodes, plasticity, softening
+from hpcdem.physics.fdem.kernels import contact, creep, detect, elements, energy
+from hpcdem.physics.fdem.kernels import limits, nodes, plasticity, softening
 from hpcdem.physics.fdem.kernels import stiffness
 from tests.blocks.support import jointed, model, rectangle
 
 def compiled():
-    modules = (build, connectivity, contact, detect, elements, energy, limits, histories, nodes, pairs, plasticity,
-               softening, stiffness)
+    modules = (build, connectivity, contact, creep, detect, elements, energy, limits, histories, nodes, pairs,
+               plasticity, softening, stiffness)
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 
@@ -62,6 +64,25 @@ for dynamic in (True, False):
     sim.gravity(0.0, -1.0)
     convergence.advance(sim, 20)
     changes.reset_state(sim)
+    saved_state.save(sim, "x.sav")
+    saved_state.restore(Blocks(), "x.sav")
+salt = {"density": 2500.0, "young": 1e6, "poisson_ratio": 0.2, "kelvin_shear": 1e6, "kelvin_viscosity": 1.0}
+for dynamic in (True, False):
+    sim = model(rectangle(4, 4, 1.0, 1.0, kind="cross"))
+    changes.element_model(sim, None, "mech_burgers", salt)
+    changes.element_model(sim, [0, 1], "mech_mohr_coulomb", rock)
+    sim.option(dynamic=dynamic)
+    sim.velocity_condition([0, 1, 2], vx=0.0, vy=0.0)
+    sim.gravity(0.0, -1.0)
+    clock.switch(sim, True, dt=0.1, change=0.1)
+    if not dynamic:
+        clock.begin(sim, 1.0)
+    convergence.advance(sim, 3)
+    diagnostics.values(sim, "kelvin_strain_xy")
+    diagnostics.values(sim, "strain_energy")
+    if not dynamic:
+        clock.finish(sim, 1.0)
+    changes.reset_kelvin_strain(sim)
     saved_state.save(sim, "x.sav")
     saved_state.restore(Blocks(), "x.sav")
 square = rectangle(2, 2, 1.0, 1.0)

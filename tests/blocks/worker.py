@@ -13,7 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state, user_functions, user_laws
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state, user_functions, user_laws
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
 
@@ -229,6 +229,48 @@ def fill_up(sim: Blocks) -> None:
         changes.element_model(sim, hole[:-3], "mech_iso_elastic", {**fill, "young": 20e9})
 
 
+def creeping(sim: Blocks) -> None:
+    """A specimen under load at rest, the left of it creeps, joints in the elastic right break in mid-creep."""
+    mesh = shaken(rectangle(14, 8, 1.4, 0.8), 0.2)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05, "friction": 20.0})
+    soft = {**ROCK, "maxwell_viscosity": 4e6, "kelvin_shear": 1e10, "kelvin_viscosity": 1e6, "damp_factor": 0.05}
+    centre = mesh.centroids()
+    changes.element_model(sim, np.flatnonzero(centre[:, 0] < 0.9), "mech_burgers", {**soft, "kelvin_strain_xy": 1e-6})
+    edges = mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    weak = {**WEAK, "tensile_strength": 0.8e6, "gf1": 2.0, "gf2": 10.0}
+    sim.joint_model(inner[centre[inner // 4, 0] > 0.6], COHESIVE, weak)
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
+    top = edges.faces[~edges.inner][:, 0]
+    top = top[mesh.points[edges.points[~edges.inner]][:, :, 1].min(axis=1) > 0.8 - 1e-9]
+    sim.stress_condition(top, yy=0.8e6)
+    sim.initial_stress(None, xx=-1e4, yy=-2e4, zz=-1e4)
+    sim.option(dynamic=False)
+    creep.switch(sim, True, dt=2e-5, change=0.2)
+
+
+def creep_more(sim: Blocks) -> None:
+    """What happens to it: creep steps at rest, one of them under way at step 701; then motion in which it creeps."""
+    step = sim.clock.step
+    if step % 150 == 50 and step < 1000:
+        if sim.creep.passed > 0.0:
+            creep.finish(sim, 1.0)
+        creep.begin(sim, 1.0)
+    if step == 1000:
+        creep.finish(sim, 1.0)
+        sim.option(dynamic=True)
+        creep.switch(sim, True)
+        diagnostics.account_energy(sim)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 1] > 0.7), vx=8.0, vy=1.0)
+    if step == 1200:
+        changes.reset_kelvin_strain(sim, np.arange(40))
+        sim.element_property(np.arange(20, 60), {"kelvin_viscosity": 3e6})
+    if step == 1300:
+        changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
+
+
 def report_borders(sim: Blocks) -> None:
     """A long bed, its left third shattered and at rest: how many elements each rank has, and their cost."""
     sim.take_mesh(rectangle(60, 4, 6.0, 0.4))
@@ -256,7 +298,8 @@ def nothing(sim: Blocks) -> None:
 
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
          "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up),
-         "backfill": (backfill, fill_up), "borders": (report_borders, nothing)}  # fmt: skip
+         "backfill": (backfill, fill_up), "creeping": (creeping, creep_more),
+         "borders": (report_borders, nothing)}  # fmt: skip
 
 
 def main() -> None:
@@ -294,6 +337,9 @@ def main() -> None:
     plastic = ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work")
     for name in (*plastic, *user_laws.quantities(sim)):
         found[name] = diagnostics.values(sim, name)
+    for name in ("creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work"):
+        found[name] = diagnostics.values(sim, name)
+    found["creep"] = np.array(list(vars(sim.creep).values()), float)
     found.update({f"event_{name}": values for name, values in diagnostics.events(sim).items()})
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["time"] = np.array([sim.clock.time, sim.clock.dt])

@@ -60,9 +60,7 @@ def make(kind: str, threads: int) -> Coupled:
     )
     if kind == "yield":
         soil = {"friction": 25.0, "cohesion": 2e4, "tensile": 1e4, "dilation": 5.0}
-        changes.element_model(
-            blocks, None, "mech_mohr_coulomb", {**ROCK, "young": 1e8, "damp_factor": 0.05, **soil}
-        )
+        changes.element_model(blocks, None, "mech_mohr_coulomb", {**ROCK, "young": 1e8, "damp_factor": 0.05, **soil})
     if kind != "drop":
         blocks.joint_model(None, "classic_intrinsic_cohesive_interface", WEAK)
     changes.set_velocity(blocks, None, vx=6.0 if kind == "flight" else 0.5, vy=-5.0)

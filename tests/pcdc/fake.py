@@ -24,6 +24,7 @@ from hpcdem.physics.fdem.convergence import Watch
 from hpcdem.physics.fdem.equilibrium import Balanced
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import MODELS, Rows
+from hpcdem.physics.fdem.state import Creep
 from hpcdem.physics.fdem.tables import Table
 
 
@@ -56,12 +57,15 @@ class FakeBlocks:
         self.calls: list[tuple[str, tuple, dict]] = []
         self.clear()
 
+    def told_time(self) -> float:
+        return self.clock.time
+
     def clear(self) -> None:
         self.local = SimpleNamespace(passes=0)
         self.event_rows: list[Any] = []
         self.joint_row = np.zeros(0)
         self.mesh: Mesh | None = None
-        self.clock = Clock()
+        self.clock, self.creep = Clock(), Creep()
         self.tables: dict[str, Table] = {}
 
     def __getattr__(self, name: str) -> Any:

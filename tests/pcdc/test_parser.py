@@ -199,7 +199,6 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 
 LATER = [
-    ("element c-model mech-burgers den 1", "creep comes later"),
     ("element c-model therm-iso-h con 1", "heat comes later"),
     ("face-joint c-model hydr-p-m f-den 1", "fluid in fractures comes later"),
     ("face-joint c-model t-f con 1", "heat comes later"),
@@ -213,7 +212,6 @@ LATER = [
     ("flow-node initial pressure 1", "fluid in fractures comes later"),
     ("model option hydraulic on", "fluid in fractures comes later"),
     ("model sub-step mechanical 1", "fluid in fractures comes later"),
-    ("model creep on", "creep comes later"),
     ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
     ("output image 'a'", "hpcdem movie"),
 ]

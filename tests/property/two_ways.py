@@ -304,6 +304,7 @@ class Writer:
             self.add(f"pcdc mesh structured ({u.length(0.3)!r},{u.length(self.high + gap)!r}) "
                      f"({u.length(0.7)!r},{u.length(self.high + gap + 0.2)!r}) cells 2 1 type {kind} group 'whole' "
                      "set 'sets'")  # fmt: skip
+        self.creeps = self.kind == BLOCKS and kind == "tri" and self.rng("creep").random() < 0.3
         self._element_model()
         if self.jointed:
             self._joint_model()
@@ -364,6 +365,16 @@ class Writer:
             self.add(f"{line} property {_words(values)}{where}")
 
     def _element_model(self) -> None:
+        if self.creeps:
+            u, rock = self.units, {name: value for name, value in self.rock.items() if name != "penalty"}
+            rock |= {
+                "maxwell-viscosity": u.time(u.stress(1e5)), "kelvin-shear": u.stress(1e8),
+                "kelvin-viscosity": u.time(u.stress(5e4)),
+            }  # fmt: skip
+            self._assign("pcdc element c-model mech-bur", rock, self.where("element"), "properties", 3,
+                         "pcdc element property")  # fmt: skip
+            self.add("pcdc model creep on")
+            return
         self._assign("pcdc element c-model mech-iso-e", self.rock, self.where("element"), "properties", 3,
                      "pcdc element property")  # fmt: skip
 
@@ -552,6 +563,9 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
         if diagnostics.joint_counts(blocks) != (0, 0, 0):
             found["opening"] = diagnostics.values(blocks, "opening") / u.l
             found["damage"] = diagnostics.values(blocks, "damage")
+        if blocks.creep.on:
+            found["creep"] = diagnostics.values(blocks, "creep_strain_xy")
+            found["creep time"] = np.array([blocks.creep.time / u.t])
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
         found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():

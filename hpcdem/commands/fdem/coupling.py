@@ -40,6 +40,8 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
         raise CommandError(f"the time step must be positive, got {dt:g}")
     project.refuse_inside("couple")
     blocks = project.ready()
+    if blocks.creep.on:
+        raise CommandError("blocks that are coupled to particles do not creep: model creep off comes first")
     if project.continues is not None and particles.number == project.asleep:
         project.coupled = Coupled(particles, blocks, friction)  # both come out of the checkpoint, see take_up
         return project.coupled

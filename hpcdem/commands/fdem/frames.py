@@ -53,7 +53,7 @@ def write_due(project: Project) -> None:
     """The frames that are due at this step, once each; `settle` waits for them. Collective."""
     due = [
         name for name, every in project.frames.items()
-        if project.step % every == 0 and project.framed.get(name) != project.step
+        if project.count % every == 0 and project.framed.get(name) != project.step
     ]  # fmt: skip
     if not due:
         return
@@ -113,14 +113,15 @@ def whole(project: Project) -> MeshState | None:
 
 def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
-    joints; of properties those that a table or a field has made different from object to object; of plastic flow only
-    where elements can yield; all state variables of laws of the user."""
+    joints; of properties those that a table or a field has made different from object to object; of plastic flow and
+    creep only where elements can yield or creep; all state variables of laws of the user."""
     yields = "plastic" in blocks.cold or bool(blocks.yielding().any())
+    creeps = "creep" in blocks.cold or bool(blocks.creeping().any())
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
     return [
         name for name, quantity in QUANTITIES.items()
         if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
-        and (yields or not name.startswith("plastic_"))
+        and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
     ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip
 
 
@@ -168,4 +169,6 @@ def frame(project: Project) -> MeshFrame:
     joints["first"], joints["last"] = joints["number"], 4 * element + (edge + 1) % count
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
     clock = blocks.clock
-    return MeshFrame(int(clock.step), float(clock.time), float(clock.dt), of_corners, of_elements, of_joints, names)
+    return MeshFrame(
+        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names
+    )

@@ -97,7 +97,7 @@ def record(project: Project, goes_on: bool = False) -> None:
     with blocks.timers.around("history"), blocks.one_moment():
         for history in project.histories.values():
             history.take(blocks)
-            if blocks.clock.step % history.every == 0:
+            if project.count % history.every == 0:
                 history.record(blocks, goes_on)
             waiting = max(waiting, len(history.rows) - history.filed)
     if waiting >= FLUSH:

@@ -84,6 +84,11 @@ class Project:
         """Steps done."""
         return int(self.blocks.clock.step)
 
+    @property
+    def count(self) -> int:
+        """Of steps, for what happens every so many: in a static run with creep of creep steps."""
+        return self.blocks.creep.steps if "creep" in (self.progress or {}) else self.step
+
     def refuse_inside(self, what: str) -> None:
         """CommandError in a function that is called in the middle of a command that steps."""
         if self.stepping:

@@ -24,7 +24,9 @@ UNITS = {
     },
     ELEMENT: {
         "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
-        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m", LAW_STATE: "that of the law",
+        "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
+        "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
+        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", LAW_STATE: "that of the law",
     },
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
@@ -33,9 +35,11 @@ UNITS = {
         "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
     },
     MODEL: {
-        "time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1", "broken_joints": "1",
+        "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
+        "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
-        "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "gravity_work": "J/m",
+        "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
+        "gravity_work": "J/m",
         "outside_work": "J/m", "disc_work": "J/m", "energy_error": "J/m",
     },
 }  # fmt: skip
@@ -53,6 +57,7 @@ def _energy(name: str) -> Callable[[Any], float]:
 
 _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "time": lambda blocks: float(blocks.clock.time),
+    "creep_time": lambda blocks: float(blocks.creep.time),
     "cycle": lambda blocks: float(blocks.clock.step),
     "ratio": lambda blocks: float(diagnostics.unbalanced_ratio(blocks)),
     "intact_joints": _of_joints(0),
@@ -65,6 +70,7 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "contact_energy": _energy("contact"),
     "viscous_loss": _energy("viscous_lost"),
     "plastic_loss": _energy("plastic_lost"),
+    "creep_loss": _energy("creep_lost"),
     "gravity_work": _energy("work_gravity"),
     "outside_work": _energy("work_outside"),
     "disc_work": _energy("work_discs"),
@@ -110,9 +116,9 @@ class History:
             probe = self._probe_of(blocks)
             probe.find()
             assert probe.local is not None
-            self._waits = int(clock.step), float(clock.time), probe.local, probe.local.passes
+            self._waits = int(clock.step), float(blocks.told_time()), probe.local, probe.local.passes
         else:
-            self.rows.append((int(clock.step), float(clock.time), self.measure(blocks)))
+            self.rows.append((int(clock.step), float(blocks.told_time()), self.measure(blocks)))
 
     def take(self, blocks: Blocks) -> None:
         """Add the record that waits, if there is one. Collective."""

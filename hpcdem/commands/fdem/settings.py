@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from hpcdem.commands.fdem import coupling
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, diagnostics
+from hpcdem.physics.fdem import creep as of_elements
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
 
 
@@ -54,6 +56,21 @@ def time_step(
         project.adapts = bool(auto)
 
 
+def creep(
+    project: Project,
+    on: bool,
+    dt: float | None = None,
+    change: float | None = None,
+    least: float | None = None,
+    greatest: float | None = None,
+) -> None:
+    """Elements creep from now on, or no more; see `creep.switch`."""
+    coupling.refuse(project, "model creep")
+    if on and dt is not None and project.dynamic:
+        raise CommandError("dt of creep is for static runs: in dynamic ones elements creep by every time step")
+    of_elements.switch(project.ready(), on, dt, change, least, greatest)
+
+
 def reset_velocity(project: Project) -> None:
     """All velocities become zero."""
     changes.reset_velocity(project.ready())
@@ -67,6 +84,11 @@ def reset_displacement(project: Project) -> None:
 def reset_elements(project: Project, where: Range | None = None) -> None:
     """Plastic states are forgotten."""
     changes.reset_state(project.ready(), chosen(project, ELEMENT, where))
+
+
+def reset_kelvin_strain(project: Project, where: Range | None = None) -> None:
+    """Kelvin units are without strain from here on."""
+    changes.reset_kelvin_strain(project.ready(), chosen(project, ELEMENT, where))
 
 
 def reset_joints(project: Project, where: Range | None = None) -> None:

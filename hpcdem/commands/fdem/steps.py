@@ -8,11 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hpcdem.commands.fdem import checkpoints, coupling, cracks, frames, histories
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, StoppedWithCheckpoint
 from hpcdem.io.behind import under_way
-from hpcdem.physics.fdem import convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
@@ -43,10 +45,13 @@ def resume(project: Project) -> None:
     if command is None:
         raise CommandError("the checkpoint does not tell which command it was written in")
     name, given = command
-    if name == "step":
-        step(project, **given)
-    else:
-        solve(project, **given)
+    match name:
+        case "step":
+            step(project, **given)
+        case "solve":
+            solve(project, **given)
+        case "solve elastic":
+            solve_elastic(project, **given)
 
 
 def solve(
@@ -71,7 +76,7 @@ def solve(
         ratio = RATIO
         words = [f"ratio {ratio:g}"]
     if time is not None and not project.dynamic:
-        raise CommandError("time does not pass in static runs: use ratio or cycles")
+        _check_creep(project, time, cycles)
     first = project.step if project.progress is None else project.progress["first"]
     text = ""
     try:
@@ -87,25 +92,122 @@ def solve(
         project.log.warn(text)
 
 
-def solve_elastic(project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto") -> None:
-    """Static equilibrium at once, see `equilibrium.solve_elastic`; the histories and frames that are due then."""
+def solve_elastic(
+    project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto", time: float | None = None
+) -> None:
+    """Static equilibrium at once, see `equilibrium.solve_elastic`; the histories and frames that are due then. time: so
+    much creep time [s] passes, each creep step at once."""
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
     blocks = project.ready()
-    began = clocks.monotonic()
     given = {} if ratio is None else {"ratio": ratio}
+    if time is not None:
+        _creep_at_once(project, time, solver, given)
+        return
+    began = clocks.monotonic()
     found = equilibrium.solve_elastic(blocks, cycles=cycles, solver=solver, **given)
     project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
     if project.log is not None:
-        where = f"line {project.line}: " if project.line else ""
         project.log.info(
-            f"{where}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations, "
+            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations, "
             f"{found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
         )
-    histories.record(project)
-    frames.write_due(project)
+    _write_due(project)
     histories.flush(project)
     frames.settle(project)
+
+
+def _where(project: Project) -> str:
+    return f"line {project.line}: " if project.line else ""
+
+
+def _write_due(project: Project) -> None:
+    """What is due at this step."""
+    histories.record(project)
+    cracks.record(project)
+    frames.write_due(project)
+
+
+def _check_creep(project: Project, time: float, cycles: int | None = None) -> None:
+    """CommandError if the model cannot creep for this time [s] in a static run."""
+    coupling.refuse(project, "model solve time in a static run")
+    if cycles is not None:
+        raise CommandError(
+            "time and cycles exclude each other in static runs: time passes in creep steps, not in cycles"
+        )
+    creep.check(project.ready(), time)
+
+
+def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, Any]) -> None:
+    """So much creep time [s] passes, each creep step by linear equations."""
+    if project.dynamic:
+        raise CommandError("elastic with time is for static runs: model option dynamic off comes first")
+    _check_creep(project, time)
+    blocks = project.blocks
+    if project.progress is None:
+        creep.drop(blocks)
+        command = "solve elastic", {"time": time, "solver": solver, **given}
+        project.progress = {"first": project.step, "creep": blocks.creep.time + time, "command": command}
+    first, end = project.progress["first"], project.progress["creep"]
+    try:
+        project.stepping = "solve elastic"
+        if blocks.creep.passed == 0.0:
+            frames.write_due(project)
+        while blocks.creep.time < end:
+            if blocks.creep.passed == 0.0:
+                creep.begin(blocks, end)
+            try:
+                found = equilibrium.solve_elastic(blocks, solver=solver, **given)
+            except CommandError:
+                creep.drop(blocks)
+                raise
+            creep.finish(blocks, end)
+            _write_due(project)
+            if blocks.stop is not None and blocks.creep.time < end:
+                asked = np.array([blocks.stop.local_request()], np.int64)
+                _answer(project, int(project.comm.max_into(asked)[0]))
+        project.solved = {"reason": "time", "ratio": found.ratio, "steps": project.step - first}
+        _tell_creep(project)
+        histories.flush(project)
+        frames.settle(project)
+    finally:
+        under_way.wait()
+        project.progress, project.stepping = None, ""
+
+
+def _tell_creep(project: Project) -> None:
+    clock = project.blocks.creep
+    if project.log is not None:
+        project.log.info(f"{_where(project)}creep time {clock.time:.6g} s after {clock.steps} creep steps")
+
+
+def _creep(
+    project: Project, name: str, ratio: float, window: int | None, limit: int | None
+) -> tuple[str, float, Watch]:
+    """Creep steps up to the creep time of project.progress, each to this ratio; see `_run`."""
+    blocks, progress = project.blocks, project.progress
+    assert progress is not None
+    clock, end = blocks.creep, progress["creep"]
+    ended = "time", math.nan, Watch(0, 0, blocks.clock.step)
+    if clock.passed == 0.0:
+        frames.write_due(project)
+    while clock.time < end:
+        if clock.passed == 0.0:
+            creep.begin(blocks, end)
+            for word in ("ended", "done"):
+                progress.pop(word, None)
+            watch = convergence.watch(blocks, window, limit)
+            progress.update(begun=blocks.clock.step, watch=asdict(watch))
+        ended = _advance(project, name, progress["begun"], math.inf, math.inf, ratio)
+        if ended[0] != "ratio":
+            creep.drop(blocks)
+            return ended
+        creep.finish(blocks, end)
+        _write_due(project)
+    _tell_creep(project)
+    histories.flush(project)
+    cracks.flush(project)
+    return "time", ended[1], ended[2]
 
 
 def _run(
@@ -119,12 +221,16 @@ def _run(
     coupling.take_up(project)
     clock = project.ready().clock
     _settle_time_step(project)
-    if time is not None and project.progress is None and time <= 0.5 * clock.dt and project.log is not None:
-        project.log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
+    creeps, log = time is not None and not project.dynamic, project.log
+    if time is not None and not creeps and project.progress is None and time <= 0.5 * clock.dt and log is not None:
+        log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
-        end = None if time is None else clock.time + time
+        creep.drop(project.blocks)
+        end = None if time is None or creeps else clock.time + time
         project.progress = {"first": clock.step, "end": end, "command": command}
-        if ratio is not None:
+        if time is not None and creeps:
+            project.progress["creep"] = project.blocks.creep.time + time
+        elif ratio is not None:
             ends = steps is not None or time is not None
             project.progress["watch"] = asdict(convergence.watch(project.blocks, window, limit, ends))
     first, end = project.progress["first"], project.progress["end"]  # from before a checkpoint, if it goes on from one
@@ -132,8 +238,11 @@ def _run(
     try:
         with coupling.stepping(project, name, alone):
             project.stepping = name
-            ended = _advance(project, name, first, math.inf if steps is None else first + steps,
-                             math.inf if end is None else end, ratio)  # fmt: skip
+            if creeps:
+                ended = _creep(project, name, ratio or RATIO, window, limit)
+            else:
+                ended = _advance(project, name, first, math.inf if steps is None else first + steps,
+                                 math.inf if end is None else end, ratio)  # fmt: skip
         frames.settle(project)
         return ended
     finally:
@@ -151,11 +260,13 @@ def _advance(
     watch = Watch(**progress["watch"]) if progress.get("watch") else Watch(0, 0, first)
     reason, found = progress.get("ended", ["", math.nan])
     look = LOOK_DYNAMIC if project.dynamic else LOOK_STATIC
-    report = _Report(project, name, last)
-    frames.write_due(project)
+    report, creeps = _Report(project, name, last), "creep" in progress
+    if not creeps:
+        frames.write_due(project)
     while clock.step < last and clock.time < end - 0.5 * clock.dt and not progress.get("done"):
         due = min(last, _after(clock.step, STRIDE, first), coupling.next_checkpoint(project))
-        due = min([due, *(_after(clock.step, every, 0) for every in _intervals(project))])
+        if not creeps:  # else after the creep step
+            due = min([due, *(_after(clock.step, every, 0) for every in _intervals(project))])
         if histories.wait(project):
             due = clock.step + 1
         if ratio is not None:
@@ -169,9 +280,10 @@ def _advance(
             raise
         _settle_time_step(project)
         more = not request and clock.step < last and clock.time < end - 0.5 * clock.dt
-        histories.record(project, more)
+        if not creeps:
+            histories.record(project, more)
+            frames.write_due(project)
         cracks.record(project)
-        frames.write_due(project)
         if ratio is not None and ((clock.step - first) % look == 0 or clock.step == last):
             found = diagnostics.unbalanced_ratio(blocks)
             reason = "ratio" if found <= ratio else watch.failed(clock.step, found, diagnostics.joint_counts(blocks)[2])
@@ -307,6 +419,8 @@ class _Report:
         intact, yielded, broken = diagnostics.joint_counts(blocks)
         joints = f" | joints: {yielded} yielded, {broken} broken" if intact + yielded + broken else ""
         time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
+        if blocks.creep.on:
+            time += f" | creep time {blocks.creep.time:.6g} s"
         return f"step {clock.step}{time} | ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"
 
     def finish(self, blocks: Blocks) -> None:

@@ -19,6 +19,7 @@ ENERGY_WORDS = {
     "contact": "lost or stored by contacts",
     "viscous_lost": "lost by viscous damping",
     "plastic_lost": "lost by plastic flow",
+    "creep_lost": "lost by creep",
     "work_gravity": "work of gravity",
     "work_outside": "work of loads and conditions",
     "work_discs": output.ACROSS,
@@ -47,7 +48,7 @@ def close(project: Project, figure: bool = True) -> None:
         rows = [
             (text, f"{energies[name]:.6g}")
             for name, text in ENERGY_WORDS.items()
-            if name not in ("work_discs", "plastic_lost") or energies[name]
+            if name not in ("work_discs", "plastic_lost", "creep_lost") or energies[name]
         ]
         log.table("energy budget", ("energy", "J/m"), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")

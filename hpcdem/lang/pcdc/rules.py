@@ -63,8 +63,8 @@ def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | 
 
 
 def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if "elastic" in arguments and "time" in arguments:
-        raise ValueError("elastic and time exclude each other: equilibrium is found at once")
+    if {"elastic", "time", "cycles"} <= arguments.keys():
+        raise ValueError("elastic takes time or cycles: a creep step is found at once")
     watched = [word for word in ("window", "limit", "on-failure") if word in arguments]
     by_ratio = "ratio" in arguments or not ({"cycles", "time"} & set(arguments))
     if watched and ("elastic" in arguments or not by_ratio):
@@ -73,6 +73,15 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
     if "solver" in arguments and "elastic" not in arguments:
         raise ValueError("solver goes with elastic; steps need none")
+
+
+def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    others = [word for word in ("dt", "change", "least", "greatest") if word in arguments]
+    if arguments["on"] is False and others:
+        raise ValueError(f"off takes no {others[0]}")
+    for word, with_ in (("change", "dt"), ("least", "change"), ("greatest", "change")):
+        if word in arguments and with_ not in arguments:
+            raise ValueError(f"{word} goes with {with_}")
 
 
 def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -92,6 +101,7 @@ _RULES = {
     "field create": _field,
     "model new": _dimensions,
     "model time-step": _time_step,
+    "model creep": _creep,
     "model solve": _solve,
     "history create": _history,
     "chart add": _curve,

@@ -48,7 +48,6 @@ FLOW = "fluid in fractures comes later; this version computes mechanics"
 HEAT = "heat comes later; this version computes mechanics"
 PROPPANT = "proppant comes later; this version computes mechanics"
 BOLTS = "rock bolts come later"
-CREEP = "creep comes later; this version has the elastic model mech-iso-elastic"
 
 
 @dataclass(frozen=True)
@@ -225,15 +224,15 @@ USER = Model(
     one_of=_PAIRS, of=properties.USER, leading=(_LAW,),
 )  # fmt: skip
 BURGERS = Model(
-    "mech{anical}-bur{gers}", "3", "Creep after Burgers.",
-    (_DENSITY, _YOUNG, _POISSON, _BULK,
-     Option("k{elvin}-s{hear}", (NOT_NEGATIVE,), "shear modulus of the Kelvin part", "Pa"),
-     Option("k{elvin}-v{iscosity}", (NOT_NEGATIVE,), "viscosity of the Kelvin part", "Pa s"),
-     Option("m{axwell}-s{hear}", (POSITIVE,), "shear modulus of the Maxwell part", "Pa"),
-     Option("m{axwell}-v{iscosity}", (NOT_NEGATIVE,), "viscosity of the Maxwell part", "Pa s"),
-     *(Option(f"k{{elvin}}-s{{train}}-{c}", (FLOAT,), "initial strain of the Kelvin part", "1", "0")
-       for c in ("xx", "yy", "xy")), _DAMP),
-    later=CREEP,
+    "mech{anical}-bur{gers}", "3",
+    "Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations. Strain "
+    "of the Kelvin unit goes with a stress that was there before. For triangles.",
+    declared(
+        properties.MECH_BURGERS, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "b{ulk}", "k{elvin}-s{hear}",
+        "k{elvin}-v{iscosity}", "m{axwell}-s{hear}", "m{axwell}-v{iscosity}", "k{elvin}-s{train}-xx",
+        "k{elvin}-s{train}-yy", "k{elvin}-s{train}-xy", "d{amp}-f{actor}", "fri{ction}",
+    ),
+    one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS,
 )  # fmt: skip
 _HEAT_OF = (
     Option("con{ductivity}", (POSITIVE,), "thermal conductivity", "W/(m K)"),
@@ -375,8 +374,9 @@ RECORDED = {
     },
     "element": {
         "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
-        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m",
-        "law-state": "that of the law",
+        "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
+        "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
+        "kelvin-strain-xy": "1", "creep-work": "J/m", "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
@@ -385,10 +385,11 @@ RECORDED = {
         "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
     },
     "model": {
-        "time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1", "broken-joints": "1",
+        "time": "s", "creep-time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1",
+        "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
-        "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "gravity-work": "J/m",
-        "outside-work": "J/m", "disc-work": "J/m", "energy-error": "J/m",
+        "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
+        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "energy-error": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -417,6 +418,7 @@ _OF_SOLIDS = (
     *(replace(o, doc=f"{o.doc}; the internal one of {MOHR_COULOMB.keyword.name}") if o.name == "friction" else o
       for o in _properties(ISO_ELASTIC)),
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
+    *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     _PARAMETER,
 )  # fmt: skip
 
@@ -467,13 +469,14 @@ _MODEL = (
             "whose joints stay before their peak and whose surfaces do not touch. A run towards a ratio that gets "
             "nowhere (window, limit) ends the script with exit code 3 and names the body that slides away; "
             "`pcdc.solved['reason']` says how a run ended.",
-            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic",
+            ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
                      Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
                             "velocities act"),
-                     Option("time", (POSITIVE,), "time that passes", "s"),
+                     Option("time", (POSITIVE,), "time that passes; in static runs creep time, each creep step to its "
+                            "ratio (1e-5), or with elastic at once", "s"),
                      Option("win{dow}", (ZERO_OR_MORE,), "towards a ratio: it has failed when the least ratio has not "
                             "fallen by a tenth in so many steps, nor in as many as the progress so far took; 0: "
                             "never", default="static runs: ten times as many as a wave takes there and back, at least "
@@ -487,7 +490,18 @@ _MODEL = (
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
                             "unknowns on", default="auto"))),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
-    Command("mod{el} creep", "Creep in a clock of its own.", later=CREEP),
+    Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
+            "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
+            "which ends in balance; `every` of histories and frames then counts creep steps.",
+            ("pcdc model creep on dt 3600", "pcdc model creep on dt 100 change 0.05 greatest 86400",
+             "pcdc model creep off"),
+            (_leading("on", BOOL, "whether they creep"),),
+            (Option("dt", (POSITIVE,), "creep step of static runs; with change the first one", "s"),
+             Option("cha{nge}", (PART,), "the creep step follows this change of stress: the largest of the deviators "
+                    "of elements and of their Kelvin dashpots in a creep step, over the largest deviator of all; from "
+                    "one to the next it halves or doubles at most", "1", "dt stays"),
+             Option("least", (POSITIVE,), "with change: shortest creep step", "s", "dt / 100"),
+             Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt"))),
 )  # fmt: skip
 
 _GEOMETRY = (
@@ -636,6 +650,8 @@ _OBJECTS = (
     Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
             ("pcdc element reset state",), ranged="element", manual=True),
+    Command("el{ement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
+            "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element"),
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),

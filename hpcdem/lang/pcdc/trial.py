@@ -7,13 +7,13 @@ from typing import Any
 
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
-from hpcdem.lang.pcdc.table import COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, USER, Command
+from hpcdem.lang.pcdc.table import BURGERS, COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, USER, Command
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, USER, CONTACT, COHESIVE)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -90,9 +90,11 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     given = {name: value for name, value in given.items() if name not in ("np", "parameter")}
     for name, value in given.items():
         model.property(name).check(value)
-    moduli = {name: value for name, value in given.items() if name in properties.MODULI}
+    solid = properties.MECH_BURGERS if "maxwell_shear" in given or model is properties.MECH_BURGERS else None
+    solid = solid or properties.MECH_ISO_ELASTIC
+    moduli = {name: value for name, value in given.items() if name in (*properties.MODULI, "maxwell_shear")}
     if len(moduli) > 1:
-        properties.MECH_ISO_ELASTIC.complete({"density": 1.0, **moduli})
+        solid.complete({"density": 1.0, **moduli})
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})

@@ -31,6 +31,11 @@ class Model:
         return self._look(lambda: float(self._project.blocks.clock.time))
 
     @property
+    def creep_time(self) -> float:
+        """Time that the elements have crept [s]."""
+        return self._look(lambda: float(self._project.blocks.creep.time))
+
+    @property
     def cycle(self) -> int:
         """Steps done."""
         return self._look(lambda: int(self._project.blocks.clock.step))

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.numerics.exact_sum import exact_sum, from_integer
-from hpcdem.physics.fdem.kernels import energy, plasticity
+from hpcdem.physics.fdem.kernels import creep, energy, plasticity
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 STORED = ("kinetic", "strain", "joints")
-WORK = ("joints", "contact", "viscous", "gravity", "outside", "plastic")
-"""Columns of energy.WORK by name, and the work of plastic flow, which elements carry with what they remember of it."""
+WORK = ("joints", "contact", "viscous", "gravity", "outside", "plastic", "creep")
+"""Columns of energy.WORK by name, and what plastic flow and creep lose, which elements carry with what they remember of
+it."""
 
 
 class Budget:
@@ -106,13 +107,14 @@ class Budget:
             "contact": -work["contact"],
             "viscous_lost": -work["viscous"],
             "plastic_lost": -work["plastic"],
+            "creep_lost": -work["creep"],
             "work_gravity": work["gravity"],
             "work_outside": work["outside"] - of_discs,
             "work_discs": of_discs,
             "commands": by_commands,
         }
         given = work["gravity"] + work["outside"] + by_commands
-        taken = joints_lost - work["contact"] - work["viscous"] - work["plastic"]
+        taken = joints_lost - work["contact"] - work["viscous"] - work["plastic"] - work["creep"]
         found["closing"] = change + taken - given
         flows = [joints_lost, *(work[name] for name in WORK[1:]), by_commands]
         flows += [sum(map(abs, part.values())) for part in (stored, start)]
@@ -146,6 +148,8 @@ class Budget:
             half = np.zeros((sim.n_own, energy.WORK))
             if local.plastic:
                 half[:, WORK.index("plastic")] = -local.plastic_columns(slice(None))[:, plasticity.WORK]
+            if local.creeps:
+                half[:, WORK.index("creep")] = -local.crept()[0][:, creep.LOST]
             self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}

@@ -10,9 +10,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
+from hpcdem.physics.fdem.kernels.creep import K11, K12, K22
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, model
+from hpcdem.physics.fdem.properties import ELEMENT, MECH_BURGERS, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import MARK
@@ -69,7 +70,7 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if MARK in name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
+    if (name == MECH_BURGERS.name or MARK in name) and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
         raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
     if MARK in name and sim.budget is not None:
         raise CommandError(
@@ -312,6 +313,21 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
             f"element reset state changes nothing: no element has a law with a state of its own "
             f"({', '.join(names) or 'there is no law yet'}); joints have one: face-joint reset state",
         )
+
+
+def reset_kelvin_strain(sim: Blocks, elements: Numbers = None) -> None:
+    """The Kelvin units of elements are without strain from here on. Stress and shape stay. CommandError if none of the
+    elements can creep."""
+    at = sim.numbers_of_elements(elements)
+    if not sim.creeping()[at].any():
+        raise CommandError(
+            f"none of these {len(at)} elements has the model {MECH_BURGERS.name}: there is no Kelvin strain"
+        )
+    sim.before_change()
+    if "creep" in sim.cold:
+        for column in (K11, K22, K12):
+            sim.cold["creep"][np.isin(sim.number, at), column] = 0.0
+    sim.changed(stiffness=False)
 
 
 def reset_joint_state(sim: Blocks, joints: Numbers = None) -> None:

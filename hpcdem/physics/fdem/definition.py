@@ -19,7 +19,15 @@ from hpcdem.physics.fdem import connectivity, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.properties import ELEMENT, FACE, JOINT, MECH_MOHR_COULOMB, MODULI, Model, Rows
+from hpcdem.physics.fdem.properties import (
+    ELEMENT,
+    FACE,
+    JOINT,
+    MECH_BURGERS,
+    MECH_MOHR_COULOMB,
+    Model,
+    Rows,
+)
 from hpcdem.physics.fdem.tables import Drawn, Over, Table, Value
 from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
@@ -277,8 +285,15 @@ class ModelDefinition:
 
     def yielding(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can yield."""
+        return self._has_model(MECH_MOHR_COULOMB)
+
+    def creeping(self) -> np.ndarray:
+        """(ne,) bool: elements that are there and have a model that can creep."""
+        return self._has_model(MECH_BURGERS)
+
+    def _has_model(self, model: Model) -> np.ndarray:
         names = [self.element_rows.name(row) for row in range(len(self.element_rows))]
-        return self.alive & np.array([name == MECH_MOHR_COULOMB.name for name in names])[self.element_row]
+        return self.alive & np.array([name == model.name for name in names])[self.element_row]
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
@@ -799,12 +814,15 @@ def finite(what: str, values: list) -> np.ndarray:
 
 def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Which two moduli stay when some are changed: Young's modulus and Poisson's ratio, or shear and bulk modulus."""
-    changed = [name for name in MODULI if name in given]
-    stays = {name: value for name, value in old.items() if name not in MODULI}
+    creeps = "maxwell_shear" in old
+    rigidities = ["maxwell_shear" if creeps else "shear", "bulk"]
+    moduli = ["young", "poisson_ratio", *rigidities]
+    changed = [name for name in moduli if name in given]
+    stays = {name: value for name, value in old.items() if name not in moduli}
     if not changed:
-        pair = ["young", "poisson_ratio"]
+        pair = moduli if creeps else ["young", "poisson_ratio"]
     elif len(changed) == 1:
-        pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else ["shear", "bulk"]
+        pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else rigidities
     else:
         pair = []
     return {**stays, **{name: old[name] for name in pair}, **given}

@@ -12,11 +12,11 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
-from hpcdem.physics.fdem.kernels import elements, plasticity
+from hpcdem.physics.fdem.kernels import creep, elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
-from hpcdem.physics.fdem.properties import COHESIVE, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
+from hpcdem.physics.fdem.properties import COHESIVE, KELVIN_STRAIN, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 
@@ -52,6 +52,9 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain"),
     "plastic_work": Quantity("element", "J/m", "work of plastic flow"),
+    **{f"creep_strain_{c}": Quantity("element", "1", f"creep strain {c}, without volume") for c in ("xx", "yy", "xy")},
+    **{f"kelvin_strain_{c}": Quantity("element", "1", f"strain {c} of the Kelvin unit") for c in ("xx", "yy", "xy")},
+    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep"),
     **_pair("position", "node", "m", "position"),
     **_pair("displacement", "node", "m", "displacement"),
     **_pair("velocity", "node", "m/s", "velocity"),
@@ -89,12 +92,15 @@ for _on, _names in (("element", ("position", "displacement", "velocity")), ("joi
 _STRENGTH = {"cohesion": "element_cohesion", "tensile": "element_tensile", "dilation": "element_dilation"}
 PROPERTIES = {
     "element": {
-        _STRENGTH.get(p.name, p.name): p.name for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB) for p in m.properties
+        _STRENGTH.get(p.name, p.name): p.name
+        for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)
+        for p in m.properties
+        if p.name not in KELVIN_STRAIN  # what it is at a time is a quantity
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }
 """Properties of elements and joints, by their names as quantities. In frames if they differ from object to object."""
-for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB)), ("joint", (COHESIVE,))):
+for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)), ("joint", (COHESIVE,))):
     for _quantity, _name in PROPERTIES[_on].items():
         _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(_on, _model.property(_name).unit, _model.property(_name).doc, False)
@@ -216,6 +222,8 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
     if any(name.startswith("plastic") for name in wanted):
         columns |= _plastic_columns(sim, some)
+    if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
+        columns |= _creep_columns(sim, some)
     if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
         memory = local.obeyed(local.s0.copy()) if local.laws else sim.cold[user_laws.COLUMN]
         columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
@@ -246,6 +254,15 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
         "plastic_volume_strain": memory[:, plasticity.VOLUME].copy(),
         "plastic_work": memory[:, plasticity.WORK].copy(),
     }
+
+
+def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
+    """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
+    strains, lost = np.zeros((sim.n_own, 6)), np.zeros(sim.n_own)
+    if "creep" in sim.cold:
+        strains, lost = sim.local.creep_strains(), sim.local.crept()[0][:, creep.LOST]
+    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy")]
+    return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 
 
 def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -488,9 +505,9 @@ def energies(sim: Blocks) -> dict[str, float]:
     """The energy budget [J/m] since `account_energy`; CommandError without it. Collective.
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
-    in joints), contact (stored or lost there), viscous_lost, plastic_lost, work_gravity, work_outside (loads and
-    conditions), work_discs (particles that touch), commands (change of what is stored by commands). closing: change of
-    what is stored + lost - work - commands; relative: that over the largest of all.
+    in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity,
+    work_outside (loads and conditions), work_discs (particles that touch), commands (change of what is stored by
+    commands). closing: change of what is stored + lost - work - commands; relative: that over the largest of all.
     """
     if sim.budget is None:
         raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")

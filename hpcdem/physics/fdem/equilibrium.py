@@ -486,7 +486,7 @@ def tangent(sim: Blocks, matrices: bool = True) -> tuple[list[Pieces], int]:
         return [], past
     rows = local.triangle_rows[: local.count]
     triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(local.quad_rows), 8, 8))
-    stiffness.triangles(rows, sim.x, local.c, local.s0, small, triangles)
+    stiffness.triangles(rows, sim.x, *local.linear(), small, triangles)
     stiffness.quads(local.quad_rows, sim.x, local.q, local.quad_s0, small, quads)
     of_triangles, of_quads = number[rows], number[local.quad_rows]
     face = local.slot_face[slots]

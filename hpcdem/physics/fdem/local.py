@@ -13,7 +13,7 @@ from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity, user_laws
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
-from hpcdem.physics.fdem.kernels import elements, energy, joints, laws, limits, plastic_quads, plasticity
+from hpcdem.physics.fdem.kernels import creep, elements, energy, joints, laws, limits, plastic_quads, plasticity
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
@@ -80,6 +80,16 @@ def yield_table(rows: Rows) -> np.ndarray:
     return table
 
 
+def creep_table(rows: Rows) -> np.ndarray:
+    """The table of creep laws (rows, 3) of kernels/creep.py; models that do not creep have zeros."""
+    shear, kelvin, maxwell = (rows.column(n) for n in ("kelvin_shear", "kelvin_viscosity", "maxwell_viscosity"))
+    table = np.zeros((len(rows), creep.LAW))
+    unit = (shear > 0.0) & (kelvin > 0.0)
+    table[unit, creep.KELVIN], table[unit, creep.PER_KELVIN] = shear[unit], 1.0 / kelvin[unit]
+    table[maxwell > 0.0, creep.PER_MAXWELL] = 1.0 / maxwell[maxwell > 0.0]
+    return table
+
+
 @dataclass
 class Evaluation:
     """Forces at the present positions, as the next step will see them [N/m].
@@ -120,6 +130,7 @@ class Local:
         self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
         self.passes = 0
         self._make_constants()
+        self._make_laws()
         self._make_joints()
         self._put_histories()
         self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
@@ -157,13 +168,21 @@ class Local:
         if sim.stress0 is not None:
             self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
             self.quad_s0[:] = np.tile(sim.initial_stresses(sim.number[self.quad_rows]), 4)
-        self.plastic = "plastic" in sim.cold
+        self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
+        if not (self.plastic or self.creeps):
+            return
+        rows = self.triangle_rows[:count]
+        self.law = np.zeros(count + 3, np.int32)
+        self.law[:count] = sim.element_row[sim.number[rows]]
+        self.said = self.s0[:count].copy()
+        self.uncrept = self.said
+        if self.creeps:
+            self.creep_table = creep_table(sim.element_rows)
+            self.creeping = np.flatnonzero(sim.creeping()[sim.number[rows]])
+            self._relieve_crept(np.arange(count))
+        self.initial = self.s0[:count].copy()
         if self.plastic:
-            rows = self.triangle_rows[:count]
-            self.initial = self.s0[:count].copy()
-            self.law = np.zeros(count + 3, np.int32)
-            self.law[:count] = sim.element_row[sim.number[rows]]
             self.yield_table = yield_table(sim.element_rows)
             memory, own = sim.cold["plastic"], self.quad_rows
             plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, memory, self.s0)
@@ -171,9 +190,17 @@ class Local:
             self.quad_law = np.repeat(sim.element_row[sim.number[own]].astype(np.int32)[:, None], 4, axis=1)
             if len(own):
                 plastic_quads.relieve_all(own, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
-        self._make_laws(models)
+        if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
+            self.uncrept = self.said.copy()
+            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.said, sim.cold["plastic"], self.uncrept)
+            self._relieve_crept(self.creeping)
 
-    def _make_laws(self, models: np.ndarray) -> None:
+    def _relieve_crept(self, who: np.ndarray) -> None:
+        """Stress without strain of the triangles `who`, less that of their creep strain."""
+        sim = self.sim
+        creep.relieve_all(who, self.triangle_rows, sim.n_left, self.c, self.uncrept, sim.cold["creep"], self.s0)
+
+    def _make_laws(self) -> None:
         """Elements with a law of the user have no moduli in the table of forces, see kernels/user_laws.py; stiff: the
         table by which the time step is found, with moduli in the ratio of those of the element."""
         sim, count = self.sim, self.count
@@ -181,7 +208,7 @@ class Local:
         numbers = user_laws.numbers(sim)[sim.number[self.triangle_rows[:count]]]
         if not user_laws.of_rows(sim.element_rows):
             return
-        of = np.flatnonzero(numbers)
+        of, models = np.flatnonzero(numbers), element_table(sim.element_rows)
         self.law_row = np.zeros(count + 3, np.int32)
         self.law_row[:count] = sim.element_row[sim.number[self.triangle_rows[:count]]]
         self.law_base = np.zeros((count + 3, 4))
@@ -461,9 +488,9 @@ class Local:
         small = not o.large_strain
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic or bool(self.laws), small, self.slot_at, self.slot_law,
-            self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow, self.joint_table,
-            self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic or self.creeps or bool(self.laws), small, self.slot_at,
+            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
+            self.joint_table, self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
@@ -482,6 +509,8 @@ class Local:
         with timers("force"):
             keep = sim.budget is not None
             self._elements(self.triangle_special, self.block_special, self.force, self.of_joints, keep)
+        if sim.options.dynamic:
+            sim.creep.passed = 0.0
         if self.some_special or self.shared:
             with timers("node"):
                 self.move_nodes()
@@ -493,6 +522,8 @@ class Local:
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
             self._flow(sim.cold["plastic"], self.s0, self.quad_s0)
+        if self._creeps_now():
+            self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
@@ -536,6 +567,48 @@ class Local:
         memory = self.sim.cold[user_laws.COLUMN].copy()
         self._obey(memory, s0)
         return memory
+
+    def _creeps_now(self) -> bool:
+        """The next forces are those after some creep, or begin it."""
+        sim = self.sim
+        return self.creeps and sim.creep.on and (sim.options.dynamic or sim.creep.passed > 0.0)
+
+    def creep(self, memory: np.ndarray, s0: np.ndarray, keep: bool) -> None:
+        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10), if they keep it, and s0
+        (count + 3, 4) [Pa] become those after it."""
+        sim = self.sim
+        kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
+        kernel(
+            sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.law,
+            self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory, s0,
+        )  # fmt: skip
+
+    def crept(self, s0: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """The same of what elements remember of creep (n_own, 10), into s0 or a copy."""
+        memory, s0 = self.sim.cold["creep"].copy(), self.s0.copy() if s0 is None else s0
+        if self._creeps_now():
+            self.creep(memory, s0, keep=True)
+        return memory, s0
+
+    def linear(self) -> tuple[np.ndarray, np.ndarray]:
+        """Constants (count + 3, 12) and stress without strain (count + 3, 4) [Pa] of the elastic triangles that those
+        that creep are within this creep step. Not to be changed."""
+        sim = self.sim
+        if not (self.creeps and sim.creep.passed > 0.0):
+            return self.c, self.s0
+        c, s0 = self.c.copy(), self.s0.copy()
+        creep.as_elastic(
+            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.law, self.creep_table,
+            sim.creep.passed, sim.cold["creep"], c, s0,
+        )  # fmt: skip
+        return c, s0
+
+    def creep_strains(self) -> np.ndarray:
+        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space."""
+        sim, out = self.sim, np.zeros((self.sim.n_own, 6))
+        small = not sim.options.large_strain
+        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, self.crept()[0], out)
+        return out
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
@@ -617,8 +690,9 @@ class Local:
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
                 *((sim.cold["plastic"], self.quad_s0) if self.yields else ()),
+                *((sim.cold["creep"],) if self._creeps_now() else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
-                *((self.s0,) if self.yields or self.laws else ()),
+                *((self.s0,) if self.yields or self.laws or self._creeps_now() else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -702,6 +776,7 @@ class Local:
         owned elements, or of some of them (at: the how-manieth)."""
         sim = self.sim
         memory, s0, quad_s0 = self.flowed() if self.plastic else (None, self.s0, self.quad_s0)
+        crept, s0 = self.crept(None if memory is None else s0) if self.creeps else (None, s0)
         if self.laws:
             s0 = s0.copy()
             self.obeyed(s0)
@@ -718,11 +793,19 @@ class Local:
             )  # fmt: skip
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
-        if memory is not None and energies:
-            more = np.zeros(sim.n_own)
-            plasticity.locked_in(self.triangle_rows[: self.count], sim.n_left, self.c, self.initial, memory, more)
-            if len(self.quad_rows):
-                plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
+        if energies and (memory is not None or crept is not None):
+            more, triangles = np.zeros(sim.n_own), self.triangle_rows[: self.count]
+            if crept is not None:
+                creep.stored(triangles, sim.n_left, self.c, self.said, self.law, self.creep_table, crept, more)
+            if memory is not None:
+                initial = self.initial
+                if crept is not None:
+                    initial = self.said.copy()
+                    every = np.arange(self.count)
+                    creep.relieve_all(every, triangles, sim.n_left, self.c, self.said, crept, initial)
+                plasticity.locked_in(triangles, sim.n_left, self.c, initial, memory, more)
+                if len(self.quad_rows):
+                    plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
             energy += more if at is None else more[at]
         if self.laws and energies:  # what such a law stores is not known
             of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0

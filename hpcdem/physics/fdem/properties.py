@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -62,6 +62,8 @@ class Model:
     doc: str
     properties: tuple[Property, ...]
     derive: Callable[[dict[str, Any]], None] = lambda values: None
+    called: Mapping[str, str] = field(default_factory=dict)
+    """Its own names of properties that other models call otherwise."""
 
     def has(self, name: str) -> bool:
         """Whether it has a property of this name."""
@@ -167,6 +169,35 @@ def _strength(values: dict[str, Any]) -> None:
         raise CommandError(f"dilation must not be above friction ({other:g} degrees), got {one:g}")
 
 
+def _agree(values: dict[str, Any]) -> bool:
+    """Whether E and Poisson's ratio are those of the bulk and Maxwell shear modulus beside them, but for rounding."""
+    one = {"shear": values["maxwell_shear"], "bulk": values["bulk"]}
+    _elastic(one)
+    near = (np.isclose(one[name], values[name], rtol=1e-9, atol=1e-9) for name in ("young", "poisson_ratio"))
+    return all(bool(np.all(each)) for each in near)
+
+
+def _burgers(values: dict[str, Any]) -> None:
+    """All four moduli from Young's modulus and Poisson's ratio, of which a bulk or Maxwell shear modulus that is given
+    takes the place of what they give, or from two of the four."""
+    own = ("young", "poisson_ratio", "maxwell_shear", "bulk")
+    given = [name for name in own if name in values]
+    if len(given) < 2:
+        raise CommandError(f"a creeping model needs two of {', '.join(own)} (Pa), got {', '.join(given) or 'none'}")
+    if len(given) == 4 and _agree(values):
+        return
+    if "maxwell_shear" in values:
+        values["shear"] = values.pop("maxwell_shear")
+    moduli = {name: values[name] for name in MODULI if name in values}
+    if len(moduli) > 2 and {"young", "poisson_ratio"} <= moduli.keys():
+        first = {name: values[name] for name in ("young", "poisson_ratio")}
+        _elastic(first)
+        moduli = {name: values.get(name, first[name]) for name in ("shear", "bulk")}
+    _elastic(moduli)
+    values.update(moduli)
+    values["maxwell_shear"] = values.pop("shear")
+
+
 _SOLID = (
     Property("density", "kg/m3", "density", low_itself=False),
     Property("young", "Pa", "Young's modulus E", optional=True, low_itself=False),
@@ -214,11 +245,34 @@ USER = Model(
     _elastic,
 )  # fmt: skip
 
+KELVIN_STRAIN = ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy")
+MECH_BURGERS = Model(
+    "mech_burgers",
+    ELEMENT,
+    "elastic in its volume, creeping in its shape after Burgers; triangles",
+    (
+        *(one for one in _SOLID if one.name not in ("shear", "bulk")),
+        Property("bulk", "Pa", "bulk modulus; in the place of the one that E and Poisson's ratio give", optional=True,
+                 low_itself=False),
+        Property("maxwell_shear", "Pa", "shear modulus of the Maxwell unit; in the place of the one that E and "
+                 "Poisson's ratio give", optional=True, low_itself=False),
+        Property("maxwell_viscosity", "Pa s", "viscosity of the Maxwell unit; 0: no dashpot", 0.0),
+        Property("kelvin_shear", "Pa", "shear modulus of the Kelvin unit; 0: no Kelvin unit", 0.0),
+        Property("kelvin_viscosity", "Pa s", "viscosity of the Kelvin unit; 0: no Kelvin unit", 0.0),
+        *(Property(name, "1", f"strain {name[-2:]} of the Kelvin unit at that moment; its zz is -xx - yy", 0.0,
+                   low=-math.inf)
+          for name in KELVIN_STRAIN),
+        _friction("friction angle of its surfaces where they have no contact model"),
+    ),
+    _burgers,
+    {"shear": "maxwell_shear"},
+)  # fmt: skip
+
 SOLID = Model(
     "of elements",
     ELEMENT,
     "all that an element may have, whatever its model",
-    tuple({p.name: p for m in (MECH_MOHR_COULOMB, MECH_ISO_ELASTIC) for p in m.properties}.values()),
+    tuple({p.name: p for m in (MECH_BURGERS, MECH_MOHR_COULOMB, MECH_ISO_ELASTIC) for p in m.properties}.values()),
 )
 
 CONTACT_MOHR_COULOMB = Model(
@@ -269,7 +323,9 @@ def _cohesive(values: dict[str, Any]) -> None:
             raise CommandError(f"{energy} must be > 0 (N/m) where {strength} is {where:g} Pa, got 0")
 
 
-MODELS = {model.name: model for model in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, CONTACT_MOHR_COULOMB, COHESIVE)}
+MODELS = {
+    model.name: model for model in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS, CONTACT_MOHR_COULOMB, COHESIVE)
+}
 
 
 def model(name: str, on: str) -> Model:
@@ -325,7 +381,11 @@ class Rows:
         """One property of all rows (rows,), not to be changed; `default` where a row has none of this name."""
         known = self._columns.get((name, default), np.empty(0))
         if len(known) < len(self.rows):
-            place = {m.name: [p.name for p in m.properties].index(name) for m in MODELS.values() if m.has(name)}
+            called = {m.name: m.called.get(name, name) for m in MODELS.values()}
+            place = {
+                m.name: [p.name for p in m.properties].index(called[m.name])
+                for m in MODELS.values() if m.has(called[m.name])
+            }  # fmt: skip
             new = [numbers[place[of]] if of in place else default for of, numbers in self.rows[len(known) :]]
             known = np.concatenate([known, new])
             known.flags.writeable = False

@@ -18,7 +18,7 @@ from hpcdem.physics.fdem import user_functions, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.state import Crack
+from hpcdem.physics.fdem.state import Crack, Creep
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -49,6 +49,7 @@ def state_of(sim: Blocks, extra: Mapping[str, Any]) -> dict[str, Any]:
         "clock": dataclasses.asdict(sim.clock),
         "lattice": dataclasses.asdict(sim.rebuild_state),
         "scene": sim.definition_state(),
+        "creep": dataclasses.asdict(sim.creep),
         "events": [list(row) for row in sim.event_rows],
         "closed": sim.closed,
         "longest": sim._longest,
@@ -185,6 +186,7 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     sim.clock = Clock(**state["clock"])
     sim.untouched = sim.clock.step == 0
     sim.rebuild_state = type(sim.rebuild_state)(**{"step": sim.clock.step, "time": sim.clock.time, **state["lattice"]})
+    sim.creep = Creep(**state.get("creep", {}))
     sim.event_rows = [Crack(*row) for row in state["events"]]
     sim._longest = state["longest"]
     if state["mesh"] is None:

@@ -14,7 +14,7 @@ neither on ranks and threads nor on when the lists were rebuilt.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -28,15 +28,17 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, overlaps, user_laws
+from hpcdem.physics.fdem import build, connectivity, creep, overlaps, user_laws
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.histories import Histories
+from hpcdem.physics.fdem.kernels import creep as creeping
 from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
+from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS
 from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, ListState, State
 from hpcdem.physics.fdem.tables import Value
 
@@ -112,6 +114,8 @@ class Blocks(State):
             if self.comm.any(bool(self.local.tally[:, elements.NEW_BROKEN].any())):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)
+        if self.creep.passed > 0.0:
+            creep.settle(self)
         self.open_model()
 
     def changed(self, topology: bool = False, stiffness: bool = True) -> None:
@@ -125,6 +129,8 @@ class Blocks(State):
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         before = self.element_row.copy()
         super().set_element_model(elements, name, properties)
+        if name == MECH_BURGERS.name:
+            self._take_kelvin_strain(elements, KELVIN_STRAIN)
         if self.log is None or self.stress0 is None:
             return
         at = np.flatnonzero((before != self.element_row) & (before > 0))
@@ -136,6 +142,22 @@ class Blocks(State):
                 f"element {other[0]} has {_pascals(self.initial_stresses(other[:1])[0])} in place of "
                 f"{_pascals(self.stress0[other[0]])}; element initial after the models sets it for the present ones",
             )
+
+    def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
+        super().element_property(elements, properties)
+        self._take_kelvin_strain(elements, [name for name in KELVIN_STRAIN if name in properties])
+
+    def _take_kelvin_strain(self, elements: Numbers, names: Sequence[str]) -> None:
+        """The strain of the Kelvin units becomes what their properties say, in these components; the model is open."""
+        at = self.numbers_of_elements(elements)
+        for name in names:
+            value = self.element_rows.column(name)[self.element_row]
+            if "creep" not in self.cold:
+                if not value[at].any():
+                    continue
+                self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
+            mine = np.isin(self.number, at)
+            self.cold["creep"][mine, creeping.K11 + KELVIN_STRAIN.index(name)] = value[self.number[mine]]
 
     def option(
         self,
@@ -149,6 +171,8 @@ class Blocks(State):
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
         it; "relax": a static stage moves them apart; "keep": they start as they are."""
         before = self.options.dynamic
+        if dynamic is not None and dynamic != before:
+            creep.drop(self)
         super().option(dynamic, collision, large_strain, overlap)
         if self.options.dynamic != before:
             self.v[:] = 0.0
@@ -178,6 +202,9 @@ class Blocks(State):
         self.clock.step += 1
         if self.options.dynamic:
             self.clock.time += self.clock.dt
+            if self.creep.on:
+                self.creep.passed = self.clock.dt
+                self.creep.time += self.clock.dt
         rebuild_state.age += 1
         rebuild_state.stored += 1
         stale = outdated = False
@@ -343,10 +370,11 @@ class Blocks(State):
         first, joints = rows[0::2], lower[0::2]
         both = rows[0::2] + rows[1::2]
         dt = clock.dt if self.options.dynamic else 0.0
+        began = rebuild_state.time if dt else self.told_time() + self.creep.passed
         return [
             Crack(
                 int(joints[k]), float(first[k, 1]), int(first[k, 2]), float(both[k, 3]),
-                rebuild_state.time + (int(first[k, 2]) - rebuild_state.step) * dt, int(first[k, 4]), float(both[k, 5]),
+                began + (int(first[k, 2]) - rebuild_state.step) * dt, int(first[k, 4]), float(both[k, 5]),
             )
             for k in np.lexsort((joints, first[:, 2])).tolist()
         ]  # fmt: skip
@@ -404,6 +432,11 @@ class Blocks(State):
             wanted = plasticity.MEMORY * (4 if self.wide else 1)
             if known.shape[1] < wanted:  # those of a file from before quads could yield have nine columns
                 self.cold["plastic"] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
+        creeps = self.creeping().any()
+        if self.creep.on and not creeps and self.log is not None:
+            self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
+        if "creep" not in self.cold and creeps:
+            self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
         user_laws.begin(self)
         with self.timers("neighbour"):
             if self._topology_stale:

@@ -52,6 +52,23 @@ class Crack(NamedTuple):
     peak_kinetic: float = math.nan
 
 
+@dataclass
+class Creep:
+    """The clock of creep. on: elements creep; dt: the next creep step of static runs [s], 0: none was given; change:
+    largest change of stress in a creep step that is aimed at, 0: dt stays; least, greatest: bounds of dt then [s];
+    time that has passed with creep on [s]; steps: creep steps that are done; passed: part of the time that elements
+    have not crept for yet [s]: in static runs the creep step that is under way."""
+
+    on: bool = False
+    dt: float = 0.0
+    change: float = 0.0
+    least: float = 0.0
+    greatest: float = 0.0
+    time: float = 0.0
+    steps: int = 0
+    passed: float = 0.0
+
+
 class State(ModelDefinition, Model):
     """ModelDefinition, positions, velocities and histories of the elements that a rank holds."""
 
@@ -63,7 +80,8 @@ class State(ModelDefinition, Model):
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
     """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
-    "plastic" (what is remembered of yielding, see plasticity.py), "law" (state variables, see user_laws.py)."""
+    "plastic" (what is remembered of yielding, see plasticity.py), "creep" (of creep, see kernels/creep.py),
+    "law" (state variables, see user_laws.py)."""
     histories: Histories
     surface_loads: SurfaceLoads
     n_left: int
@@ -108,6 +126,7 @@ class State(ModelDefinition, Model):
         self.restart()
         self.clear_definition()
         self.rebuild_state = ListState()
+        self.creep = Creep()
         self.event_rows: list[Crack] = []
         self.closed = False
         self.budget: Any = None
@@ -145,6 +164,10 @@ class State(ModelDefinition, Model):
     def masses_change(self) -> bool:
         """Masses or the time step will be others with the next lists."""
         return self.rebuild_state.dt == 0.0 or not self.options.dynamic or self.options.mass_scaling > 0.0
+
+    def told_time(self) -> float:
+        """Model time [s]; in static mode with creep the time that elements have crept."""
+        return self.creep.time if self.creep.on and not self.options.dynamic else self.clock.time
 
     def has_ended(self, one: Relaxation) -> bool:
         """Forces left behind are gone, or belong to the other mode."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import changes, connectivity, convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 
@@ -27,6 +27,7 @@ def warm_up(threads: int = 1) -> None:
         mesh = Mesh.of(np.array(points)[used], again)
         _rest(mesh, threads)
         _flow(mesh, threads)
+        _creep(mesh, threads)
         sim = Blocks(SerialComm(), threads)
         sim.take_mesh(mesh)
         sim.option(overlap="keep")
@@ -70,6 +71,29 @@ def _flow(mesh: Mesh, threads: int) -> None:
     diagnostics.account_energy(sim)
     convergence.advance(sim, 2)
     diagnostics.energies(sim)
+
+
+def _creep(mesh: Mesh, threads: int) -> None:
+    """Triangles that creep in motion, then in a static creep step, and the tangent in it."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    at = np.flatnonzero(mesh.cells[:, 3] < 0)
+    changes.element_model(sim, at, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    sim.initial_stress(None, yy=1e3)
+    sim.option(collision=False)
+    creep.switch(sim, True)
+    diagnostics.account_energy(sim)
+    convergence.advance(sim, 2)
+    diagnostics.energies(sim)
+    diagnostics.values(sim, "creep_strain_xx")
+    diagnostics.account_energy(sim, False)
+    sim.option(dynamic=False)
+    creep.switch(sim, True, dt=1.0)
+    creep.begin(sim, 1.0)
+    equilibrium.tangent(sim)
+    sim.step()
+    creep.finish(sim, 1.0)
 
 
 def _rest(mesh: Mesh, threads: int) -> None:

@@ -1,0 +1,175 @@
+"""Creep steps of static runs, and the switch of creep. In dynamic runs elements creep by each time step.
+
+A creep step: the stress of the present positions is what it begins with (`begin`); the model is brought into balance,
+by relaxation or at once, with elements that creep for dt at their new positions (kernels/creep.py); then they remember
+it (`finish`). It ends at the balance that is asked for, so the stress at its end is as good as that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.definition import finite
+from hpcdem.physics.fdem.kernels import creep as kernels
+from hpcdem.physics.fdem.kernels import elements
+from hpcdem.physics.fdem.kernels import nodes as moving
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+RANGE = 100.0
+"""Creep steps that adapt stay within the given one over and times this, unless other bounds are given."""
+FASTEST = 2.0
+"""Most by which one creep step differs from the one before."""
+FULL = 1.0 - 1e-9
+"""A creep step this near to the end goes there."""
+
+
+def switch(
+    sim: Blocks,
+    on: bool,
+    dt: float | None = None,
+    change: float | None = None,
+    least: float | None = None,
+    greatest: float | None = None,
+) -> None:
+    """Elements creep from now on, or no more; the time that they have crept is kept. Collective.
+
+    dt: creep step of static runs [s]. change: the creep step follows the change of stress: the largest change of the
+    deviator in an element, or in the dashpot of its Kelvin unit, in a creep step, over the largest deviator of all,
+    shall be about this; then dt is the first step, least and greatest are its bounds (dt / 100, 100 dt). A step in
+    which more changed is not repeated: the next one is up to FASTEST times as short."""
+    given = {"dt": dt, "change": change, "least": least, "greatest": greatest}
+    numbers = {name: float(finite(name, [value])[0]) for name, value in given.items() if value is not None}
+    if not on and numbers:
+        raise CommandError(f"creep off takes no {next(iter(numbers))}")
+    for name, value in numbers.items():
+        if value <= 0.0:
+            raise CommandError(f"{name} of creep must be positive, got {value:g}")
+    follows = [name for name in ("change", "least", "greatest") if name in numbers]
+    if follows and "dt" not in numbers:
+        raise CommandError(f"{follows[0]} of creep goes with dt, the first creep step")
+    if follows and "change" not in numbers:
+        raise CommandError(
+            f"{follows[0]} of creep bounds a creep step that follows the change of stress: change is missing"
+        )
+    if numbers.get("change", 0.0) >= 1.0:
+        raise CommandError(f"change of creep is a part of the largest stress, below 1, got {numbers['change']:g}")
+    step = numbers.get("dt", 0.0)
+    low, high = numbers.get("least", step / RANGE), numbers.get("greatest", RANGE * step)
+    if not low <= step <= high:
+        raise CommandError(f"dt of creep, {step:g} s, must lie between least, {low:g} s, and greatest, {high:g} s")
+    sim.before_change()
+    drop(sim)
+    if not follows:
+        low = high = 0.0
+    sim.creep = replace(sim.creep, on=on, dt=step, change=numbers.get("change", 0.0), least=low, greatest=high)
+    sim.changed(stiffness=False)
+
+
+def settle(sim: Blocks) -> None:
+    """A command is about to change a model in motion: elements creep for the time that has passed. Collective."""
+    if sim.options.dynamic:
+        sim.close_model()
+        if sim.local.creeps:
+            sim.local.creep(sim.cold["creep"], sim.local.s0, keep=True)
+        sim.creep.passed = 0.0
+
+
+def check(sim: Blocks, time: float) -> None:
+    """CommandError if the model cannot creep for this time [s] in a static run."""
+    if not sim.creep.on:
+        raise CommandError("time does not pass in static runs: use ratio or cycles; or model creep on")
+    if not sim.creeping().any():
+        raise CommandError("no element can creep: element c-model mech-burgers comes first")
+    if sim.creep.dt == 0.0:
+        raise CommandError("static runs need the length of a creep step: model creep on dt")
+    if not time > 0.0:
+        raise CommandError(f"time must be positive, got {time}")
+    for row in np.unique(sim.point_row[sim.node_exists()]).tolist():
+        one = sim.conditions[row]
+        for axis, does, at in (("x", one.does_x, one.at_x), ("y", one.does_y, one.at_y)):
+            if does == moving.VELOCITY and at != 0.0 and one.constraint != moving.FIXED:
+                point = int(np.flatnonzero(sim.point_row == row)[0])
+                raise CommandError(
+                    f"node {point} has a prescribed velocity in {axis}: in static runs nodes move so far per step, "
+                    "not in creep time; in dynamic runs they do"
+                )
+
+
+def begin(sim: Blocks, end: float) -> None:
+    """A creep step begins, which goes to the creep time `end` [s] at most. Collective."""
+    clock = sim.creep
+    sim.close_model()
+    sim.local.creep(sim.cold["creep"], sim.local.s0, keep=True)
+    left = end - clock.time
+    clock.passed = left if left * FULL <= clock.dt else clock.dt
+    _warn_of_long_step(sim)
+
+
+def finish(sim: Blocks, end: float) -> None:
+    """The model is in balance: the creep step is done, and elements remember it. Collective."""
+    sim.close_model()
+    clock, local = sim.creep, sim.local
+    if sim.comm.any(bool(local.tally[:, elements.NEW_BROKEN].any())):
+        sim._renew_lists()  # joints that broke did so in this creep step
+    before = sim.cold["creep"].copy()
+    local.creep(sim.cold["creep"], local.s0, keep=True)
+    whole = end - clock.time <= clock.passed
+    done, clock.time = clock.passed, end if whole else clock.time + clock.passed
+    clock.passed = 0.0
+    clock.steps += 1
+    if clock.change > 0.0:
+        found = _change(sim, before) * clock.dt / done
+        best = clock.change / found if found > 0.0 else math.inf
+        clock.dt = min(max(clock.dt * min(max(best, 1.0 / FASTEST), FASTEST), clock.least), clock.greatest)
+
+
+def drop(sim: Blocks) -> None:
+    """Forget a creep step of a static run that did not come into balance: elements have not crept in it."""
+    if sim.creep.passed > 0.0 and not sim.options.dynamic:
+        sim.creep.passed = 0.0
+        sim.open_model()
+
+
+def _change(sim: Blocks, before: np.ndarray) -> float:
+    """Largest change of the deviator of an element, and of that in the dashpot of its Kelvin unit, in the creep step
+    that is done, over the largest deviator of all. Equal on all ranks. Collective."""
+    local, after = sim.local, sim.cold["creep"]
+    found = np.zeros(2)
+    at = local.triangle_rows[local.creeping] - sim.n_left
+    if len(at):
+        old, new = before[at], after[at]
+        table = local.creep_table[local.law[local.creeping]]
+        stress, kelvin = slice(kernels.S11, kernels.S12 + 1), slice(kernels.K11, kernels.K12 + 1)
+        way = new[:, stress] - old[:, stress]
+        unit = table[:, kernels.PER_KELVIN, None] > 0.0
+        rest = np.where(unit, way - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0)
+        found[0] = max(_size(way).max(), _size(rest).max())
+        found[1] = max(_size(new[:, stress]).max(), _size(old[:, stress]).max())
+    change, largest = sim.comm.max_into(found).tolist()
+    return change / largest if largest > 0.0 else 0.0
+
+
+def _size(s: np.ndarray) -> np.ndarray:
+    """sqrt(s : s) of deviators (n, 3)."""
+    return np.sqrt(s[:, 0] ** 2 + s[:, 1] ** 2 + (s[:, 0] + s[:, 1]) ** 2 + 2.0 * s[:, 2] ** 2)
+
+
+def _warn_of_long_step(sim: Blocks) -> None:
+    """A line in the log about Kelvin units that a creep step takes beyond their rest."""
+    if sim.log is None:
+        return
+    table = sim.local.creep_table[np.unique(sim.element_row[sim.creeping()])]
+    longest = 2.0 / float((table[:, kernels.KELVIN] * table[:, kernels.PER_KELVIN]).max(initial=1e-300))
+    if sim.creep.passed > longest:
+        sim.log.warn_once(
+            "long creep step",
+            f"the creep step {sim.creep.passed:g} s is above 2 eta_K / G_K = {longest:g} s: strains of Kelvin units "
+            "go to and fro about their rest; a shorter one is more exact",
+        )
