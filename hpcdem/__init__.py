@@ -20,6 +20,9 @@ from typing import Any
 _NAMES = {
     "Simulation": "hpcdem.api",
     "couple": "hpcdem.api",
+    "element_law": "hpcdem.physics.fdem.user_laws",
+    "Property": "hpcdem.physics.fdem.properties",
+    "StateVariable": "hpcdem.physics.fdem.user_laws",
     "HpcdemError": "hpcdem.core.errors",
     "version": "hpcdem.runtime.launch",
 }

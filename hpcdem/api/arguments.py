@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.pcdc import bindings, parser, rules, trial
 from hpcdem.lang.pcdc.keywords import matching
-from hpcdem.lang.pcdc.kinds import Kind, TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, Kind, TableName
 from hpcdem.lang.pcdc.lexer import short
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.lang.zdem.nearest import hint
@@ -45,13 +45,16 @@ def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False) 
 def model_arguments(command: Command, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """The same of a command that names a constitutive model or condition."""
     model = _model(command, name)
+    leading = {option.name: given[option.name] for option in model.leading if option.name in given}
+    first = _read(model.leading, leading, f"model {model.keyword}")
+    given = {name: value for name, value in given.items() if name not in first}
     properties = _read(model.options, given, f"model {model.keyword}")
     if model.any_of and not properties:
         raise ValueError(f"needs at least one of {_listed(model.options)}")
     if model.one_of and not any(all(word in properties for word in words) for words in model.one_of):
         sets = " or ".join(" and ".join(map(trial.python, words)) for words in model.one_of)
         raise ValueError(f"model {model.keyword} needs {sets}")
-    found = {"model": model.keyword.name, "properties": properties}
+    found = {"model": model.keyword.name, **first, "properties": properties}
     trial.check(command, {**found, "properties": _known(properties)}, None)
     return found
 
@@ -147,6 +150,8 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
         return value
     if kind.varied and isinstance(value, np.ndarray) and value.ndim == 1:
         return np.array([_one(kind, item, name) for item in value.tolist()], np.float64)
+    if kind.tabled and isinstance(value, FunctionName):
+        return value
     if kind.tabled and isinstance(value, str):
         return TableName(value)
     try:

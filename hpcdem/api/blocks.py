@@ -18,6 +18,7 @@ from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
 from hpcdem.api.program import HELP, carried_out, place
 from hpcdem.commands import fdem
 from hpcdem.lang.pcdc.bindings import BINDINGS, Call
+from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 File = str | Path
-Number = float | str
-"""Of a condition: a number, or the name of a table of time."""
+Number = float | str | FunctionName
+"""Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
 OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{kind: kind for kind in g.BOLTS}}
@@ -316,7 +317,8 @@ class _Modelled(Objects):
     """With a constitutive model."""
 
     def model(self, name: str, *, where: Where = None, **properties: Value) -> None:
-        """The constitutive model, with its properties: docs/pcdc_reference.md lists them; `young`, `poisson_ratio`."""
+        """The constitutive model, with its properties: docs/pcdc_reference.md lists them; `young`, `poisson_ratio`.
+        Of a law of the user: "user", law="file.py:law", parameter=[("limit", 2e5)], see docs/user_laws.md."""
         self._carry_out("c-model", properties, where, name)
 
     def property(self, *, where: Where = None, **properties: Value) -> None:
@@ -329,6 +331,10 @@ class Elements(_Modelled):
     """Elements: `sim.elements["stress-xx"]`, see `Objects`."""
 
     _word, kind, pcdc = "elements", g.ELEMENT, "element"
+
+    def law(self, law: str) -> None:
+        """Read, check and compile a law of a Python file, "file.py:law", before `sim.restore`."""
+        self._do("element law", {"law": law})
 
     def null(self, *, relax: float | None = None, where: Where = None) -> None:
         """Take elements out; relax: time [s] (static runs: steps) over which their forces on the others die down."""
@@ -420,6 +426,12 @@ class Nodes(Objects):
         """Velocity [m/s] or acceleration [m/s2] that nodes have from now on; components left out stay free."""
         given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
         self._carry_out("boundary", given, where, "mechanical-velocity-boundary-condition")
+
+    def function(self, function: str) -> FunctionName:
+        """Read, check and compile a function of place and time in a Python file, "file.py:function"
+        (docs/user_laws.md): a value for conditions of nodes and faces. Before `sim.restore` it names the function."""
+        self._do("node function", {"function": function})
+        return FunctionName(function)
 
     def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
         """Force on each node [N per m of thickness]."""
@@ -590,14 +602,16 @@ class Histories(Words):
         nearest: Point | None = None,
         how: str | None = None,
         every: int | None = None,
+        variable: str | None = None,
         where: Where = None,
     ) -> None:
         """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element" or of the "model": of one (id, or
-        nearest to a point), or of
-        those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps."""
+        nearest to a point), or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many
+        steps. variable: with the value "law-state", which state variable of laws of the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
-        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every}
+        given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
+                 "variable": variable}  # fmt: skip
         if how is not None and how not in ways:
             raise ValueError(f"how: expected one of {', '.join(ways)}, got {how!r}")
         if how is not None:

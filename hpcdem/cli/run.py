@@ -157,11 +157,13 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
         project = session.project()
         interpreter = session.interpreter = Interpreter(project)
         enter_session(session)
+        script = interpreter.read(text, name)
+        interpreter.load_laws(script)
         past = fdem.checkpoints.take_up(project) if options.resume else None
         log.script_started(name, 0)
         sys.argv = [name, *options.arguments]
         sys.path.insert(0, str(options.script.resolve().parent))
-        interpreter.run(interpreter.read(text, name), past or ())
+        interpreter.run(script, past or ())
         interpreter.at_the_end()
     except SystemExit as leaving:
         if leaving.code not in (None, EXIT_OK):

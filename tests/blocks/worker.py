@@ -13,7 +13,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state, user_functions, user_laws
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
@@ -35,9 +35,19 @@ def make(kind: str, threads: int) -> Blocks:
     return sim
 
 
+LAWS: dict[str, user_laws.UserLaw] = {}
+FUNCTIONS: dict[str, str] = {}
+"""Of laws/rock.py, compiled."""
+
+
 def empty(kind: str, threads: int) -> Blocks:
     """What flies goes through borders that stay; else they follow the load."""
-    return Blocks(communicator(), threads, balance_on=kind != "flight")
+    sim = Blocks(communicator(), threads, balance_on=kind != "flight")
+    if kind == "obeying":
+        file = Path(__file__).with_name("laws") / "rock.py"
+        LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("elastic", "tresca")})
+        FUNCTIONS["beat"] = user_functions.load(sim, file, "rock.py:beat")
+    return sim
 
 
 def impact(sim: Blocks, shape: str = "cross") -> None:
@@ -113,6 +123,40 @@ def yield_more(sim: Blocks) -> None:
     if sim.clock.step == 800:
         sim.element_property(np.arange(30, 60), {"cohesion": 0.5e6})
         changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
+
+
+def obeying(sim: Blocks) -> None:
+    """The same blocks with laws of the user (laws/rock.py), which come to rest first."""
+    one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
+    two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13), 0.2, seed=2)
+    sim.take_mesh(joined(one, two))
+    rock = {**ROCK, "friction": 25.0, "damp_factor": 0.05}
+    changes.element_model(sim, None, LAWS["tresca"].name, {**rock, "limit": 2e6})
+    sim.element_property(np.arange(0, len(one.cells), 3), {"limit": 3e6})
+    changes.element_model(sim, np.arange(len(one.cells), len(one.cells) + 6), "mech_iso_elastic", ROCK)
+    changes.element_model(sim, np.arange(len(one.cells) + 6, len(one.cells) + 16), LAWS["elastic"].name, rock)
+    edges = sim.mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    sim.joint_model(inner[inner < 4 * len(one.cells)], COHESIVE, WEAK)
+    sim.initial_stress(None, xx=-1e5, yy=-5e6, zz=-1e5)
+    outside = edges.faces[~edges.inner][:, 0]
+    sim.stress_condition(outside[::7], normal=FUNCTIONS["beat"])
+    sim.option(dynamic=False)
+
+
+def obey_more(sim: Blocks) -> None:
+    """What happens to them."""
+    n = len(rectangle(10, 5, 1.0, 0.5).points)
+    if sim.clock.step == 200:
+        sim.option(dynamic=True)
+        changes.set_velocity(sim, np.arange(n), vx=203.0, vy=0.0)
+        changes.set_velocity(sim, np.arange(n, len(sim.mesh.points)), vx=197.0, vy=0.5)
+    if sim.clock.step == 600:
+        changes.reset_state(sim, np.arange(20))
+    if sim.clock.step == 750:
+        sim.element_property(np.arange(30, 60), {"limit": 0.5e6})
+        changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
+        changes.element_model(sim, np.arange(4), LAWS["tresca"].name, {**ROCK, "limit": 1e6})
 
 
 def opening(sim: Blocks) -> None:
@@ -255,8 +299,9 @@ def nothing(sim: Blocks) -> None:
 
 
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
-         "yielding": (yielding, yield_more), "opening": (opening, open_up), "backfill": (backfill, fill_up),
-         "creeping": (creeping, creep_more), "borders": (report_borders, nothing)}  # fmt: skip
+         "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up),
+         "backfill": (backfill, fill_up), "creeping": (creeping, creep_more),
+         "borders": (report_borders, nothing)}  # fmt: skip
 
 
 def main() -> None:
@@ -291,7 +336,8 @@ def main() -> None:
         "shear_stress_first",
     ):
         found[name] = diagnostics.values(sim, name)
-    for name in ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work"):
+    plastic = ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work")
+    for name in (*plastic, *user_laws.quantities(sim)):
         found[name] = diagnostics.values(sim, name)
     for name in ("creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work"):
         found[name] = diagnostics.values(sim, name)

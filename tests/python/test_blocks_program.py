@@ -21,6 +21,7 @@ from hpcdem.core.errors import ScriptError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.lang.pcdc import bindings, execute
+from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
 from hpcdem.runtime.run_folder import RECORD
@@ -104,6 +105,12 @@ SAME: list[tuple[str, str]] = [
     ("pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2 y 1 3",
      "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
      "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
+    ("pcdc element c-model user 'a.py:clay' property density 2500 young 50e9 poisson-ratio 0.25 parameter 'limit' 2e6 "
+     "parameter 'slope' field 'rho' range x 0 1",
+     "sim.elements.model('user', law='a.py:clay', density=2500, young=50e9, poisson_ratio=0.25, "
+     "parameter=[('limit', 2e6), ('slope', sim.fields.drawn('rho'))], where='x 0 1')"),
+    ("pcdc element property parameter 'limit' 3e6", "sim.elements.property(parameter=[('limit', 3e6)])"),
+    ("pcdc element law 'a.py:clay'", "sim.elements.law('a.py:clay')"),
     ("pcdc element initial stress-xy 1 stress-zz 2", "sim.elements.initial_stress(xy=1, zz=2)"),
     ("pcdc element c-model mech-burgers property density 2500 bulk 20e9 maxwell-shear 10e9 maxwell-viscosity 1e16 "
      "kelvin-shear 5e9 kelvin-viscosity 1e14",
@@ -130,6 +137,9 @@ SAME: list[tuple[str, str]] = [
      "sim.nodes.velocity(vx=1, vy='v', where='id 1')"),
     ("pcdc node boundary mech-vel-b-c acceleration-x 1 acceleration-y -1", "sim.nodes.velocity(ax=1, ay=-1)"),
     ("pcdc node boundary mech-f-b-c force-x 1 force-y table 'v'", "sim.nodes.force(fx=1, fy='v')"),
+    ("pcdc node boundary mech-vel-b-c velocity-x function 'a.py:wave' range id 1",
+     "sim.nodes.velocity(vx=FunctionName('a.py:wave'), where='id 1')"),
+    ("pcdc node function 'a.py:wave'", "sim.nodes.function('a.py:wave')"),
     ("pcdc node boundary mech-m-b-c type 2 (1,1) range id 2", "sim.nodes.move(2, (1, 1), where='id 2')"),
     ("pcdc node boundary mech-m-b-c type 1", "sim.nodes.move(1)"),
     ("pcdc node boundary remove range id 0", "sim.nodes.remove_boundary(where='id 0')"),
@@ -168,6 +178,8 @@ SAME: list[tuple[str, str]] = [
      "sim.histories.create('h', 'node', 'reaction-y', how='sum', every=100, where=\"group 'p' set 'bc'\")"),
     ("pcdc history create 'h' joint value normal-stress-largest max range crack",
      "sim.histories.create('h', 'joint', 'normal_stress_largest', how='maximum', where='crack')"),
+    ("pcdc history create 'h' element id 3 value law-state variable 'slip'",
+     "sim.histories.create('h', 'element', 'law-state', variable='slip', id=3)"),
     ("pcdc history create 'h' element value stress-yy min",
      "sim.histories.create('h', 'element', 'stress-yy', how='minimum')"),
     ("pcdc history create 'h' node value velocity-x mean",
@@ -224,7 +236,9 @@ def program(bench: Bench) -> Simulation:
 
 
 def carry_out(sim: Simulation, text: str) -> Any:
-    return eval(compile(text, "study.py", "eval"), {"sim": sim, "g": g, "np": np, "Path": Path})
+    return eval(
+        compile(text, "study.py", "eval"), {"sim": sim, "g": g, "np": np, "Path": Path, "FunctionName": FunctionName}
+    )
 
 
 @pytest.fixture

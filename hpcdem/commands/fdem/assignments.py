@@ -11,9 +11,10 @@ from hpcdem.commands.fdem.choices import chosen, everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem import changes, user_functions, user_laws
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.user_laws import UserLaw
 
 Number = float | str
 """A number, or the name of a table of time."""
@@ -33,6 +34,31 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True
+
+
+def load_law(project: Project, law: str) -> None:
+    """Read, check and compile a law 'file.py:function' of the user. Collective."""
+    _law(project, law)
+
+
+def _law(project: Project, law: str) -> UserLaw:
+    return user_laws.load(project.blocks, project.to_read(law.rpartition(":")[0]), law)
+
+
+def load_function(project: Project, name: str) -> None:
+    """Read, check and compile a function 'file.py:function' of place and time. Collective."""
+    function(project, name)
+
+
+def function(project: Project, name: str) -> str:
+    """The same; returns its name as value of a condition. Collective."""
+    return user_functions.load(project.blocks, project.to_read(name.rpartition(":")[0]), name)
+
+
+def user_model(project: Project, law: str, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """The same, and elements get it, with its properties. Collective."""
+    project.ready()
+    element_model(project, _law(project, law).name, properties, where)
 
 
 def null(project: Project, relax: float = 0.0, where: Range | None = None) -> None:
@@ -171,7 +197,7 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 
 def _known(project: Project, *values: Number | None) -> None:
     for value in values:
-        if isinstance(value, str) and value not in project.blocks.tables:
+        if isinstance(value, str) and value not in project.blocks.tables and value not in user_functions.FUNCTIONS:
             known = ", ".join(f"'{name}'" for name in project.blocks.tables) or "none so far"
             raise CommandError(f"there is no table '{value}'; there is {known}")
 

@@ -16,6 +16,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
 from hpcdem.physics.fdem.groups import Groups
+from hpcdem.physics.fdem.user_laws import UnknownLaw
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import checkpoints, run_folder
 
@@ -112,6 +113,8 @@ def _newest(project: Project) -> tuple[Path, Any] | None:
     for path in comm.bcast(found):
         try:
             extra = _restored(project, path, begins=True)
+        except UnknownLaw as error:
+            raise UsageError(str(error)) from None
         except CommandError as error:
             if log is not None:
                 log.warn(f"{error}; trying the checkpoint before it")

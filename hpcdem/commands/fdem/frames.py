@@ -19,7 +19,7 @@ from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT
@@ -115,7 +115,7 @@ def whole(project: Project) -> MeshState | None:
 def _names(blocks: Blocks, kind: str) -> list[str]:
     """What is written of elements and joints: neither where they are, which the points say, nor single points of
     joints; of properties those that a table or a field has made different from object to object; of plastic flow and
-    creep only where elements can yield or creep."""
+    creep only where elements can yield or creep; all state variables of laws of the user."""
     yields = "plastic" in blocks.cold or bool(blocks.yielding().any())
     creeps = "creep" in blocks.cold or bool(blocks.creeping().any())
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
@@ -123,7 +123,7 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
         name for name, quantity in QUANTITIES.items()
         if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
         and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
-    ]  # fmt: skip
+    ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip
 
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:

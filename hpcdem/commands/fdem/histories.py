@@ -8,10 +8,11 @@ import numpy as np
 
 from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.project import Project
-from hpcdem.commands.fdem.records import ENERGIES, MODEL, UNITS, History
+from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, History
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
+from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
 from hpcdem.physics.fdem.groups import BOLTS, ELEMENT, NODE, Ids, Range
 
@@ -29,9 +30,11 @@ def create(
     how: str = "",
     every: int = 1,
     where: Range | None = None,
+    variable: str = "",
 ) -> None:
     """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
-    a range or of all (how: sum, mean, minimum, maximum), or of the model."""
+    a range or of all (how: sum, mean, minimum, maximum), or of the model. variable: with the value law_state, a state
+    variable of laws of the user that elements have."""
     file_name(name)
     if name in project.histories:
         raise CommandError(f"there is a history '{name}' already")
@@ -39,6 +42,10 @@ def create(
         raise CommandError(f"a history of {kind} can follow {', '.join(UNITS.get(kind, {}))}, not {value}")
     if value in ENERGIES and project.blocks.budget is None:
         raise CommandError("no energy budget is kept: model option energy on comes first")
+    if (value == LAW_STATE) != bool(variable):
+        raise CommandError("value law-state and variable, the name of a state variable, go together")
+    if variable:
+        value = user_laws.quantity(project.ready(), variable)
     numbers: list[int] = []
     if kind != MODEL:
         if ident is not None:

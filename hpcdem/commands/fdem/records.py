@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
 MODEL = "model"
+LAW_STATE = "law_state"
+"""A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
 UNITS = {
     NODE: {
         "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
@@ -29,7 +31,7 @@ UNITS = {
         "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
         "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
         "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
-        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m",
+        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", LAW_STATE: "that of the law",
     },
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
@@ -107,7 +109,7 @@ class History:
 
     @property
     def unit(self) -> str:
-        return UNITS[self.kind][self.value]
+        return UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
 
     @property
     def waits(self) -> bool:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands import fdem
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
-from hpcdem.lang.pcdc.kinds import TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, TableName
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -40,9 +41,19 @@ class Call:
         """The arguments as keyword arguments of Python."""
         return {python(name): value for name, value in self.arguments.items() if name not in left_out}
 
+    def given_only(self, *names: str) -> dict[str, Any]:
+        """Those of these names that were given."""
+        return {python(name): self.arguments[name] for name in names if name in self.arguments}
+
     def properties(self) -> dict[str, Any]:
-        """Those of a model, tables by their name."""
-        return {python(name): _plain(value) for name, value in self.arguments["properties"].items()}
+        """Those of a model, tables and functions by their names."""
+        given = {python(name): self._plain(value) for name, value in self.arguments["properties"].items()}
+        return with_parameters(given)
+
+    def _plain(self, value: Any) -> Any:
+        if isinstance(value, FunctionName):
+            return fdem.assignments.function(self.project, value.name)
+        return value.name if isinstance(value, TableName) else value
 
     def group(self) -> dict[str, Any]:
         """`group 'g' set 's'` of a mesh."""
@@ -52,8 +63,14 @@ class Call:
         return {"group": given["value"], "set_name": given.get("set", g.DEFAULT)}
 
 
-def _plain(value: Any) -> Any:
-    return value.name if isinstance(value, TableName) else value
+def with_parameters(given: dict[str, Any]) -> dict[str, Any]:
+    """Properties, with those that a law of the user declares under their names. CommandError if one is given twice."""
+    found = {name: value for name, value in given.items() if name != "parameter"}
+    for name, value in given.get("parameter", ()):
+        if name in found:
+            raise CommandError(f"'{name}' is given twice")
+        found[name] = value
+    return found
 
 
 def where(terms: Terms | None) -> g.Range | None:
@@ -140,6 +157,8 @@ def _group(kind: str) -> Callable[[Call], None]:
 def _element_model(call: Call) -> None:
     if call["model"] == "null":
         fdem.assignments.null(call.project, **call.properties(), where=call.where)
+    elif call["model"] == "user":
+        fdem.assignments.user_model(call.project, call["law"], call.properties(), call.where)
     else:
         name = trial.MODELS[call["model"]].name
         fdem.assignments.element_model(call.project, name, call.properties(), call.where)
@@ -220,7 +239,7 @@ def _history(call: Call) -> None:
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
     fdem.histories.create(
         call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
-        call.get("every", 1), call.where,
+        call.get("every", 1), call.where, **call.given_only("variable"),
     )  # fmt: skip
 
 
@@ -269,7 +288,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "mesh quality": lambda c: fdem.meshes.tell_quality(c.project),
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
-    "element property": lambda c: fdem.assignments.element_property(c.project, c.given(), c.where),
+    "element law": lambda c: fdem.assignments.load_law(c.project, c["law"]),
+    "element property": lambda c: fdem.assignments.element_property(c.project, with_parameters(c.given()), c.where),
     "element initial": _initial_stress,
     "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),
     "element reset kelvin-strain": lambda c: fdem.settings.reset_kelvin_strain(c.project, c.where),
@@ -284,6 +304,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "face-joint reset state": lambda c: fdem.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
+    "node function": lambda c: fdem.assignments.load_function(c.project, c["function"]),
     "node boundary remove": lambda c: fdem.assignments.remove_node_conditions(c.project, c.where),
     "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),

@@ -25,6 +25,7 @@ from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, Scri
 from hpcdem.lang.pcdc import names, source
 from hpcdem.lang.pcdc.bindings import BINDINGS, PASSED_OVER, Call
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
+from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.source import CALL, Source
 from hpcdem.lang.pcdc.statement import Statement, shown
 from hpcdem.lang.pcdc.vector import Vector
@@ -77,6 +78,21 @@ class Interpreter:
         self.namespace["__file__"] = script.file
         self.project.inputs[os.path.realpath(script.file)] = "the script that runs"
         self._execute(script, "exec")
+
+    def load_laws(self, script: Source) -> None:
+        """Read, check and compile the laws and functions that commands of a script name, before it runs or goes on.
+        ScriptError."""
+        for statement in script.statements:
+            given = statement.arguments
+            functions = [v.name for v in given.get("properties", {}).values() if isinstance(v, FunctionName)]
+            functions += [given["function"]] if "function" in given else []
+            try:
+                if "law" in given:
+                    fdem.assignments.load_law(self.project, given["law"])
+                for name in functions:
+                    fdem.assignments.load_function(self.project, name)
+            except CommandError as error:
+                raise statement.error(str(error)) from None
 
     def line(self, script: Source) -> None:
         """The same for what was typed: the value of an expression is shown."""

@@ -33,6 +33,13 @@ class TableName:
 
 
 @dataclass(frozen=True)
+class FunctionName:
+    """``function 'file.py:name'`` in the place of a number: a function of place and time."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class Kind:
     """pattern: as the reference shows it; meaning: as messages say it; check: of a value of Python, ValueError (the
     message is not shown) if it is not of this kind."""
@@ -45,7 +52,7 @@ class Kind:
     optional: bool = False
     """May be left out; it is the last one then."""
     tabled: bool = False
-    """``table 'name'`` may stand for it."""
+    """``table 'name'`` or ``function 'file.py:name'`` may stand for it."""
     words: tuple[str, ...] = ()
     """Words that are values."""
     varied: bool = False
@@ -148,7 +155,7 @@ POSITIVE = Kind("<f>", "a number above 0", number(0.0, above=True))
 PART = Kind("<f>", "a number above 0, at most 1", number(0.0, 1.0, above=True))
 NOT_NEGATIVE = Kind("<f>", "a number, not negative", number(0.0))
 ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 1e-9))
-TABLED = Kind("<f>|table <s>", "a number or table 'name'", number(), tabled=True)
+TABLED = Kind("<f>|table <s>|function <s>", "a number, table 'name' or function 'file.py:name'", number(), tabled=True)
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
 POINTS = Kind("3", "3, the points of a joint in two dimensions,", whole(3, 3))

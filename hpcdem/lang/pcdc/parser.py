@@ -101,6 +101,8 @@ class _Line:
         if command.models:
             model = self.model(command)
             arguments["model"] = model.keyword.name
+            for leading in model.leading:
+                self.leading(leading, arguments)
             self.take([PROPERTY])
             given: dict[str, Any] = {}
             terms = self.options(command, model.options, given)
@@ -246,6 +248,13 @@ class _Line:
                 kinds.STRING, self.next("the name of a table in quotes"), "'table'", self.expressions
             )
             return _later(kinds.TableName, name)
+        if kind.tabled and isinstance(token, Word) and matching(token.text, [_FUNCTION]):
+            name = kinds.read_value(
+                kinds.FILE, self.next("the name of a function in quotes"), "'function'", self.expressions
+            )
+            if isinstance(name, Pending):
+                raise ValueError("the file of a function is plain text: it is read and checked before the script runs")
+            return kinds.FunctionName(name)
         return kinds.read_value(kind, token, what, self.expressions)
 
     def _varied(self, token: Word, kind: kinds.Kind) -> Any:
@@ -281,6 +290,7 @@ class _Line:
         return tuple(terms)
 
 
+_FUNCTION = Option("func{tion}", ())
 _TABLE, _FIELD, _OVER = Option("tab{le}", ()), Option("field", ()), Option("over", ())
 
 

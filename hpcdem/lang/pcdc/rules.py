@@ -27,6 +27,8 @@ def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | No
         raise ValueError(f"{how[-1]} goes with range or stands for all, and only one of sum, mean, minimum and maximum")
     if terms is not None and not how:
         raise ValueError("a history of several objects needs sum, mean, minimum or maximum")
+    if not isinstance(value, Pending) and (value == "law-state") != ("variable" in arguments):
+        raise ValueError("value law-state and variable, the name of a state variable, go together")
     if isinstance(kind, Pending):
         return
     if not isinstance(value, Pending) and value not in RECORDED[kind]:

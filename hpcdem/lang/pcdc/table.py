@@ -82,9 +82,9 @@ class Option:
 
 @dataclass(frozen=True)
 class Model:
-    """A constitutive model or boundary condition with its properties. number: of the manual's table; one_of: sets of
-    properties of which one must be complete; any_of: at least one property must be given; of: the model of the
-    simulation."""
+    """A constitutive model or boundary condition with its properties. number: of the manual's table; leading: values
+    that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be
+    given; of: the model of the simulation."""
 
     notation: str
     number: str
@@ -95,6 +95,7 @@ class Model:
     later: str = ""
     also: tuple[str, ...] = ()
     of: properties.Model | None = None
+    leading: tuple[Option, ...] = ()
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -207,6 +208,21 @@ MOHR_COULOMB = Model(
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
     ),
     one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB,
+)  # fmt: skip
+_FUNCTION = Option("function", (FILE,), "'file.py:function', beside the script; plain text", required=True)
+_LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
+              required=True)  # fmt: skip
+_PARAMETER = Option(
+    "par{ameter}",
+    (STRING, varied(FLOAT)),
+    "a property that the law declares, by its name, and its value",
+    repeated=True,
+)
+USER = Model(
+    "user", "", "A law in a Python file of the user, see docs/user_laws.md. For triangles.",
+    (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
+               "fri{ction}", "pen{alty}"), _PARAMETER),
+    one_of=_PAIRS, of=properties.USER, leading=(_LAW,),
 )  # fmt: skip
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
@@ -387,7 +403,7 @@ RECORDED = {
         "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
         "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
         "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
-        "kelvin-strain-xy": "1", "creep-work": "J/m",
+        "kelvin-strain-xy": "1", "creep-work": "J/m", "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
@@ -437,6 +453,7 @@ _OF_SOLIDS = (
       if o.name == "friction" else o for o in _properties(ISO_ELASTIC)),
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
+    _PARAMETER,
 )  # fmt: skip
 
 _MODEL = (
@@ -646,8 +663,13 @@ _OBJECTS = (
             ("pcdc element c-model mech-iso-elastic property density 2500 young 50e9 poisson-ratio 0.25",
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
-             "1e5 cohesion table 'c_of_strain' over plastic-strain"),
-            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, BURGERS, ISO_HEAT), ranged="element", manual=True),
+             "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
+             "'limit' 2e5"),
+            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True),
+    Command("el{ement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
+            "script that begins with model restore. A checkpoint does not name files that are executed.",
+            ("pcdc element law 'clay.py:clay'",), (_LAW,)),
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
@@ -692,8 +714,12 @@ _OBJECTS = (
     _group_command("node", "node"),
     Command("node bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
+             "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1"),
             models=(VELOCITY, FORCE, MOVE, *_LATER_NODE), ranged="node"),
+    Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
+            "giving it to a condition: for a script that begins with model restore.",
+            ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
     Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
     Command("node init{ial}", "The velocity of nodes now.", ("pcdc node initial velocity (1,0) range group 'block'",),
@@ -770,6 +796,7 @@ _RECORDS = (
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
+             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
             ranged="any"),

@@ -6,15 +6,25 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.lang.pcdc.kinds import Pending, TableName
-from hpcdem.lang.pcdc.table import BOLT, BOLT_VELOCITY, BURGERS, COHESIVE, CONTACT, ISO_ELASTIC, MOHR_COULOMB, Command
+from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
+from hpcdem.lang.pcdc.table import (
+    BOLT,
+    BOLT_VELOCITY,
+    BURGERS,
+    COHESIVE,
+    CONTACT,
+    ISO_ELASTIC,
+    MOHR_COULOMB,
+    USER,
+    Command,
+)
 from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, CONTACT, COHESIVE, BOLT)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -32,6 +42,8 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         for name, value in terms or ():
             if name in ("id", "x", "y") and known(value):
                 _ascending(name, value)
+        if isinstance(arguments.get("law", arguments.get("function")), Pending):
+            raise CommandError("the file of a law or function is plain text: it is read before the script runs")
         if "model" in arguments:
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
@@ -61,7 +73,7 @@ def _given(arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         python(name): value
         for name, value in arguments.items()
-        if known(value) and not isinstance(value, (TableName, Over, Drawn))
+        if known(value) and not isinstance(value, (TableName, FunctionName, Over, Drawn))
     }
 
 
@@ -86,7 +98,7 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
 
 def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     """Properties of a model, some of them perhaps left out or not known yet."""
-    given = {name: value for name, value in given.items() if name != "np"}
+    given = {name: value for name, value in given.items() if name not in ("np", "parameter")}
     for name, value in given.items():
         model.property(name).check(value)
     solid = properties.MECH_BURGERS if "maxwell_shear" in given or model is properties.MECH_BURGERS else None

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics
+from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.creep import K11, K12, K22
@@ -16,6 +16,7 @@ from hpcdem.physics.fdem.local import element_table
 from hpcdem.physics.fdem.properties import ELEMENT, MECH_BURGERS, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.fdem.user_laws import MARK
 
 VECTORS = "position", "displacement", "velocity"
 TORN = 0.1
@@ -70,8 +71,13 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if name == MECH_BURGERS.name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
-        raise CommandError(f"element {quads[0]} is a quad: {name} is for triangles")
+    if (name == MECH_BURGERS.name or MARK in name) and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
+        raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
+    if MARK in name and sim.budget is not None:
+        raise CommandError(
+            f"an energy budget is kept, but what the law {name.partition(MARK)[0]} stores and loses is not known: "
+            "model option energy off comes first"
+        )
     if elements is not None:
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
@@ -287,8 +293,8 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
 
 def reset_state(sim: Blocks, elements: Numbers = None) -> None:
     """That elements have yielded is forgotten: their state bits, and plastic strain is counted from here on. Stresses
-    stay, and so does the plastic strain that they depend on. Where no element has a model that yields the log says
-    that nothing was changed."""
+    stay, and so does the plastic strain that they depend on. State variables of laws of the user take their initial
+    values. Where no element has a model that remembers something the log says that nothing was changed."""
     at = sim.numbers_of_elements(elements)
     if "plastic" in sim.cold:
         sim.before_change()
@@ -298,7 +304,13 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
             for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
                 plastic[mine, part + column] = 0.0
         sim.changed(stiffness=False)
-    if sim.log is not None and not sim.yielding()[at].any():
+    remember = [1 + k for k, law in enumerate(user_laws.of_rows(sim.element_rows)) if law.states]
+    of_users = np.isin(user_laws.numbers(sim)[at], remember)
+    if of_users.any():
+        sim.before_change()
+        user_laws.forget(sim, np.isin(sim.number, at[of_users]))
+        sim.changed(stiffness=False)
+    if sim.log is not None and not sim.yielding()[at].any() and not of_users.any():
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
         sim.log.warn_once(
             f"reset state {names}",

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import connectivity, properties
+from hpcdem.physics.fdem import connectivity, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.mesh import Mesh
@@ -31,11 +31,13 @@ from hpcdem.physics.fdem.properties import (
     softening_table,
 )
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Drawn, Over, Table, Value
+from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 Numbers = np.ndarray | Sequence[int] | None
 """Numbers of elements, nodes, faces or joints; None: all."""
 Number = float | str
-"""A value of a boundary condition: a number, or the name of a table of values over model time."""
+"""A value of a boundary condition: a number, the name of a table of values over model time, or of a function of place
+and time (user_functions.py)."""
 
 SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
@@ -562,12 +564,17 @@ class ModelDefinition:
         del self.fields[name]
 
     def _value(self, what: str, value: Number) -> Number:
-        if isinstance(value, str):
+        if isinstance(value, str) and value not in FUNCTIONS:
             if value not in self.tables:
                 known = ", ".join(f"'{n}'" for n in self.tables) or "none"
                 raise CommandError(f"{what}: there is no table '{value}' (tables: {known})")
+        if isinstance(value, str):
             return value
         return float(finite(what, [value])[0])
+
+    def time_now(self) -> float:
+        """Model time [s]."""
+        return 0.0
 
     def velocity_condition(
         self,
@@ -615,6 +622,8 @@ class ModelDefinition:
 
     def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
         at = self.numbers_of_nodes(nodes)
+        for name, value in changes.items():
+            user_functions.check(name, value, self._mesh().points[at], self.time_now())
         self.before_change()
         self._change_rows(self.conditions, self.point_row, at, changes)
         self.changed(stiffness=False)
@@ -641,6 +650,8 @@ class ModelDefinition:
         if not changes:
             raise CommandError("a stress condition needs a stress, or quiet")
         at = self.numbers_of_faces(faces)
+        for name, value in changes.items():
+            user_functions.check(f"stress {name}", value, self._places(FACE, at), self.time_now())
         self.before_change()
         self._change_rows(self.loads, self.load_row, at, changes)
         self.changed(stiffness=quiet is not None)  # dashpots limit the time step
@@ -760,7 +771,7 @@ class ModelDefinition:
         return out
 
     def conditions_vary(self) -> bool:
-        """Whether a node condition follows a table."""
+        """Whether a node condition follows a table or a function."""
         return any(isinstance(value, str) for one in self.conditions for value in asdict(one).values())
 
     def loads_at(self, time: float) -> np.ndarray:
@@ -772,7 +783,9 @@ class ModelDefinition:
         return np.array([one.quiet for one in self.loads])[self.load_row]
 
     def _now(self, value: Number, time: float) -> float:
-        return self.tables[value](time) if isinstance(value, str) else value
+        if isinstance(value, str):
+            return 0.0 if value in FUNCTIONS else self.tables[value](time)  # of functions see `Placed`
+        return value
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 

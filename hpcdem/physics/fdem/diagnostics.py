@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.kernels import creep, elements, plasticity
@@ -135,6 +135,8 @@ def total(sim: Blocks, name: str, numbers: Numbers = None) -> float:
 
 def quantity(sim: Blocks, name: str) -> Quantity:
     """The quantity of this name. CommandError if there is none. Not collective."""
+    if name not in QUANTITIES and name in user_laws.quantities(sim):
+        return Quantity("element", user_laws.unit(name), "state variable of a law of the user")
     if name not in QUANTITIES:
         raise CommandError(f"there is no quantity {name}; there are {', '.join(QUANTITIES)}")
     return QUANTITIES[name]
@@ -222,6 +224,9 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
         columns |= _plastic_columns(sim, some)
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
         columns |= _creep_columns(sim, some)
+    if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
+        memory = local.obeyed(local.s0.copy()) if local.laws else sim.cold[user_laws.COLUMN]
+        columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
     columns["area"] = sim.areas[number]
@@ -487,6 +492,11 @@ def account_energy(sim: Blocks, on: bool = True) -> None:
     """Keep the energy budget from now on. In dynamic mode only. Collective."""
     if on and not sim.options.dynamic:
         raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
+    if on and (laws := user_laws.in_use(sim)):
+        raise CommandError(
+            f"no energy budget can be kept: what the law {laws[0].title} of {user_laws.some(sim)} stores and loses is "
+            "not known"
+        )
     sim.open_model()
     sim.cold.pop("work", None)
     sim.budget = Budget() if on else None

@@ -15,7 +15,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics
+from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
@@ -92,6 +92,11 @@ def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: s
             f"element {yielding[0]} can yield ({len(yielding)} have the model {MECH_MOHR_COULOMB.name}): the static "
             "solve takes elastic elements; model solve relaxes others to equilibrium"
         )
+    if laws := user_laws.in_use(sim):
+        raise CommandError(
+            f"{user_laws.some(sim)} has the law {laws[0].title}: the static solve takes elastic elements; model solve "
+            "relaxes others to equilibrium"
+        )
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
         sim._renew_lists()
@@ -137,6 +142,11 @@ def _all_nodes(sim: Blocks) -> _Nodes:
 
 def _unknowns(sim: Blocks, nodes: _Nodes, cycles: int) -> Unknowns:
     """CommandError for conditions that have no equilibrium."""
+    for row in np.unique(sim.point_row).tolist():
+        for function in user_functions.used(sim.conditions[row]).values():
+            raise CommandError(
+                f"a condition of nodes follows the function {function.title}: the static solve takes numbers and tables"
+            )
     table = sim.conditions_at(sim.clock.time, sim.clock.time, 1.0)
     free, way, step = (np.empty((len(table), *shape)) for shape in ((2,), (2, 2), (2,)))
     for row, one in enumerate(table):

@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, connectivity
+from hpcdem.physics.fdem import build, connectivity, user_laws
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import (
     creep,
@@ -29,10 +29,14 @@ from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YI
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
 from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, SOFTENS, Rows, softening_table
 from hpcdem.physics.fdem.tables import Table
+from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.definition import NodeCondition
     from hpcdem.physics.fdem.state import State
 
+_TRACTION = "xx", "yy", "xy", "normal"
+"""Columns of the table of tractions."""
 ALPHA = 0.8
 """Local damping of the static mode."""
 
@@ -151,6 +155,7 @@ class Local:
         self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
         self.passes = 0
         self._make_constants()
+        self._make_laws()
         self._make_joints()
         self._put_histories()
         self.pairs = ContactPairs(sim, self, *ContactPairs.remembered(sim))
@@ -241,6 +246,32 @@ class Local:
             strength.renew_all(rows, sim.n_left, 1, law, self.strength, self.yield_table)
             strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
+    def _make_laws(self) -> None:
+        """Elements with a law of the user have no moduli in the table of forces, see kernels/user_laws.py; stiff: the
+        table by which the time step is found, with moduli in the ratio of those of the element."""
+        sim, count = self.sim, self.count
+        self.stiff, self.laws = self.c, []
+        numbers = user_laws.numbers(sim)[sim.number[self.triangle_rows[:count]]]
+        if not user_laws.of_rows(sim.element_rows):
+            return
+        of, models = np.flatnonzero(numbers), element_table(sim.element_rows)
+        self.law_row = np.zeros(count + 3, np.int32)
+        self.law_row[:count] = sim.element_row[sim.number[self.triangle_rows[:count]]]
+        self.law_base = np.zeros((count + 3, 4))
+        if sim.stress0 is not None:
+            self.law_base[of] = sim.initial_stresses(sim.number[self.triangle_rows[of]])
+        self.stiff = self.c.copy()
+        bound, row = sim.element_rows.column(user_laws.BOUND), self.law_row[of]
+        part = bound[row] / (models[row, build.LAME] + models[row, build.MU2])
+        self.stiff[of, elements.LAMBDA] *= part
+        self.stiff[of, elements.TWO_MU] *= part
+        self.c[of, elements.LAMBDA] = self.c[of, elements.TWO_MU] = 0.0
+        for k, law in enumerate(user_laws.of_rows(sim.element_rows)):
+            at = np.flatnonzero(numbers == 1 + k)
+            if len(at):
+                which = np.concatenate([at, np.repeat(at[-1:], 3)]).astype(np.int32)
+                self.laws.append((law, which, law.table(sim.element_rows)))
+
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
         sim, count = self.sim, self.count
@@ -300,7 +331,9 @@ class Local:
         self.special[i, k] = self.special[i, k2] = True
         self.load_edge = row * sim.x.shape[1] + 2 * k
         self.load_a, self.load_b = 8 * row + 2 * k, 8 * row + 2 * k2
-        self.load_of = sim.load_row[faces[i, k]].astype(np.int64)
+        places = mesh.points[connectivity.face_points(mesh.cells, faces[i, k])].mean(axis=1)
+        self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
+        self.load_of = self.load_functions.of
         self._make_dashpots(np.flatnonzero(sim.quiet_faces()[faces[i, k]]), row, k, k2)
         parts = [one for one in sim.relaxations if not sim.has_ended(one)]
         corner = np.concatenate([one.corner for one in parts] or [np.empty(0, np.int64)])
@@ -366,7 +399,8 @@ class Local:
         rows = self.node_corner // 8
         self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
         lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
-        self.node_condition = sim.point_row[lead].astype(np.int64)
+        self.node_functions = Placed(sim.conditions, sim.point_row[lead].astype(np.int64), mesh.points[lead])
+        self.node_condition = self.node_functions.of
         self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
         self.outside, self.felt = np.zeros((n, 2)), np.zeros((n, 4))
         total = len(sim.number)
@@ -444,7 +478,7 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = limits.time_step(
-            self.c, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
             o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
@@ -463,7 +497,7 @@ class Local:
         own = sim.owned
         if not o.dynamic:
             limits.static_masses(
-                self.c, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
+                self.stiff, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
@@ -502,9 +536,9 @@ class Local:
         small = not o.large_strain
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic or self.creeps, small, self.slot_at, self.slot_law, self.slot_kind,
-            self.slot_state, self.slot_history, self.head, self.follow, self.joint_table, self.joint_beyond,
-            pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
+            sim.stress0 is not None or self.plastic or self.creeps or bool(self.laws), small, self.slot_at,
+            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
+            self.joint_table, self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
@@ -538,6 +572,8 @@ class Local:
             self._flow(*self._plastic_state())
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
+        if self.laws:
+            self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
             *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
         )
@@ -568,6 +604,25 @@ class Local:
                 sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
                 self.quad_law, soft, small, step, memory, quad_s0, table,
             )  # fmt: skip
+
+    def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
+        """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0
+        (count + 3, 4) [Pa] the stress."""
+        sim = self.sim
+        dt = sim.clock.dt if sim.options.dynamic else 0.0
+        for law, which, table in self.laws:
+            loop = law.loop if sim.threads == 1 else law.loop_threaded
+            loop(
+                sim.threads, len(which) - 3, which, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c,
+                self.law_base, self.law_row, table, dt, not sim.options.large_strain, memory, s0,
+            )  # fmt: skip
+
+    def obeyed(self, s0: np.ndarray) -> np.ndarray:
+        """State variables of laws of the user (n_own, 1 + states) after this moment, which the next forces will see;
+        s0 (count + 3, 4) [Pa] becomes their stress. The model stays as it is."""
+        memory = self.sim.cold[user_laws.COLUMN].copy()
+        self._obey(memory, s0)
+        return memory
 
     def _creeps_now(self) -> bool:
         """The next forces are those after some creep, or begin it."""
@@ -640,7 +695,9 @@ class Local:
         sim, clock = self.sim, self.sim.clock
         if self.some_applied:
             self.applied[:] = 0.0
-            loads = sim.loads_at(clock.time)
+            loads = self.load_functions.filled(
+                sim.loads_at(clock.time), lambda one, field: (_TRACTION.index(field), clock.time, 1.0)
+            )
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
             if len(self.quiet_edge):
                 moving.dashpots(
@@ -659,12 +716,23 @@ class Local:
         table = self._conditions
         if table is None:
             half = 0.5 * clock.dt if sim.options.dynamic else 0.0
-            table = sim.conditions_at(clock.time, clock.time + half, clock.dt)
+            table = self._conditions_now(clock.time, clock.time + half, clock.dt)
         self._move(
             sim.threads, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_kick,
             self.node_condition, self.node_share, table, self.some_applied, self.force, self.applied, sim.v,
             0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip
+
+    def _conditions_now(self, time: float, middle: float, dt: float) -> np.ndarray:
+        """The table of node conditions, with a row of its own for each node whose condition is a function."""
+
+        def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
+            if field in ("force_x", "force_y"):
+                return (moving.FORCE_X if field == "force_x" else moving.FORCE_Y), time, 1.0
+            column, does = (moving.AT_X, one.does_x) if field == "at_x" else (moving.AT_Y, one.does_y)
+            return (column, middle, 1.0) if does == moving.VELOCITY else (column, time, dt)
+
+        return self.node_functions.filled(self.sim.conditions_at(time, middle, dt), how)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 
@@ -678,7 +746,9 @@ class Local:
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
                 *(self._plastic_state() if self.yields else ()),
-                *((sim.cold["creep"], self.s0) if self._creeps_now() else ()),
+                *((sim.cold["creep"],) if self._creeps_now() else ()),
+                *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
+                *((self.s0,) if self.laws or self._creeps_now() else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -766,6 +836,9 @@ class Local:
         sim = self.sim
         memory, s0, quad_s0 = self.flowed() if self.plastic and flow else (None, self.s0, self.quad_s0)
         crept, s0 = self.crept(None if memory is None else s0) if self.creeps else (None, s0)
+        if self.laws:
+            s0 = s0.copy()
+            self.obeyed(s0)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0
             n, first = sim.n_own, sim.n_left
@@ -793,6 +866,9 @@ class Local:
                 if len(self.quad_rows):
                     plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
             energy += more if at is None else more[at]
+        if self.laws and energies:  # what such a law stores is not known
+            of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0
+            energy[of_users if at is None else of_users[at]] = math.nan
         return stress, energy
 
     def stored_in_joints(self) -> np.ndarray:

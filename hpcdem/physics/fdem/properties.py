@@ -252,6 +252,14 @@ MECH_MOHR_COULOMB = Model(
     _strength,
 )  # fmt: skip
 
+USER = Model(
+    "user",
+    ELEMENT,
+    "a law of the user, in a Python file: what its elements have beside what the law declares; triangles",
+    MECH_ISO_ELASTIC.properties,
+    _elastic,
+)  # fmt: skip
+
 KELVIN_STRAIN = ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy")
 MECH_BURGERS = Model(
     "mech_burgers",
@@ -339,7 +347,7 @@ def model(name: str, on: str) -> Model:
     """The model of this name for elements, faces or joints; CommandError listing those there are."""
     found = MODELS.get(name)
     if found is None or found.on != on:
-        known = ", ".join(m.name for m in MODELS.values() if m.on == on)
+        known = ", ".join(m.name for m in MODELS.values() if m.on == on and type(m) is Model)
         raise CommandError(f"there is no model {name} for an {on}; there is {known}")
     return found
 

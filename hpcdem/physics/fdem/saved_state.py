@@ -15,6 +15,7 @@ from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import holders, to_slabs
 from hpcdem.physics.block_physics import PHYSICS
+from hpcdem.physics.fdem import user_functions, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
@@ -155,7 +156,10 @@ def read(comm: SerialComm, path: Path | str, kind: str, what: str) -> tuple[dict
 
 
 def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
-    """Take a state and tables that were read. Collective."""
+    """Take a state and tables that were read. Collective. CommandError, with the model as it was, without the laws of
+    the user that it has."""
+    user_laws.check_restored(state["scene"])
+    user_functions.check_restored(state["scene"])
     sim.clear()
     if state["mesh"] is not None:
         points = np.column_stack([tables["mesh_points"][c] for c in "xy"])

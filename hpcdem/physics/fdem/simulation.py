@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, creep, overlaps
+from hpcdem.physics.fdem import build, connectivity, creep, overlaps, user_laws
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
@@ -448,6 +448,7 @@ class Blocks(State):
             self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
         if "creep" not in self.cold and creeps:
             self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
+        user_laws.begin(self)
         with self.timers("neighbour"):
             if self._topology_stale:
                 self.renew_topology()

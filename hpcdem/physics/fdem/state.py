@@ -80,7 +80,8 @@ class State(ModelDefinition, Model):
     """Their velocities at the last half step [m/s]."""
     cold: dict[str, np.ndarray]
     """More columns of the owned elements, which travel with them: "home" (where displacement is zero), "work",
-    "plastic" (what is remembered of yielding, see plasticity.py), "creep" (of creep, see kernels/creep.py)."""
+    "plastic" (what is remembered of yielding, see plasticity.py), "creep" (of creep, see kernels/creep.py),
+    "law" (state variables, see user_laws.py)."""
     histories: Histories
     surface_loads: SurfaceLoads
     n_left: int
@@ -152,6 +153,9 @@ class State(ModelDefinition, Model):
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""
         return self._mesh()
+
+    def time_now(self) -> float:
+        return self.clock.time
 
     @property
     def owned(self) -> slice:

@@ -1,0 +1,472 @@
+"""Laws of elements that users write, in a Python file of their own.
+
+    from hpcdem import Property, StateVariable, element_law
+
+    @element_law(
+        properties=[Property("limit", "Pa", "yield stress in shear", low_itself=False)],
+        state=[StateVariable("slip", "1", "plastic shear")],
+    )
+    def clay(e11, e22, e12, slip, bulk, shear, limit):
+        ...
+        return s11, s22, s12, s33, slip
+
+A law is compiled by numba. It takes numbers by these names and returns the stress [Pa] that belongs to them, tension
+positive, and then its state variables in the order in which they were declared:
+
+- e11, e22, e12: strain U - 1 in the frame that turns with the element (with small strains: that of the plane);
+- its state variables, as they are after the step before;
+- what it needs of the properties that every solid has (density, damp_factor, young, poisson_ratio, shear, bulk,
+  friction, penalty) and of its own;
+- i11, i22, i12, i33: initial stress [Pa], which is added to what the law returns; dt: time step [s], 0 in static runs.
+
+It is called once per step and element. The time step follows from `stiffness`: a number [Pa], or a function of
+properties, that the slope of the law is never above; without it lambda + 2 mu of the moduli.
+
+Only the file is known by its text: a law has the name FILE:FUNCTION and a digest of the text, which stands in
+checkpoints. What a checkpoint names is never looked for: the script names the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import math
+import re
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem import properties as known
+from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.properties import Rows
+    from hpcdem.physics.fdem.state import State
+
+BOUND = "stiffness bound"
+"""The property of a law's elements that the time step follows; a name that no law can declare."""
+STRAIN, INITIAL, STEP = ("e11", "e22", "e12"), ("i11", "i22", "i12", "i33"), "dt"
+STRESS = ("s11", "s22", "s12", "s33")
+COLUMN = "law"
+"""Of `State.cold`: 1 + the place of the element's law among `names`, then its state variables."""
+STEP_OF_STRAIN = 1e-9
+"""For the slope of a law at zero strain."""
+OF_LAW = "law_"
+"""How state variables are called as quantities."""
+TOLD = 0.1
+"""Seconds of compiling that the log tells."""
+MARK = "#"
+"""Between the name of a law and the digest of its text."""
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """What an element remembers; initial: its value when the element gets the law."""
+
+    name: str
+    unit: str
+    doc: str = ""
+    initial: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Declared:
+    function: Callable[..., Any]
+    properties: tuple[Property, ...]
+    state: tuple[StateVariable, ...]
+    stiffness: float | Callable[..., float] | None
+
+
+@dataclass(frozen=True)
+class UserLaw(Model):
+    """A law of a file. title: FILE:FUNCTION; names: arguments of its function, in their order; columns: of the table of
+    properties; kernel, loop, loop_threaded, evaluate: compiled, see kernels/user_laws.py."""
+
+    title: str = ""
+    states: tuple[StateVariable, ...] = ()
+    names: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    loop: Any = None
+    loop_threaded: Any = None
+
+    def table(self, rows: Rows) -> np.ndarray:
+        """The table of properties of the kernels."""
+        return np.ascontiguousarray(np.array([rows.column(name) for name in self.columns]).T)
+
+
+def element_law(
+    properties: Sequence[Property] = (),
+    state: Sequence[StateVariable] = (),
+    stiffness: float | Callable[..., float] | None = None,
+) -> Callable[[Callable[..., Any]], _Declared]:
+    """Declares a function as law of elements: properties of its own, state variables, and what its slope is never above
+    [Pa], a number or a function of properties (by their names)."""
+    return lambda function: _Declared(
+        getattr(function, "py_func", function), tuple(properties), tuple(state), stiffness
+    )
+
+
+Made = TypeVar("Made")
+
+
+class Wrong(Exception):
+    """What is wrong with a file; line: 0 if it has none."""
+
+    def __init__(self, line: int, message: str) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+def load(sim: State, path: Path, law: str) -> UserLaw:
+    """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
+    text that rank 0 reads. CommandError with file and line. Collective."""
+
+    def take(text: str, path: str, name: str, function: str) -> UserLaw:
+        found = MODELS.get(name) or _made(text, path, name, function)
+        assert isinstance(found, UserLaw)
+        _compile(found, sim.threads)
+        MODELS[name] = found
+        return found
+
+    return agreed(sim, path, law, "law", take)
+
+
+def agreed(sim: State, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
+    """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
+    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
+    file, _, function = what.rpartition(":")
+    if not file.endswith(".py") or not function.isidentifier():
+        raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
+    text, problem = "", ""
+    if sim.comm.rank == 0:
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            problem = f"{file} cannot be read: {getattr(error, 'strerror', None) or error}"
+    text, problem = sim.comm.bcast((text, problem))
+    if problem:
+        raise CommandError(problem)
+    name = f"{Path(file).name}:{function}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    began, message, made = time.perf_counter(), None, []
+    try:
+        made.append(take(text, str(path), name, function))
+    except Wrong as wrong:
+        message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
+    try:
+        sim.comm.agree(message)
+    except HpcdemError as error:
+        raise CommandError(str(error)) from None
+    spent = time.perf_counter() - began
+    if spent > TOLD and sim.log is not None:
+        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled for this run: {spent:.1f} s on rank 0")
+    return made[0]
+
+
+def executed(text: str, path: str, name: str) -> dict[str, Any]:
+    """The names of a text of the user, after it ran. Wrong."""
+    code: Any
+    try:
+        code = compile(text, path, "exec")
+    except (SyntaxError, ValueError) as error:
+        raise Wrong(getattr(error, "lineno", 0) or 0, f"{getattr(error, 'msg', error)}") from None
+    names: dict[str, Any] = {"__name__": f"law of {name}", "__file__": path}
+    try:
+        exec(code, names)
+    except Exception as error:  # whatever the user's own code does
+        raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
+    return names
+
+
+def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
+    """Compile a kernel for arguments of these types; the type that it returns. Wrong, at `line` if numba knows none."""
+    from numba.core.errors import NumbaError
+
+    try:
+        kernel.compile(types)
+    except NumbaError as error:
+        raise Wrong(_numba_line(error, path) or line, _numba_message(error)) from None
+    except Exception as error:  # numba hands on what its passes meet in the user's own code
+        raise Wrong(line, f"numba: {type(error).__name__}: {error}") from None
+    return kernel.overloads[tuple(types)].signature.return_type
+
+
+def _made(text: str, path: str, name: str, function: str) -> UserLaw:
+    """The law of a text. Wrong."""
+    names = executed(text, path, name)
+    if function not in names:
+        laws = [key for key, value in names.items() if isinstance(value, _Declared)]
+        raise Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
+    declared = names[function]
+    if not isinstance(declared, _Declared):
+        code = getattr(declared, "__code__", None)
+        line = code.co_firstlineno if code is not None and code.co_filename == path else 0
+        raise Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
+    return _checked(declared, name, path)
+
+
+def _last_line(error: BaseException, path: str) -> int:
+    lines = [at.lineno or 0 for at in traceback.extract_tb(error.__traceback__) if at.filename == path]
+    return lines[-1] if lines else 0
+
+
+def _checked(declared: _Declared, name: str, path: str) -> UserLaw:
+    line = declared.function.__code__.co_firstlineno
+    base, own, states = USER.properties, declared.properties, declared.state
+    for kind, things, wanted in (("property", own, Property), ("state variable", states, StateVariable)):
+        strange = [thing for thing in things if not isinstance(thing, wanted)]
+        if strange:
+            raise Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {strange[0]!r}")
+    every = [*(p.name for p in base), *(p.name for p in own), *(s.name for s in states), *STRAIN, *INITIAL, STEP]
+    for name_ in (*(p.name for p in own), *(s.name for s in states)):
+        if not isinstance(name_, str) or not name_.isidentifier():
+            raise Wrong(line, f"{name_!r} cannot be the name of an argument")
+        if every.count(name_) > 1:
+            raise Wrong(line, f"'{name_}' stands for something already; a law may declare other names only")
+    for state in states:
+        if not math.isfinite(state.initial):
+            raise Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
+    arguments = inspect.signature(declared.function).parameters
+    for argument in arguments.values():
+        if argument.kind is not inspect.Parameter.POSITIONAL_OR_KEYWORD or argument.name not in every:
+            raise Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
+        if argument.default is not inspect.Parameter.empty:
+            raise Wrong(line, f"'{argument}': arguments of a law have no defaults; Property(..., default=) has")
+    lost = [one for one in (*STRAIN, *(s.name for s in states)) if one not in arguments]
+    if lost:
+        raise Wrong(line, f"the law does not take {', '.join(lost)}")
+    takes = set(arguments)
+    if callable(declared.stiffness):
+        of = inspect.signature(declared.stiffness).parameters
+        others = [n for n in of if n not in {p.name for p in (*base, *own)}]
+        if others:
+            raise Wrong(line, f"stiffness takes properties, '{others[0]}' is none")
+        takes |= set(of)
+    idle = [p.name for p in own if p.name not in takes]
+    if idle:
+        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
+    return _compiled(declared, name, path, tuple(arguments), line)
+
+
+def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...], line: int) -> UserLaw:
+    from numba import njit, types
+    from numba.core.errors import NumbaError
+
+    kernel = njit(error_model="numpy", nogil=True)(declared.function)
+    found: Any = compiled(kernel, (types.float64,) * len(names), path, line)
+    wanted = [*STRESS, *(s.name for s in declared.state)]
+    given = list(getattr(found, "types", [found]))
+    if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
+        raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
+    for what, type_ in zip(wanted, given):
+        if type_ != types.float64:
+            raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
+    from hpcdem.physics.fdem.kernels import user_laws as kernels
+
+    columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names]
+    columns += columns[:1] * (-len(columns) % 4) or ["density"] * (4 if not columns else 0)
+    states = [s.name for s in declared.state]
+    evaluate = kernels.at_strain(kernel, names, states, columns)
+    try:
+        one, several = kernels.loops(kernel, names, states, columns)
+        evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
+    except NumbaError as error:
+        raise Wrong(line, _numba_message(error)) from None
+    title, _, _ = name.partition(MARK)
+    bound = Property(BOUND, "Pa", "what the slope of the law is never above", optional=True, low_itself=False)
+
+    def derive(values: dict[str, Any]) -> None:
+        known._elastic(values)
+        file, _, function = title.rpartition(":")
+        _derive(declared, f"{file}:{line}: law '{function}'", evaluate, columns, values)
+
+    return UserLaw(
+        name, ELEMENT, f"the law of {title}", (*USER.properties, *declared.properties, bound), derive, title=title,
+        states=declared.state, names=names, columns=tuple(columns), loop=one, loop_threaded=several,
+    )  # fmt: skip
+
+
+def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str], values: dict[str, Any]) -> None:
+    """The stiffness bound of properties (numbers or arrays), and a look at the law at zero strain. law: its place and
+    name. CommandError."""
+    shape = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
+    full = {name: np.broadcast_to(np.asarray(value, float), shape).reshape(-1) for name, value in values.items()}
+    n = full["bulk"].size
+    modulus = full["bulk"] + 4.0 / 3.0 * full["shear"]
+    if callable(declared.stiffness):
+        of = list(inspect.signature(declared.stiffness).parameters)
+        bound = np.empty(n)
+        for i in range(n):
+            try:
+                bound[i] = float(declared.stiffness(**{name: float(full[name][i]) for name in of}))
+            except Exception as error:  # the user's own code
+                raise CommandError(f"{law}: its stiffness fails: {type(error).__name__}: {error}") from None
+    else:
+        bound = modulus if declared.stiffness is None else np.full(n, float(declared.stiffness))
+    wrong = ~(np.isfinite(bound) & (bound > 0.0))
+    if wrong.any():
+        raise CommandError(f"{law}: its stiffness must be a number above 0 (Pa), got {bound[wrong][0]:g}")
+    table = np.ascontiguousarray(np.array([full[name] for name in columns]).T)
+    begin = np.array([state.initial for state in declared.state])
+    width = len(STRESS) + len(begin)
+    what = (*STRESS, *(state.name for state in declared.state))
+
+    def at(k: int, strain: float) -> np.ndarray:
+        out, e = np.empty((n, width)), np.zeros(3)
+        e[k] = strain
+        evaluate(table, e, begin, out)
+        return out
+
+    rest = at(0, 0.0)
+    wrong = ~np.isfinite(rest)
+    if wrong.any():
+        i, k = np.argwhere(wrong)[0]
+        told = ", ".join(f"{name} {full[name][i]:g}" for name in dict.fromkeys(columns))
+        raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
+    for k in range(2):
+        for way in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
+            slope = (at(k, way)[:, k] - rest[:, k]) / way
+            steep = ~(slope <= bound * (1.0 + 1e-6) + 1e-12 * np.abs(rest[:, k]) / STEP_OF_STRAIN)
+            if steep.any():
+                i = int(np.flatnonzero(steep)[0])
+                raise CommandError(
+                    f"{law}: d{what[k]}/d{STRAIN[k]} is {slope[i]:g} Pa at zero strain, above its stiffness "
+                    f"{bound[i]:g} Pa, by which the time step is found: stiffness= of element_law says more"
+                )
+    values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
+
+
+def _numba_line(error: Any, path: str) -> int:
+    """The line of the file in what numba says, the last one: that of the cause."""
+    found = re.findall(r'File "([^"\n]+)", line (\d+)', re.sub(r"\x1b\[[0-9;]*m", "", str(error)))
+    lines = [int(line) for file, line in found if Path(file).name == Path(path).name]
+    place = getattr(error, "loc", None)
+    if not lines and place is not None and place.line is not None and str(place.filename).endswith(Path(path).name):
+        return int(place.line)
+    return lines[-1] if lines else 0
+
+
+def _numba_message(error: Any) -> str:
+    """Without colours, its first lines in one."""
+    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
+    told = [line for line in lines if line and not line.startswith(("File ", "Failed in nopython", "During:", "^"))]
+    return "numba: " + " ".join(told[:2]).partition(" def ")[0].replace(">>> ", "")
+
+
+def _compile(law: UserLaw, threads: int) -> None:
+    """The loop over elements, with arguments of the types that it will have."""
+    nothing, places = np.zeros((0, 4)), np.zeros(3, np.int32)
+    (law.loop if threads == 1 else law.loop_threaded)(
+        threads, 0, places, places, 0, False, np.zeros((0, 8)), np.zeros((0, 12)), nothing, places,
+        np.zeros((1, len(law.columns))), 0.0, False, np.zeros((0, 1 + len(law.states))), nothing,
+    )  # fmt: skip
+
+
+# ---- of a model ------------------------------------------------------------------------------------------------------
+
+
+def of_rows(rows: Rows) -> list[UserLaw]:
+    """Laws of users among the models of elements, in the order in which they came: the same on all ranks."""
+    names = dict.fromkeys(name for name, _ in rows.rows if MARK in name)
+    return [law for name in names if isinstance(law := MODELS[name], UserLaw)]
+
+
+def numbers(sim: State) -> np.ndarray:
+    """(ne,) 1 + the place of the law of each element in `of_rows`; 0: it is not a user's."""
+    place = {law.name: 1 + k for k, law in enumerate(of_rows(sim.element_rows))}
+    return np.array([place.get(name, 0) for name, _ in sim.element_rows.rows], np.int64)[sim.element_row]
+
+
+def in_use(sim: State) -> list[UserLaw]:
+    """Those that elements have that are there."""
+    found = np.unique(numbers(sim)[sim.alive])
+    return [law for k, law in enumerate(of_rows(sim.element_rows)) if 1 + k in found]
+
+
+def some(sim: State) -> str:
+    """An element with a law of the user, for messages."""
+    return f"element {np.flatnonzero((numbers(sim) > 0) & sim.alive)[0]}"
+
+
+def begin(sim: State) -> None:
+    """State variables of owned elements whose law is another one than before begin with their initial values."""
+    laws = of_rows(sim.element_rows)
+    if not laws:
+        return
+    width = 1 + max(len(law.states) for law in laws)
+    before = sim.cold.get(COLUMN, np.zeros((len(sim.number), width)))
+    memory = np.zeros((len(sim.number), max(width, before.shape[1])))
+    memory[:, : before.shape[1]] = before
+    now = numbers(sim)[sim.number].astype(np.float64)
+    for k, law in enumerate(laws):
+        new = (now == 1 + k) & (memory[:, 0] != now)
+        memory[new, 1:] = 0.0
+        memory[np.ix_(new, np.arange(1, 1 + len(law.states)))] = [state.initial for state in law.states]
+    memory[:, 0] = now
+    sim.cold[COLUMN] = memory
+
+
+def forget(sim: State, mine: np.ndarray) -> None:
+    """State variables of owned elements (bool) take their initial values at the next `begin`."""
+    if COLUMN in sim.cold:
+        sim.cold[COLUMN][mine, 0] = 0.0
+
+
+def quantity(sim: State, variable: str) -> str:
+    """The name as quantity of a state variable. CommandError unless a law that elements have has one of this name."""
+    found = quantities(sim)
+    if OF_LAW + variable not in found:
+        known_ = ", ".join(name.removeprefix(OF_LAW) for name in found) or "none"
+        raise CommandError(
+            f"no law of the user that elements have has a state variable '{variable}'; there is {known_}"
+        )
+    return OF_LAW + variable
+
+
+def quantities(sim: State) -> list[str]:
+    """State variables of the laws that elements have, as quantities."""
+    return list(dict.fromkeys(OF_LAW + state.name for law in in_use(sim) for state in law.states))
+
+
+def unit(name: str) -> str:
+    """Of such a quantity."""
+    laws = [law for law in MODELS.values() if isinstance(law, UserLaw)]
+    return next(state.unit for law in reversed(laws) for state in law.states if OF_LAW + state.name == name)
+
+
+def values(sim: State, name: str, memory: np.ndarray) -> np.ndarray:
+    """Such a quantity of the owned elements (n_own,), NaN for those whose law has no such variable; memory (n_own, 1 +
+    states): see `begin`."""
+    out = np.full(len(memory), math.nan)
+    for k, law in enumerate(of_rows(sim.element_rows)):
+        names = [OF_LAW + state.name for state in law.states]
+        if name in names:
+            mine = memory[:, 0] == 1 + k
+            out[mine] = memory[mine, 1 + names.index(name)]
+    return out
+
+
+class UnknownLaw(CommandError):
+    """A checkpoint has a law that was not named before."""
+
+
+def check_restored(state: Mapping[str, Any]) -> None:
+    """UnknownLaw unless the laws that rows of a checkpoint name are there, with the same texts."""
+    for name, _ in state["element_rows"]:
+        if MARK not in name or name in MODELS:
+            continue
+        title = name.partition(MARK)[0]
+        other = any(one.partition(MARK)[0] == title for one in MODELS)
+        raise UnknownLaw(
+            f"the checkpoint has elements with the law {title}, "
+            + (
+                f"of another text of {title.rpartition(':')[0]}: with a changed law a run does not go on"
+                if other
+                else "which this script has not named: element law 'FILE:FUNCTION' before model restore does"
+            )
+        )

@@ -1,0 +1,45 @@
+"""Laws for the tests."""
+
+import math
+
+from hpcdem import Property, StateVariable, element_law
+
+
+@element_law()
+def elastic(e11, e22, e12, bulk, shear):
+    """That of mech-iso-elastic."""
+    lame, two_mu = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+    p = lame * (e11 + e22)
+    return p + two_mu * e11, p + two_mu * e22, two_mu * e12, p
+
+
+@element_law(
+    properties=[Property("limit", "Pa", "largest shear stress", low_itself=False)],
+    state=[
+        StateVariable("g11", "1", "plastic strain 11"), StateVariable("g12", "1", "plastic strain 12"),
+        StateVariable("slip", "1", "shear of the plastic strain along its way"),
+    ],
+)  # fmt: skip
+def tresca(e11, e22, e12, g11, g12, slip, i11, i22, i12, bulk, shear, limit):
+    """Shear stress in the plane up to a limit; plastic strain without volume."""
+    lame, two_mu = bulk - 2.0 / 3.0 * shear, 2.0 * shear
+    p = lame * (e11 + e22)
+    s11, s22, s12 = p + two_mu * (e11 - g11), p + two_mu * (e22 + g11), two_mu * (e12 - g12)
+    half, across = 0.5 * ((s11 + i11) - (s22 + i22)), s12 + i12
+    radius = math.sqrt(half * half + across * across)
+    if radius > limit:
+        over = 1.0 - limit / radius
+        d11, d12 = over * half / two_mu, over * across / two_mu
+        g11, g12, slip = g11 + d11, g12 + d12, slip + math.sqrt(d11 * d11 + d12 * d12)
+        s11, s22, s12 = s11 - over * half, s22 + over * half, s12 - over * across
+    return s11, s22, s12, p, g11, g12, slip
+
+
+def lift(y):
+    """Velocity [m/s] of a plate that is drawn out evenly."""
+    return 0.1 * y
+
+
+def beat(x, y, t):
+    """Stress [Pa] of a wave that runs along y."""
+    return -2e6 * math.sin(3e4 * (t - 1e-4 * y) + x)

@@ -1,0 +1,259 @@
+"""Laws of elements that users write: the same bits as the built-in law, what is refused and where, states."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state, user_laws
+from hpcdem.physics.fdem.properties import MODELS
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.support import ROCK, jointed, model, near, rectangle, shaken
+from tests.blocks.test_yielding import deform
+
+LAWS = Path(__file__).with_name("laws") / "rock.py"
+STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress_zz")
+
+
+def law(sim: Blocks, name: str) -> str:
+    """A law of the file, by the name of its model."""
+    return user_laws.load(sim, LAWS, f"rock.py:{name}").name
+
+
+def clay(limit: float = 1e6, **options) -> Blocks:
+    """A square metre of elements with a limit of shear stress, at rest."""
+    sim = Blocks(**options)
+    sim.take_mesh(shaken(rectangle(3, 3, 1.0, 1.0), 0.2))
+    changes.element_model(sim, None, law(sim, "tresca"), {**ROCK, "limit": limit})
+    sim.option(dynamic=False, collision=False)
+    return sim
+
+
+@pytest.mark.parametrize("part", [1.0, 0.4], ids=["all", "some"])
+@pytest.mark.parametrize("dynamic", [True, False], ids=["motion", "relaxation"])
+def test_a_law_like_the_built_in_one_gives_its_bits(part, dynamic):
+    """In motion with joints that break and contact, and towards equilibrium; time step and masses too."""
+    ends = []
+    for own in (False, True):
+        sim = model(shaken(rectangle(6, 4, 0.6, 0.4), 0.2))
+        rock = {**ROCK, "damp_factor": 0.1, "friction": 20.0}
+        changes.element_model(sim, None, "mech_iso_elastic", rock)
+        if own:
+            some = np.arange(int(part * len(sim.alive)))
+            changes.element_model(sim, None if part == 1.0 else some, law(sim, "elastic"), rock)
+        jointed(sim, tensile_strength=5e5, gf1=5.0)
+        sim.initial_stress(None, xx=-1e5, yy=2e5)
+        sim.option(dynamic=dynamic)
+        if dynamic:
+            changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] < 0.3), 5.0, 1.0)
+        else:
+            sim.stress_condition(near(sim.mesh, 0, 0.6), xx=3e5)
+        convergence.advance(sim, 400)
+        ends.append([sim.x, sim.v, np.array(sim.clock.dt), *(diagnostics.values(sim, name) for name in STRESSES)])
+        if dynamic:
+            assert diagnostics.joint_counts(sim)[2] > 3
+    for one, other in zip(*ends):
+        assert np.array_equal(one, other)
+
+
+def test_states_follow_the_law():
+    """Simple shear up to twice the strain at the limit L / (2 G): slip is what is beyond it. Half of the way back is
+    elastic. Frames, histories and fingerprints see the state that the stress of this moment belongs to."""
+    shear = ROCK["young"] / 2.5
+    sim, e = clay(), 1e6 / (2.0 * shear)
+    sim.option(large_strain=False)
+    deform(sim, [[1.0, 2.0 * 2.0 * e], [0.0, 1.0]])
+    assert diagnostics.values(sim, "law_slip") == pytest.approx(np.full(18, e), rel=1e-6)
+    assert diagnostics.values(sim, "stress_xy") == pytest.approx(np.full(18, 1e6), rel=1e-9)
+    deform(sim, [[1.0, 2.0 * 1.5 * e], [0.0, 1.0]])
+    assert diagnostics.values(sim, "law_slip") == pytest.approx(np.full(18, e), rel=1e-6)
+    assert diagnostics.values(sim, "stress_xy") == pytest.approx(np.full(18, 0.5e6), rel=1e-6)
+    assert np.isnan(diagnostics.values(sim, "strain_energy")).all()
+    changes.reset_state(sim, np.arange(9))
+    assert diagnostics.values(sim, "law_g12")[:9].tolist() != diagnostics.values(sim, "law_g12")[9:].tolist()
+
+
+def test_initial_stress_reaches_the_law():
+    """Half of the limit is there already."""
+    shear = ROCK["young"] / 2.5
+    sim, e = clay(), 1e6 / (2.0 * shear)
+    sim.option(large_strain=False)
+    sim.initial_stress(None, xy=0.5e6)
+    deform(sim, [[1.0, 2.0 * e], [0.0, 1.0]])
+    assert diagnostics.values(sim, "law_slip") == pytest.approx(np.full(18, 0.5 * e), rel=1e-6)
+    assert diagnostics.values(sim, "stress_xy") == pytest.approx(np.full(18, 1e6), rel=1e-9)
+
+
+def test_another_law_begins_with_its_initial_states():
+    sim = clay()
+    deform(sim, [[1.0, 0.01], [0.0, 1.0]])
+    before = diagnostics.values(sim, "law_slip")
+    assert (before > 0.0).all()
+    sim.element_property(np.arange(4), {"limit": 2e6})  # the same law: it goes on
+    assert (diagnostics.values(sim, "law_slip")[:4] > 0.0).all()
+    changes.element_model(sim, np.arange(4, 8), law(sim, "elastic"), ROCK)
+    assert np.isnan(diagnostics.values(sim, "law_slip")[4:8]).all()
+    sim.close_model()
+    changes.element_model(sim, np.arange(4, 8), law(sim, "tresca"), {**ROCK, "limit": 1e12})
+    assert (diagnostics.values(sim, "law_slip")[4:8] == 0.0).all()
+
+
+def test_properties_of_a_law_alone_change_the_outcome():
+    ends = []
+    for limit in (1e6, 2e6):
+        sim = clay(limit)
+        deform(sim, [[1.0, 0.01], [0.0, 1.0]])
+        ends.append(np.abs(diagnostics.values(sim, "stress_xy")).max())
+    assert ends == pytest.approx([1e6, 2e6], rel=1e-3)
+
+
+HEAD = "import math\nfrom hpcdem import Property, StateVariable, element_law\n\n"
+
+
+def written(folder: Path, text: str) -> Path:
+    (folder / "clay.py").write_text(HEAD + text)
+    return folder / "clay.py"
+
+
+def test_the_time_step_follows_the_stiffness(tmp_path):
+    """A bound that is four times as high halves the time step; a number stands for a function."""
+    found = []
+    for stiffness in ("None", "lambda bulk, shear: 4.0 * (bulk + 4.0 / 3.0 * shear)", "24e10"):
+        text = (
+            f"@element_law(stiffness={stiffness})\ndef law(e11, e22, e12, young):\n"
+            "    return young * e11, young * e22, young * e12, 0.0\n"
+        )
+        sim = model(rectangle(4, 4, 1.0, 1.0))
+        name = user_laws.load(sim, written(tmp_path, text), "clay.py:law").name
+        changes.element_model(sim, None, name, ROCK)
+        sim.option(collision=False)
+        found.append(diagnostics.critical_time_step(sim))
+    assert found[1] == pytest.approx(0.5 * found[0], rel=1e-12) == found[2]
+
+
+def test_a_law_knows_the_time_step(tmp_path):
+    """A clock as state variable: dt is added in motion, nothing at rest."""
+    text = (
+        "@element_law(state=[StateVariable('age', 's', initial=3.0)])\ndef law(e11, e22, e12, age, young, dt):\n"
+        "    return young * e11, young * e22, young * e12, 0.0, age + dt\n"
+    )
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    changes.element_model(sim, None, user_laws.load(sim, written(tmp_path, text), "clay.py:law").name, ROCK)
+    sim.option(dynamic=False)
+    convergence.advance(sim, 5)
+    assert (diagnostics.values(sim, "law_age") == 3.0).all()
+    sim.option(dynamic=True)
+    convergence.advance(sim, 5)
+    assert diagnostics.values(sim, "law_age") == pytest.approx(np.full(8, 3.0 + 6.0 * sim.clock.dt), rel=1e-12)
+
+
+LAW = "@element_law()\ndef law(e11, e22, e12, young):\n    "
+WRONG = {
+    "syntax": ("@element_law()\ndef law(e11, e22, e12:\n    return 0.0\n", "clay.py:5: '(' was never closed"),
+    "a missing name": (LAW + "a = young\n    return a, yuong * e22, a, a\n", "clay.py:7: numba: NameError: name"),
+    "text that fails": ("x = 1 / 0\n", "clay.py:4: ZeroDivisionError: division by zero"),
+    "no such law": ("@element_law()\ndef other(e11, e22, e12):\n    return e11, e22, e12, e11\n",
+                    "clay.py: there is no law 'law' in it; there is other"),
+    "not declared": ("def law(e11, e22, e12):\n    return e11, e22, e12, e11\n", "clay.py:4: 'law' is not declared"),
+    "no brackets": ("@element_law\ndef law(e11, e22, e12):\n    return e11, e22, e12, e11\n",
+                    "clay.py: 'law' is not declared as a law"),
+    "an unknown argument": (LAW.replace("young", "yuong") + "return e11, e22, e12, e11\n", "clay.py:4: 'yuong'"),
+    "without a strain": (LAW.replace(" e12,", "") + "return e11, e22, e11, e11\n", "clay.py:4: the law does not take"),
+    "a default": (LAW.replace("young", "young=1.0") + "return e11, e22, e11, e11\n", "clay.py:4: 'young=1.0': "),
+    "wrong type": (LAW + "return young * e11, e22, e12, 0\n", "clay.py:4: the law must return s33 as a float"),
+    "too few": (LAW + "return young * e11, e22, e12\n", "clay.py:4: the law must return 4 numbers (s11, s22, s12"),
+    "one number": (LAW + "return young * e11\n", "clay.py:4: the law must return 4 numbers"),
+    "typing": (LAW + "a = 1.0\n    b = 'x' + young\n    return a, a, a, a\n", "clay.py:7: numba: No implementation of"),
+    "a plain function": ("def half(x):\n    return 0.5 * x\n\n" + LAW + "a = half(e11)\n    return a, a, a, a\n",
+                         "clay.py:9: numba: Untyped global name 'half'"),
+    "nan": (LAW + "a = young * e11 / math.sqrt(e11 * e11)\n    return a, 0.0, 0.0, 0.0\n",
+            "clay.py:4: law 'law': s11 is nan at zero strain with young 5e+10"),
+    "too steep": (LAW + "return 9.0 * young * e11, 0.0, 0.0, 0.0\n",
+                  "clay.py:4: law 'law': ds11/de11 is 4.5e+11 Pa at zero strain, above its stiffness 6e+10 Pa"),
+    "negative stiffness": (LAW.replace("()", "(stiffness=-1.0)", 1) + "return e11, e22, e12, 0.0\n",
+                           "its stiffness must be a number above 0 (Pa), got -1"),
+    "stiffness that fails": (LAW.replace("()", "(stiffness=lambda young: [][3])", 1) + "return e11, e22, e12, 0.0\n",
+                             "its stiffness fails: IndexError"),
+    "stiffness of nothing": (LAW.replace("()", "(stiffness=lambda limit: 1.0)", 1) + "return e11, e22, e12, 0.0\n",
+                             "clay.py:4: stiffness takes properties, 'limit' is none"),
+    "an idle property": (LAW.replace("()", "([Property('limit', 'Pa', '')])", 1) + "return e11, e22, e12, 0.0\n",
+                         "clay.py:4: property 'limit' is declared, but neither the law nor its stiffness takes it"),
+    "a name of all solids": (LAW.replace("()", "([Property('young', 'Pa', '')])", 1) + "return e11, e22, e12, 0.0\n",
+                             "clay.py:4: 'young' stands for something already"),
+    "a state that is not taken": (LAW.replace("()", "(state=[StateVariable('a', '1')])", 1)
+                                  + "return e11, e22, e12, 0.0, e11\n", "clay.py:4: the law does not take a"),
+    "an infinite state": (LAW.replace("()", "(state=[StateVariable('a', '1', '', math.inf)])", 1)
+                          + "return e11, e22, e12, 0.0, e11\n", "clay.py:4: state variable 'a' begins with inf"),
+    "no property": (LAW.replace("()", "(['limit'])", 1) + "return e11, e22, e12, 0.0\n",
+                    "clay.py:4: a property is declared by Property(...), got 'limit'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_with_a_law_is_told_by_file_and_line(case, tmp_path):
+    text, message = WRONG[case]
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    with pytest.raises(CommandError) as caught:
+        changes.element_model(sim, None, user_laws.load(sim, written(tmp_path, text), "clay.py:law").name, ROCK)
+    assert message in str(caught.value) and "\n" not in str(caught.value) and len(str(caught.value)) < 300
+    sim.step()  # the model is as it was
+
+
+@pytest.mark.parametrize(
+    "name, message",
+    [("none.py:law", "none.py cannot be read: No such file"), ("clay.py", "a law is named 'file.py:function'"),
+     ("clay.txt:law", "a law is named"), ("clay.py:a b", "a law is named")],
+)  # fmt: skip
+def test_names_of_laws(name, message, tmp_path):
+    with pytest.raises(CommandError, match=message):
+        user_laws.load(Blocks(), tmp_path / name.rpartition(":")[0], name)
+
+
+def test_what_a_law_cannot_do_is_refused():
+    sim = model(rectangle(2, 2, 1.0, 1.0, kind="mixed"))
+    with pytest.raises(CommandError, match=r"is a quad: rock\.py:elastic is for triangles"):
+        changes.element_model(sim, None, law(sim, "elastic"), ROCK)
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    diagnostics.account_energy(sim)
+    with pytest.raises(CommandError, match=r"what the law rock\.py:elastic stores and loses is not known"):
+        changes.element_model(sim, None, law(sim, "elastic"), ROCK)
+    diagnostics.account_energy(sim, False)
+    changes.element_model(sim, [3], law(sim, "elastic"), ROCK)
+    with pytest.raises(CommandError, match=r"the law rock\.py:elastic of element 3 stores and loses is not known"):
+        diagnostics.account_energy(sim)
+    sim.option(dynamic=False)
+    with pytest.raises(CommandError, match=r"element 3 has the law rock\.py:elastic: the static solve takes elastic"):
+        equilibrium.solve_elastic(sim)
+    for given, message in (
+        ({}, "needs limit"),
+        ({"limit": 0.0}, "limit must be > 0"),
+        ({"limits": 1.0}, "no property"),
+    ):
+        with pytest.raises(CommandError, match=message):
+            changes.element_model(sim, [3], law(sim, "tresca"), {**ROCK, **given})
+
+
+def test_a_checkpoint_needs_the_law_with_the_same_text(tmp_path, monkeypatch):
+    sim = clay()
+    deform(sim, [[1.0, 0.01], [0.0, 1.0]])
+    saved_state.save(sim, tmp_path / "a.sav")
+    name = law(sim, "tresca")
+    monkeypatch.delitem(MODELS, name)
+    other = clay()  # the law is there again, and the state goes on
+    saved_state.restore(other, tmp_path / "a.sav")
+    for quantity in ("law_slip", "law_g11", *STRESSES):
+        assert np.array_equal(diagnostics.values(sim, quantity), diagnostics.values(other, quantity)), quantity
+    found = MODELS.pop(name)
+    empty = Blocks()
+    with pytest.raises(CommandError, match=r"the law rock\.py:tresca, which this script has not named"):
+        saved_state.restore(empty, tmp_path / "a.sav")
+    assert empty.mesh is None
+    monkeypatch.setitem(MODELS, name[:-1] + "x", found)
+    with pytest.raises(CommandError, match=r"of another text of rock\.py"):
+        saved_state.restore(empty, tmp_path / "a.sav")
+    monkeypatch.setitem(MODELS, name, found)
+    assert math.isfinite(diagnostics.values(other, "law_slip").max())

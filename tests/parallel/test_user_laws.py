@@ -1,0 +1,122 @@
+"""Laws of the user at rest and in motion: the same bits on any number of ranks and threads, and across a restart."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.parallel import workers
+from tests.parallel.workers import equal
+
+WORKER = Path(__file__).resolve().parent.parent / "blocks" / "worker.py"
+LAWS = WORKER.with_name("laws")
+STEPS = 900
+SLOW = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The run on one rank with one thread, with a checkpoint from the middle of it."""
+    return workers.alone(WORKER, "obeying", STEPS, 701, tmp_path_factory.mktemp("obeying"))
+
+
+def test_much_happens(folder):
+    with np.load(folder / "alone.npz") as found:
+        assert found["counts"][2] > 10 and found["about"][0] > 5  # joints that broke; rebuilds
+        slip = found["law_slip"]
+        assert np.isnan(slip).sum() == 22 and (slip > 1e-5).sum() > 20 and (slip == 0.0).sum() > 3
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks, threads", [(2, 1), (4, 1), (1, 2), pytest.param(2, 2, marks=SLOW)])
+def test_ranks_and_threads_do_not_change_a_bit(folder, launch, ranks, threads):
+    out = equal(launch, WORKER, "obeying", STEPS, folder, ranks, threads)
+    if ranks > 1:
+        with np.load(out) as found:
+            assert found["about"][3] > 3  # elements that came from another rank, with their states
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks, threads", [(2, 1), pytest.param(4, 1, marks=SLOW), (1, 2)])
+def test_a_restart_does_not_change_a_bit(folder, launch, ranks, threads):
+    equal(launch, WORKER, "obeying", STEPS, folder, ranks, threads, "resume", "middle.sav")
+
+
+SCRIPT = """
+pcdc mesh structured (0,0) (2,1) cells 8 4 diagonal alternate
+pcdc element c-model user 'rock.py:tresca' property den 2000 bulk 4e9 shear 3e9 parameter 'limit' 1e6
+pcdc model option dynamic off
+pcdc node boundary mech-vel-b-c velocity-y 0 range y -0.01 0.01
+pcdc node boundary mech-vel-b-c velocity-y -2e-5 range y 0.99 1.01
+pcdc history create 'flow' element value law-state variable 'slip' maximum every 50
+pcdc model step 200
+pcdc model save 'a.sav'
+pcdc model step 100
+pcdc history export 'flow.csv'
+"""
+GO_ON = """
+pcdc element law 'rock.py:tresca'
+pcdc model restore 'a.sav'
+pcdc model step 100
+pcdc history export 'flow.csv'
+"""
+
+
+def run(launch, folder: Path, ranks: int, name: str, text: str):
+    (folder / f"{name}.sc").write_text(text)
+    return launch(ranks, f"{name}.sc", "--outdir", name, "--no-figure", cwd=folder)
+
+
+@pytest.mark.mpi
+def test_a_script_goes_on_with_the_law_that_it_names_and_with_no_other(launch, tmp_path):
+    shutil.copy(LAWS / "rock.py", tmp_path)
+    whole = run(launch, tmp_path, 1, "whole", SCRIPT)
+    assert whole.returncode == 0, whole.stderr
+    assert "law rock.py:tresca is compiled for this run" in whole.stdout + whole.stderr
+    again = run(launch, tmp_path, 2, "again", GO_ON)
+    assert again.returncode == 0, again.stderr
+    curves = [(tmp_path / name / "flow.csv").read_text() for name in ("whole", "again")]
+    assert curves[0] == curves[1] and "law_slip [1]" in curves[0] and len(curves[0].splitlines()) > 5
+    silent = run(launch, tmp_path, 2, "silent", GO_ON.replace("pcdc element law 'rock.py:tresca'", ""))
+    assert silent.returncode not in (0, None)
+    assert "silent.sc:3" in silent.stderr and "has elements with the law rock.py:tresca" in silent.stderr
+    (tmp_path / "rock.py").write_text((LAWS / "rock.py").read_text() + "\n# changed\n")
+    changed = run(launch, tmp_path, 2, "changed", GO_ON)
+    assert changed.returncode != 0 and "of another text of rock.py" in changed.stderr
+
+
+@pytest.mark.mpi
+def test_an_error_stops_all_ranks_before_the_run(launch, tmp_path):
+    text = (LAWS / "rock.py").read_text().replace("two_mu * e12, p\n", "two_nu * e12, p\n")
+    (tmp_path / "rock.py").write_text(text)
+    line = 1 + text[: text.index("two_nu")].count("\n")
+    script = SCRIPT.replace("tresca", "elastic").replace("parameter 'limit' 1e6", "")
+    found = run(launch, tmp_path, 2, "wrong", "print('it runs')\n" + script)
+    assert found.returncode != 0 and "it runs" not in found.stdout
+    assert (
+        "wrong.sc:4: pcdc element c-model user" in found.stderr and f"rock.py:{line}: numba: NameError" in found.stderr
+    )
+
+
+@pytest.mark.mpi
+def test_resume_takes_the_law_of_the_script(launch, tmp_path):
+    """The law is compiled before the checkpoint is read; with another text the run stops."""
+    shutil.copy(LAWS / "rock.py", tmp_path)
+    (tmp_path / "job.sc").write_text(SCRIPT.replace("pcdc model save 'a.sav'", ""))
+    job = ("job.sc", "--no-figure", "--outdir")
+    whole = launch(1, *job, "whole", cwd=tmp_path)
+    assert whole.returncode == 0, whole.stderr
+    stopped = launch(1, *job, "out", "--time-limit", "0:00:00.001", cwd=tmp_path)
+    assert stopped.returncode == 85, stopped.stderr
+    text = (tmp_path / "rock.py").read_text()
+    (tmp_path / "rock.py").write_text(text + "\n# changed\n")
+    changed = launch(1, *job, "out", "--resume", cwd=tmp_path)
+    assert changed.returncode == 2 and "of another text of rock.py" in changed.stderr
+    (tmp_path / "rock.py").write_text(text)
+    again = launch(2, *job, "out", "--resume", cwd=tmp_path)
+    assert again.returncode == 0 and "going on from" in again.stdout, again.stderr
+    curves = [(tmp_path / name / "flow.csv").read_text() for name in ("whole", "out")]
+    assert curves[0] == curves[1] and len(curves[0].splitlines()) > 5
