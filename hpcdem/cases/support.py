@@ -15,7 +15,7 @@ class Supported:
     """convergence [m]: mean displacement of the wall towards the centre, at_support: when the bolts were put in; crown
     [m]: displacement of the crown into the tunnel; plastic_radius [m]: of a circle with the area of the tunnel and of
     the rock that has yielded; axial_force [N]: largest of a bolt, tension positive; yielded, broken: elements of bolts;
-    slipping: nodes of bolts whose grout slips; ratio: unbalanced forces over all at the end."""
+    slipped: nodes of bolts whose grout has slipped; ratio: unbalanced forces over all at the end."""
 
     convergence: float
     at_support: float
@@ -24,7 +24,7 @@ class Supported:
     axial_force: float
     yielded: int
     broken: int
-    slipping: int
+    slipped: int
     ratio: float
 
 
@@ -153,16 +153,16 @@ convergence, crown = into()
 ratio = pcdc.ratio
 flowed = pcdc.values('element', 'area')[pcdc.values('element', 'plastic-state') > 0]
 plastic_radius = math.sqrt(radius**2 + math.fsum(flowed) / math.pi)
-axial_force, yielded, broken, slipping = 0.0, 0, 0, 0
+axial_force, yielded, broken, slipped = 0.0, 0, 0, 0
 if bolts:
     force, state = pcdc.values('bolt-element', 'axial-force'), pcdc.values('bolt-element', 'bolt-state').astype(int)
     axial_force = float(force[np.abs(force).argmax()])
     yielded, broken = int((state & 15 > 0).sum()), int((state & 16 > 0).sum())
-    slipping = int((pcdc.values('bolt-node', 'bond-state').astype(int) & 1 > 0).sum())
+    slipped = int((pcdc.values('bolt-node', 'bond-state').astype(int) > 0).sum())
 print('into the tunnel: mean %.4g mm (%.4g before the bolts), crown %.4g mm; plastic to %.4g m'
       % (1e3*convergence, 1e3*at_support, 1e3*crown, plastic_radius))
-print('bolts: largest force %.4g kN, %d elements yielded, %d broken, grout slips at %d nodes'
-      % (axial_force/1e3, yielded, broken, slipping))
+print('bolts: largest force %.4g kN, %d elements yielded, %d broken, grout slipped at %d nodes'
+      % (axial_force/1e3, yielded, broken, slipped))
 curve.append((1e3 * convergence, 0.0))
 pcdc chart create 'support' x-label 'convergence (mm)' y-label 'stress at the wall over that before'
 pcdc chart add 'support' values [curve] label 'release'

@@ -68,6 +68,27 @@ def view(state: MeshState) -> View:
     return View(float(low[0]) - air, float(high[0]) + air, float(low[1]) - air, float(high[1]) + air)
 
 
+def view_of_flow(state: MeshState) -> View:
+    """The part of the plane where there is plastic strain or a bolt, and half of its width around it; the whole model
+    where that is hardly more."""
+    from hpcdem.post.bolts import areas
+
+    whole = view(state)
+    cells = state.cells[plastic_shear(state) > 0.01 * plastic_range(state)[1]]
+    points = [state.points[cells[cells >= 0]]]
+    if state.bolts:
+        points.append(areas(state)[0].reshape(-1, 2))
+    there = np.concatenate(points)
+    if not len(there):
+        return whole
+    low, high = there.min(axis=0), there.max(axis=0)
+    middle, half = 0.5 * (low + high), 0.75 * float((high - low).max())
+    if 2.0 * half > 0.6 * max(whole.width, whole.height):
+        return whole
+    (left, bottom), (right, top) = middle - half, middle + half
+    return View(max(left, whole.left), min(right, whole.right), max(bottom, whole.bottom), min(top, whole.top))
+
+
 def compression(state: MeshState) -> np.ndarray:
     """(ne,) larger compressive stress in the plane [Pa]: minus the smaller principal stress."""
     s = state.of_elements
@@ -296,7 +317,7 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 
 CONTOURS = {
     STRESS: Contours(compression, stress_range, PRESSURES, "compressive stress", "YlOrBr"),
-    PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGnBu"),
+    PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGn"),
 }
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from hpcdem.io.vtkhdf_mesh import MeshState
 
 BAR, TENSION, COMPRESSION = "#202020", "#2f7fb5", "#d0562a"
-HEIGHT = 0.06
-"""Of the area at the largest force, over the size of the model."""
+HEIGHT = 0.12
+"""Of the area at the largest force, over the length of the longest bolt."""
 BROKEN = 16
 """Bit of the state of an element."""
 
@@ -24,8 +24,12 @@ def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
     a, b = at[first], at[first + 1]
     way = b - a
     across = np.column_stack([-way[:, 1], way[:, 0]]) / np.hypot(way[:, 0], way[:, 1])[:, None]
-    size = float(np.ptp(state.points, axis=0).max())
-    out = HEIGHT * size * (force / max(float(np.abs(force).max(initial=0.0)), 1e-300))[:, None] * across
+    out = (
+        HEIGHT
+        * float(nodes["distance"].max())
+        * (force / max(float(np.abs(force).max(initial=0.0)), 1e-300))[:, None]
+        * across
+    )
     return np.stack([a, b, b + out, a + out], axis=1), force
 
 

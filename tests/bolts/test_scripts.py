@@ -77,8 +77,9 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     # The area beside an element: as wide as its force over the largest, to the left of the bar in tension.
     corners, force = of_bolts.areas(state)
     along, out = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    longest = bolts.nodes["arc"].max()
     left = along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0]
-    assert np.hypot(*out.T) == pytest.approx(of_bolts.HEIGHT * 2.0 * np.abs(force) / np.abs(force).max(), rel=1e-6)
+    assert np.hypot(*out.T) == pytest.approx(of_bolts.HEIGHT * longest * np.abs(force) / np.abs(force).max(), rel=1e-6)
     assert (np.sign(left) == np.sign(force)).all()
     labels = [handle.get_label() for handle in of_bolts.draw(pictures.draw(state).axes[0], state)]
     assert labels[0] == f"tension up to {force.max() / 1e3:.3g} kN"

@@ -63,7 +63,8 @@ def test_every_parameter_has_an_effect_and_every_result_is_made(kind):
         assert field.description
         if chooses(field):
             values = getattr(field.annotation, "__args__", (True, False))
-            assert len({kind(**{name: value}).model() for value in values}) == len(values), name
+            made = [kind(**{name: value}) for value in values]
+            assert len({one.model() + one.loading() for one in made}) == len(values), name
         else:
             assert re.search(rf"\b{name}\b", everything), name
     made = kind().script()

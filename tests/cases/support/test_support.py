@@ -1,0 +1,55 @@
+"""A tunnel in rock that yields, with bolts and without.
+
+Salencon (1969), see tests/cases/plastic_hole: with N = (1 + sin phi) / (1 - sin phi) and q = 2 c sqrt(N) rock under the
+equal stress P yields around a hole of radius a up to R = a [2 (P (N - 1) + q) / ((N + 1) q)]^(1 / (N - 1)).
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from hpcdem.cases import Support
+from tests.cases.ready import results
+
+COARSE = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000}
+
+
+def test_bolts_hold(launch, tmp_path):
+    """Each of these alone changes what the tunnel does, in the way that it should."""
+    usual = results(launch, tmp_path / "usual", Support(**COARSE))
+    assert 0.0 < usual.at_support < usual.convergence and usual.plastic_radius > 3.5
+    assert 0.0 < usual.axial_force <= 250e3 and usual.yielded > 0 and usual.broken == 0
+    none = results(launch, tmp_path / "none", Support(bolts=0, **COARSE))
+    assert none.axial_force == none.yielded == none.slipped == 0
+    assert none.at_support == usual.at_support and none.convergence > 1.05 * usual.convergence
+    assert none.plastic_radius > usual.plastic_radius
+    late = results(launch, tmp_path / "late", Support(release=0.95, **COARSE))
+    assert late.at_support > 1.5 * usual.at_support and usual.convergence < late.convergence <= none.convergence
+    weak = results(launch, tmp_path / "weak", Support(bond_cohesion=2e5, **COARSE))
+    assert weak.slipped > usual.slipped and weak.axial_force < usual.axial_force
+    strong = results(launch, tmp_path / "strong", Support(bolt_yield=1e9, plates=False, **COARSE))
+    assert strong.yielded == 0 and strong.axial_force > 250e3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("elements", ["quad", "tri"])
+def test_plastic_radius(launch, tmp_path, elements):
+    """Without bolts, with a tensile strength that does not count: 2 % of the closed form (and half an element)."""
+    case = Support(bolts=0, elements=elements, tensile_strength=1e9, dilation=30.0, size=0.15, reach=14.0, stages=40000)
+    done = results(launch, tmp_path, case)
+    n = 3.0
+    q = 2.0 * case.cohesion * math.sqrt(n)
+    exact = case.radius * (2.0 * (10e6 * (n - 1.0) + q) / ((n + 1.0) * q)) ** (1.0 / (n - 1.0))
+    print(done.plastic_radius, exact)
+    assert done.plastic_radius == pytest.approx(exact, rel=0.02, abs=0.075)
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+@pytest.mark.ranks
+def test_the_same_on_two_ranks(launch, tmp_path):
+    assert results(launch, tmp_path / "2", Support(**COARSE), ranks=2) == results(
+        launch, tmp_path / "1", Support(**COARSE)
+    )
