@@ -89,7 +89,7 @@ def test_every_row_says_what_it_is():
 def test_every_kind_is_read_and_every_command_is_bound():
     kinds = {type(option.kind) for options in ROWS.values() for option in options}
     assert kinds <= set(parser._READERS)
-    assert set(execute._VERBS) == {command.same_as or command.name for command in t.COMMANDS}
+    assert set(execute._COMMANDS) == {command.same_as or command.name for command in t.COMMANDS}
 
 
 @pytest.mark.parametrize("line", [line for command in t.COMMANDS for line in command.example])

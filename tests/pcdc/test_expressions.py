@@ -12,7 +12,7 @@ from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.physics.fdem.tables import Drawn, Over
 
 SAMPLES: dict[str, tuple[str, object]] = {
-    "<f>": ("0.25", 0.25), "<f>|table <s>": ("0.25", 0.25),
+    "<f>": ("0.25", 0.25), "<f>|table <s>|function <s>": ("0.25", 0.25),
     "<f>|table <s> over x|y|field <s>": ("0.25", 0.25),
     "<f>|table <s> over x|y|plastic-strain|field <s>": ("0.25", 0.25),
     "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
@@ -58,7 +58,8 @@ def _without(options: tuple[Option, ...], *names: str) -> list[Option]:
 
 EXCLUDING = {
     "model time-step": ("value", "mass-scaling"), "model solve": ("time", "elastic", "cycles", "solver"),
-    "history create": ("id", "nearest", "mean", "minimum", "sum"),
+    "history create": ("id", "nearest", "mean", "minimum", "sum", "variable"),
+    "bolt create polyline": ("length",),
     "chart add": ("values",), "field create": ("weibull", "lognormal"), "output vtk": ("off",),
 }  # fmt: skip
 """Keywords that do not go with the others of their command."""
@@ -83,7 +84,8 @@ def written(command: Command, model: Model | None, term: Option | None, writer: 
     words = [command.name, *(writer.value(kind) for o in command.leading for kind in o.values)]
     options = command.options if model is None else model.options
     if model is not None:
-        words += [model.keyword.name, "property"] * bool(model.options) or [model.keyword.name]
+        words += [model.keyword.name, *(writer.value(kind) for o in model.leading for kind in o.values)]
+        words += ["property"] * bool(model.options)
     words += [writer.option(o) for o in _without(options, *EXCLUDING.get(command.name, ()))]
     if term is not None:
         words += ["range", writer.option(term)]
@@ -142,7 +144,7 @@ def test_names_of_tables_too(name):
      ("history create 'h' [v] value [w]", ("element", "stress-xx"), "needs one of id, nearest and range"),
      ("history create 'h' [v] value [w] range x 0 1 sum", ("node", "position-x"), "read 'sum'"),
      ("history create 'h' [v] value [w] max", ("model", "time"), "a history of the model takes no maximum"),
-     ("history create 'h' [v] value [w] max", ("cell", "time"), "expected one of node, element, joint, model"),
+     ("history create 'h' [v] value [w] max", ("cell", "time"), "expected one of node, element, joint, bolt-node"),
      ("model new dim [v]", (3,), "dim 3 is not there yet"),
      ("model time-step auto [v] value 1e-6", (True,), "value and auto on exclude each other"),
      ("node boundary mech-m-b-c type [v] range id 1", (0.5,), "read 0.5 from '[v]', expected 0 free, 1 held or 2")],

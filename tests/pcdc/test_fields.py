@@ -107,7 +107,7 @@ def test_ranks_and_a_restart_do_not_change_a_bit(launch, alone, tmp_path, ranks)
      ("element property young table 'none' over y", "young: there is no table 'none'"),
      ("face-joint property gf1 field 'none'", "gf1: there is no field 'none'"),
      ("element property poisson-ratio field 'strength'", r"element 0: poisson_ratio must be > -1"),
-     ("node boundary mech-vel-b-c velocity-x field 'strength'", "expected a number or table"),
+     ("node boundary mech-vel-b-c velocity-x field 'strength'", "expected a number, table"),
      ("field delete 'none'", "there is no field 'none'")],
 )  # fmt: skip
 def test_refusals(tmp_path, line, message):

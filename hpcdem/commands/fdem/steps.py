@@ -145,7 +145,7 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
     _check_creep(project, time)
     blocks = project.blocks
     if project.progress is None:
-        creep.drop(blocks)
+        blocks.drop_creep_step()
         command = "solve elastic", {"time": time, "solver": solver, **given}
         project.progress = {"first": project.step, "creep": blocks.creep.time + time, "command": command}
     first, end = project.progress["first"], project.progress["creep"]
@@ -159,7 +159,7 @@ def _creep_at_once(project: Project, time: float, solver: str, given: dict[str, 
             try:
                 found = equilibrium.solve_elastic(blocks, solver=solver, **given)
             except CommandError:
-                creep.drop(blocks)
+                blocks.drop_creep_step()
                 raise
             creep.finish(blocks, end)
             _write_due(project)
@@ -200,7 +200,7 @@ def _creep(
             progress.update(begun=blocks.clock.step, watch=asdict(watch))
         ended = _advance(project, name, progress["begun"], math.inf, math.inf, ratio)
         if ended[0] != "ratio":
-            creep.drop(blocks)
+            blocks.drop_creep_step()
             return ended
         creep.finish(blocks, end)
         _write_due(project)
@@ -225,7 +225,7 @@ def _run(
     if time is not None and not creeps and project.progress is None and time <= 0.5 * clock.dt and log is not None:
         log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
-        creep.drop(project.blocks)
+        project.blocks.drop_creep_step()
         end = None if time is None or creeps else clock.time + time
         project.progress = {"first": clock.step, "end": end, "command": command}
         if time is not None and creeps:

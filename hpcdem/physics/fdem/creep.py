@@ -65,20 +65,11 @@ def switch(
     if not low <= step <= high:
         raise CommandError(f"dt of creep, {step:g} s, must lie between least, {low:g} s, and greatest, {high:g} s")
     sim.before_change()
-    drop(sim)
+    sim.drop_creep_step()
     if not follows:
         low = high = 0.0
     sim.creep = replace(sim.creep, on=on, dt=step, change=numbers.get("change", 0.0), least=low, greatest=high)
     sim.changed(stiffness=False)
-
-
-def settle(sim: Blocks) -> None:
-    """A command is about to change a model in motion: elements creep for the time that has passed. Collective."""
-    if sim.options.dynamic:
-        sim.close_model()
-        if sim.local.creeps:
-            sim.local.creep(sim.cold["creep"], sim.local.s0, keep=True)
-        sim.creep.passed = 0.0
 
 
 def check(sim: Blocks, time: float) -> None:
@@ -130,13 +121,6 @@ def finish(sim: Blocks, end: float) -> None:
         clock.dt = min(max(clock.dt * min(max(best, 1.0 / FASTEST), FASTEST), clock.least), clock.greatest)
 
 
-def drop(sim: Blocks) -> None:
-    """Forget a creep step of a static run that did not come into balance: elements have not crept in it."""
-    if sim.creep.passed > 0.0 and not sim.options.dynamic:
-        sim.creep.passed = 0.0
-        sim.open_model()
-
-
 def _change(sim: Blocks, before: np.ndarray) -> float:
     """Largest change of the deviator of an element, and of that in the dashpot of its Kelvin unit, in the creep step
     that is done, over the largest deviator of all. Equal on all ranks. Collective."""
@@ -145,7 +129,7 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     at = local.triangle_rows[local.creeping] - sim.n_left
     if len(at):
         old, new = before[at], after[at]
-        table = local.creep_table[local.law[local.creeping]]
+        table = local.creep_table[local.creep_law[local.creeping]]
         stress, kelvin = slice(kernels.S11, kernels.S12 + 1), slice(kernels.K11, kernels.K12 + 1)
         way = new[:, stress] - old[:, stress]
         unit = table[:, kernels.PER_KELVIN, None] > 0.0

@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, creep, overlaps, user_laws
+from hpcdem.physics.fdem import build, connectivity, overlaps, user_laws
 from hpcdem.physics.fdem.definition import Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
@@ -116,8 +116,22 @@ class Blocks(State):
                 self._renew_lists()  # what broken joints lose is not the doing of commands
             self.budget.pause(self)
         if self.creep.passed > 0.0:
-            creep.settle(self)
+            self._settle_creep()
         self.open_model()
+
+    def _settle_creep(self) -> None:
+        """A command is about to change a model in motion: elements creep for the time that has passed. Collective."""
+        if self.options.dynamic:
+            self.close_model()
+            if self.local.creeps:
+                self.local.creep(self.cold["creep"], self.local.s0, keep=True)
+            self.creep.passed = 0.0
+
+    def drop_creep_step(self) -> None:
+        """Forget a creep step of a static run that did not come into balance: elements have not crept in it."""
+        if self.creep.passed > 0.0 and not self.options.dynamic:
+            self.creep.passed = 0.0
+            self.open_model()
 
     def changed(self, topology: bool = False, stiffness: bool = True) -> None:
         self._topology_stale |= topology
@@ -178,7 +192,7 @@ class Blocks(State):
         it; "relax": a static stage moves them apart; "keep": they start as they are."""
         before = self.options.dynamic
         if dynamic is not None and dynamic != before:
-            creep.drop(self)
+            self.drop_creep_step()
         super().option(dynamic, collision, large_strain, overlap)
         if self.options.dynamic != before:
             self.v[:] = 0.0

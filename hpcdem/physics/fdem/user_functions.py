@@ -6,7 +6,7 @@
 A function takes numbers by these names: x, y [m]: where the node, or the middle of the face, lies in the mesh (it stays
 the same when things move, as in ranges of commands); t [s]: model time, at which tables are read too. It returns one
 number in the unit of the condition. It is compiled by numba and evaluated in each step at the nodes and faces that have
-it. Files are read, named in checkpoints and refused as those of laws (user_laws.py).
+it. Files are read, named in checkpoints and refused as those of laws (user_files.py).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import user_laws
-from hpcdem.physics.fdem.user_laws import MARK, UnknownLaw, Wrong
+from hpcdem.physics.fdem.user_files import MARK, UnknownLaw, Wrong, agreed, compiled, executed
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.definition import NodeCondition, Traction
-    from hpcdem.physics.fdem.state import State
+    from _typeshed import DataclassInstance
+
+    from hpcdem.physics.model import Model
 
 ARGUMENTS = "x", "y", "t"
 
@@ -48,10 +48,10 @@ FUNCTIONS: dict[str, UserFunction] = {}
 """Those that were loaded, by name and digest."""
 
 
-def load(sim: State, path: Path, function: str) -> str:
+def load(sim: Model, path: Path, function: str) -> str:
     """The name of the function 'file.py:function' of a file, which is checked and compiled, on all ranks from the text
     that rank 0 reads. CommandError with file and line. Collective."""
-    return user_laws.agreed(sim, path, function, "function", _take)
+    return agreed(sim, path, function, "function", _take)
 
 
 def _take(text: str, path: str, name: str, function: str) -> str:
@@ -63,7 +63,7 @@ def _take(text: str, path: str, name: str, function: str) -> str:
 def _made(text: str, path: str, name: str, function: str) -> UserFunction:
     from numba import njit, types
 
-    made = user_laws.executed(text, path, name).get(function)
+    made = executed(text, path, name).get(function)
     made = getattr(made, "py_func", made)
     if not inspect.isfunction(made):
         raise Wrong(0, f"there is no function '{function}' in it")
@@ -72,7 +72,7 @@ def _made(text: str, path: str, name: str, function: str) -> UserFunction:
     if not names or set(names) - set(ARGUMENTS):
         raise Wrong(line, f"a boundary condition is a function of {', '.join(ARGUMENTS)}, '{function}' is of {names}")
     kernel = njit(error_model="numpy", nogil=True)(made)
-    found = user_laws.compiled(kernel, (types.float64,) * len(names), path, line)
+    found = compiled(kernel, (types.float64,) * len(names), path, line)
     if found != types.float64:
         raise Wrong(line, f"'{function}' must return one float (0.0, not 0), it returns {found}")
     order = [ARGUMENTS.index(name) for name in names]
@@ -91,7 +91,7 @@ def _made(text: str, path: str, name: str, function: str) -> UserFunction:
         for i in range(len(places)):
             out[i] = call(places[i, 0], places[i, 1], t)
 
-    user_laws.compiled(loop, (types.float64[:, ::1], types.float64, types.float64[::1]), path, line)
+    compiled(loop, (types.float64[:, ::1], types.float64, types.float64[::1]), path, line)
     return UserFunction(name.partition(MARK)[0], loop)
 
 
@@ -107,7 +107,7 @@ def check(what: str, value: Any, places: np.ndarray, time: float) -> None:
         raise CommandError(f"{what}: {function.title} is {number:g} at x {x:g}, y {y:g}, t {time:g}")
 
 
-def used(one: NodeCondition | Traction) -> dict[str, UserFunction]:
+def used(one: DataclassInstance) -> dict[str, UserFunction]:
     """Functions of a condition by the name of the field."""
     given = asdict(one).items()
     return {field: FUNCTIONS[value] for field, value in given if isinstance(value, str) and value in FUNCTIONS}
@@ -131,7 +131,7 @@ class Placed:
     conditions: by row; of (n,): row of each object; places (n, 2) [m]. After that `of` are the new rows.
     """
 
-    def __init__(self, conditions: Sequence[NodeCondition | Traction], of: np.ndarray, places: np.ndarray) -> None:
+    def __init__(self, conditions: Sequence[DataclassInstance], of: np.ndarray, places: np.ndarray) -> None:
         functions = [used(one) for one in conditions]
         at = np.flatnonzero(np.array([bool(one) for one in functions])[of])
         self.rows = of[at]

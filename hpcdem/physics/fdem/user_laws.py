@@ -28,22 +28,19 @@ checkpoints. What a checkpoint names is never looked for: the script names the f
 
 from __future__ import annotations
 
-import hashlib
 import inspect
 import math
-import re
-import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import properties as known
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
+from hpcdem.physics.fdem.user_files import MARK, UnknownLaw, Wrong, agreed, compiled, executed, numba_message
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.properties import Rows
@@ -59,10 +56,6 @@ STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
 OF_LAW = "law_"
 """How state variables are called as quantities."""
-TOLD = 0.1
-"""Seconds of compiling that the log tells."""
-MARK = "#"
-"""Between the name of a law and the digest of its text."""
 
 
 @dataclass(frozen=True)
@@ -112,17 +105,6 @@ def element_law(
     )
 
 
-Made = TypeVar("Made")
-
-
-class Wrong(Exception):
-    """What is wrong with a file; line: 0 if it has none."""
-
-    def __init__(self, line: int, message: str) -> None:
-        super().__init__(message)
-        self.line = line
-
-
 def load(sim: State, path: Path, law: str) -> UserLaw:
     """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
     text that rank 0 reads. CommandError with file and line. Collective."""
@@ -137,65 +119,6 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
     return agreed(sim, path, law, "law", take)
 
 
-def agreed(sim: State, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
-    """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
-    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
-    file, _, function = what.rpartition(":")
-    if not file.endswith(".py") or not function.isidentifier():
-        raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
-    text, problem = "", ""
-    if sim.comm.rank == 0:
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            problem = f"{file} cannot be read: {getattr(error, 'strerror', None) or error}"
-    text, problem = sim.comm.bcast((text, problem))
-    if problem:
-        raise CommandError(problem)
-    name = f"{Path(file).name}:{function}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    began, message, made = time.perf_counter(), None, []
-    try:
-        made.append(take(text, str(path), name, function))
-    except Wrong as wrong:
-        message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
-    try:
-        sim.comm.agree(message)
-    except HpcdemError as error:
-        raise CommandError(str(error)) from None
-    spent = time.perf_counter() - began
-    if spent > TOLD and sim.log is not None:
-        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled for this run: {spent:.1f} s on rank 0")
-    return made[0]
-
-
-def executed(text: str, path: str, name: str) -> dict[str, Any]:
-    """The names of a text of the user, after it ran. Wrong."""
-    code: Any
-    try:
-        code = compile(text, path, "exec")
-    except (SyntaxError, ValueError) as error:
-        raise Wrong(getattr(error, "lineno", 0) or 0, f"{getattr(error, 'msg', error)}") from None
-    names: dict[str, Any] = {"__name__": f"law of {name}", "__file__": path}
-    try:
-        exec(code, names)
-    except Exception as error:  # whatever the user's own code does
-        raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
-    return names
-
-
-def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:
-    """Compile a kernel for arguments of these types; the type that it returns. Wrong, at `line` if numba knows none."""
-    from numba.core.errors import NumbaError
-
-    try:
-        kernel.compile(types)
-    except NumbaError as error:
-        raise Wrong(_numba_line(error, path) or line, _numba_message(error)) from None
-    except Exception as error:  # numba hands on what its passes meet in the user's own code
-        raise Wrong(line, f"numba: {type(error).__name__}: {error}") from None
-    return kernel.overloads[tuple(types)].signature.return_type
-
-
 def _made(text: str, path: str, name: str, function: str) -> UserLaw:
     """The law of a text. Wrong."""
     names = executed(text, path, name)
@@ -208,11 +131,6 @@ def _made(text: str, path: str, name: str, function: str) -> UserLaw:
         line = code.co_firstlineno if code is not None and code.co_filename == path else 0
         raise Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
     return _checked(declared, name, path)
-
-
-def _last_line(error: BaseException, path: str) -> int:
-    lines = [at.lineno or 0 for at in traceback.extract_tb(error.__traceback__) if at.filename == path]
-    return lines[-1] if lines else 0
 
 
 def _checked(declared: _Declared, name: str, path: str) -> UserLaw:
@@ -276,7 +194,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
         one, several = kernels.loops(kernel, names, states, columns)
         evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
     except NumbaError as error:
-        raise Wrong(line, _numba_message(error)) from None
+        raise Wrong(line, numba_message(error)) from None
     title, _, _ = name.partition(MARK)
     bound = Property(BOUND, "Pa", "what the slope of the law is never above", optional=True, low_itself=False,
                      internal=True)  # fmt: skip
@@ -340,23 +258,6 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
                     f"{bound[i]:g} Pa, by which the time step is found: stiffness= of element_law says more"
                 )
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
-
-
-def _numba_line(error: Any, path: str) -> int:
-    """The line of the file in what numba says, the last one: that of the cause."""
-    found = re.findall(r'File "([^"\n]+)", line (\d+)', re.sub(r"\x1b\[[0-9;]*m", "", str(error)))
-    lines = [int(line) for file, line in found if Path(file).name == Path(path).name]
-    place = getattr(error, "loc", None)
-    if not lines and place is not None and place.line is not None and str(place.filename).endswith(Path(path).name):
-        return int(place.line)
-    return lines[-1] if lines else 0
-
-
-def _numba_message(error: Any) -> str:
-    """Without colours, its first lines in one."""
-    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
-    told = [line for line in lines if line and not line.startswith(("File ", "Failed in nopython", "During:", "^"))]
-    return "numba: " + " ".join(told[:2]).partition(" def ")[0].replace(">>> ", "")
 
 
 def _compile(law: UserLaw, threads: int) -> None:
@@ -450,10 +351,6 @@ def values(sim: State, name: str, memory: np.ndarray) -> np.ndarray:
             mine = memory[:, 0] == 1 + k
             out[mine] = memory[mine, 1 + names.index(name)]
     return out
-
-
-class UnknownLaw(CommandError):
-    """A checkpoint has a law that was not named before."""
 
 
 def check_restored(state: Mapping[str, Any]) -> None:
