@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from hpcdem.cases.base import Case, choice, quantity
+from hpcdem.cases.tunnel import MESH, OUTLINE, ROUND, STRESSED
 
 
 @dataclass(frozen=True)
@@ -83,33 +84,16 @@ class Support(Case):
         return self
 
     def model(self) -> str:
-        return GROUND.replace("KIND", "type quad" if self.elements == "quad" else "irregular")
+        mesh = MESH.replace("KIND", "type quad" if self.elements == "quad" else "irregular")
+        return OUTLINE + ROUND + mesh + YIELDING + STRESSED
 
     def loading(self) -> str:
         return EXCAVATED.replace(" PLATE", " plate" if self.plates else "") + MEASURED
 
 
-GROUND = """
-side = reach * radius
-
-pcdc model new
-# Corners in the middle of the sides: points of the mesh that can be held.
-pcdc geometry create polygon ([-side],[-side]) (0,[-side]) ([side],[-side]) ([side],0) ([side],[side]) \\
-    (0,[side]) ([-side],[side]) ([-side],0) as-layer 'outline'
-pcdc geometry create circle (0,0) [radius] as-layer 'wall'
-pcdc mesh create from-layer 'outline' size [coarse] refine-layer 'wall' size [size] distance [0.8*side] \\
-    region 'wall' group 'core' KIND group 'rock'
+YIELDING = """\
 pcdc element c-model mech-m-c property density [density] young [young] poisson-r [poisson] friction [friction] \\
     cohesion [cohesion] tensile [tensile_strength] dilation [dilation]
-
-# The stress that was there before, held by the same stress on the sides.
-pcdc element initial stress-xx [stress_xx] stress-yy [stress_yy] stress-zz [poisson*(stress_xx + stress_yy)]
-pcdc element-face boundary m-s-b-c stress-xx [stress_xx] stress-yy [stress_yy] range geometry 'outline'
-near = 1e-6 * side
-for name, x, y, way in (('left', -side, 0, Vector(1,0)), ('right', side, 0, Vector(1,0)),
-                        ('below', 0, -side, Vector(0,1)), ('above', 0, side, Vector(0,1))):
-    pcdc node group '[name]' set 'held' range x [x - near] [x + near] y [y - near] [y + near]
-    pcdc node boundary mech-m-b-c type 2 [way] range group '[name]' set 'held'
 """
 EXCAVATED = """
 import numpy as np

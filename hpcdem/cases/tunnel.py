@@ -94,10 +94,10 @@ pcdc model new
 pcdc geometry create polygon ([-side],[-side]) (0,[-side]) ([side],[-side]) ([side],0) ([side],[side]) \\
     (0,[side]) ([-side],[side]) ([-side],0) as-layer 'outline'
 """
-CIRCLE = """\
-bottom = -radius
+ROUND = """\
 pcdc geometry create circle (0,0) [radius] as-layer 'wall'
 """
+CIRCLE = "bottom = -radius\n" + ROUND
 HORSESHOE = """\
 bottom = -wall
 pieces = max(12, round(math.pi * radius / size))

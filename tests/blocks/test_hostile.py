@@ -121,6 +121,22 @@ def test_a_table_in_use_stays():
         sim.remove_table("load")
 
 
+def test_steps_go_on_without_a_table_that_conditions_had():
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    sim.table("load", [(0.0, 1.0)])
+    faces = sim.mesh.edges().faces[~sim.mesh.edges().inner][:, 0]
+    sim.velocity_condition([0], vx="load")
+    sim.force_condition([1], fx="load")
+    sim.stress_condition(faces[:1], xx="load")
+    sim.stress_condition(faces[1:2], xx=-1.0)
+    convergence.advance(sim, 1)
+    sim.remove_conditions([0, 1])
+    sim.remove_stress_conditions(faces[:1])
+    sim.remove_table("load")
+    convergence.advance(sim, 1)
+    assert sim.clock.step == 2
+
+
 def test_nothing_runs_without_mesh_or_models():
     sim = Blocks()
     for call in (

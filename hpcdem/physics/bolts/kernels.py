@@ -24,7 +24,7 @@ SLIPS, SLIPPED = 1, 2
 STIFFNESS, LENGTH, TENSION, COMPRESSION, FAILURE = range(5)
 # Columns of the table of nodes (n, 7): mass, dashpot, grout: stiffness, cohesion and friction on both its faces.
 MASS, DRAG, GROUT, ROCK_COHESION, ROCK_FRICTION, BOLT_COHESION, BOLT_FRICTION = range(7)
-# Work (4,) [J/m]: on the rock; lost in bars, in the grout, and by dashpots; by conditions.
+# Work (5,) [J/m]: on the rock; lost in bars, in the grout, and by dashpots; by conditions.
 ON_ROCK, IN_BARS, IN_GROUT, IN_DASHPOTS, BY_CONDITIONS = range(5)
 WORK = 5
 CRUSHED = 0.5

@@ -314,8 +314,9 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
         names = sorted({sim.element_rows.name(row) for row in np.unique(sim.element_row[at]).tolist() if row})
         sim.log.warn_once(
             f"reset state {names}",
-            f"element reset state changes nothing: no element has a law with a state of its own "
-            f"({', '.join(names) or 'there is no law yet'}); joints have one: face-joint reset state",
+            "element reset state changes nothing: it forgets that elements have yielded, and states of laws of users; "
+            f"no element has either ({', '.join(names) or 'there is no law yet'}). For joints: face-joint reset state, "
+            "for creep: element reset kelvin-strain",
         )
 
 

@@ -551,6 +551,9 @@ class ModelDefinition:
         for one in (*used_conditions, *used_loads):
             if name in asdict(one).values():
                 raise CommandError(f"table '{name}' is used by a boundary condition")
+        # Rows that nothing follows any more are evaluated with the others.
+        self.conditions = [NodeCondition() if name in asdict(one).values() else one for one in self.conditions]
+        self.loads = [Traction() if name in asdict(one).values() else one for one in self.loads]
         del self.tables[name]
 
     def random_field(self, name: str, field: RandomField) -> None:

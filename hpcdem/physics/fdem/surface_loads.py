@@ -3,6 +3,7 @@ heat."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -14,36 +15,36 @@ ORDER = ("discs", "fluid", "heat", "bolts")
 """In which they are added up, whoever came first: sums keep their bits."""
 
 
-class SurfaceLoad:
+class SurfaceLoad(ABC):
     """What blocks ask of one; `name` is one of ORDER. of_mesh: it goes with the mesh that it was made for."""
 
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False
 
+    @abstractmethod
     def corners(self, blocks: Any) -> np.ndarray:
         """(n_own, 4) bool: corners of owned elements that may get such a force."""
-        raise NotImplementedError
 
+    @abstractmethod
     def add_to(self, applied: np.ndarray) -> None:
         """Add the present ones to what is applied to corners (n, 8), in storage order [N/m]. Not collective."""
-        raise NotImplementedError
 
+    @abstractmethod
     def storage_rebuilt(self) -> None:
         """Elements have other rows or owners. Collective."""
-        raise NotImplementedError
 
+    @abstractmethod
     def mesh_replaced(self) -> None:
         """There is another mesh."""
-        raise NotImplementedError
 
     def springs(self, blocks: Any) -> np.ndarray | None:
         """(n_own, 4) stiffness [N/m per m] that it brings to corners of owned elements, for masses and time step."""
         return None
 
-    def check_start(self) -> None:
+    def check_start(self) -> None:  # noqa: B027 - most have nothing to do here
         """CommandError if no step can be done with it. Not collective."""
 
-    def follow(self) -> None:
+    def follow(self) -> None:  # noqa: B027 - most have nothing to do here
         """The elements have moved by a step; their new positions are there, ghosts too. Collective."""
 
     def balance(self) -> tuple[np.ndarray, np.ndarray]:
@@ -55,14 +56,14 @@ class SurfaceLoad:
         ranks [J/m]."""
         return 0.0
 
-    def elements_removed(self, elements: np.ndarray) -> None:
+    def elements_removed(self, elements: np.ndarray) -> None:  # noqa: B027 - most have nothing to do here
         """These elements are taken out; the model is open. Collective."""
 
     def uses_table(self, name: str) -> bool:
         """Whether something of it follows this table of time. Not collective."""
         return False
 
-    def stop(self) -> None:
+    def stop(self) -> None:  # noqa: B027 - most have nothing to do here
         """All velocities become zero. Not collective."""
 
     def saved_state(self) -> dict[str, Any] | None:

@@ -122,12 +122,26 @@ SAND_PEAKS = {50.0: 350.9, 100.0: 475.5, 200.0: 728.5, 300.0: 920.2}
 """Li et al. 2021: peak s1 - s3 [Pa]; 32.3 degrees and 67.4 Pa."""
 
 
+def _peaks(seed: int) -> list[float]:
+    """Peaks [Pa] of another packing of the sand, loaded slowly."""
+    sim = Simulation(log=False)
+    press = Press(sim, SAND, 1500, seed)
+    found = []
+    for s3 in SAND_PEAKS:
+        press.confine(s3)
+        sim.save("other.sav")
+        sim.prop(fric=0.3)
+        found.append(press.shear(s3).peak)
+        sim.restore("other.sav")
+    return found
+
+
 @pytest.mark.slow
 def test_sand(press_folder: Path) -> None:
     """Slowly: the published friction angle, but hardly any cohesion. With the lattice-solid damping of the published
     sandbox: the published peaks, too.
 
-    The published peaks exceed ours by 140-190 Pa at every confining pressure. That is what the damping -eta v gives:
+    The published peaks exceed ours by 160-195 Pa at every confining pressure. That is what the damping -eta v gives:
     in a sample of n grains per area, shortened at the rate r, it adds about eta r n H^2 / 8 to the axial stress and
     eta r n W^2 / 8 to the confining one at the centre. Speed and size of the published test are not known; here
     r H^2 = 40 mm/s x 70 mm: the speed of the wall in their sandbox, and the height of a sample that is then needed.
@@ -161,10 +175,12 @@ def test_sand(press_folder: Path) -> None:
         sim.restore("sample.sav")
         sim.set(lsm=0.0)
 
-    phi, cohesion, r2 = mohr_coulomb(list(slow), [c.peak for c in slow.values()])
-    print(f"sand: {phi:.1f} degrees (published 32.3), {cohesion:.1f} Pa, r2 {r2:.4f}")
+    peaks = np.mean([[c.peak for c in slow.values()], *(_peaks(seed) for seed in (2, 3))], axis=0)
+    phi, cohesion, r2 = mohr_coulomb(list(slow), peaks.tolist())
+    print(f"sand, mean of three packings: {np.round(peaks)}, r2 {r2:.4f}")
+    print(f"sand: {phi:.1f} degrees (published 32.3), {cohesion:.1f} Pa")
     assert phi == pytest.approx(32.3, abs=2.0)
-    assert r2 > 0.98  # packings 1 to 5: 0.988 to 0.998, 31.3 to 32.3 degrees, 18 to 26 Pa
+    assert r2 > 0.99  # of single packings, 1 to 5: 0.988 to 0.998, 31.3 to 32.3 degrees, 18 to 26 Pa
     assert 0.0 < cohesion < 25.0
     assert all(abs(c.side.mean() / s3 - 1.0) < 0.01 for s3, c in slow.items())
     assert half[100.0].peak == pytest.approx(slow[100.0].peak, rel=0.08)
