@@ -27,6 +27,8 @@ _WORDS = {
     g.FACE: "element-face",
     g.JOINT: "face-joint",
     **{kind: kind for kind in g.BOLTS},
+    g.FLOW_NODE: "node",
+    g.CHANNEL: "face-joint",
 }
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
 from hpcdem.api.program import HELP, carried_out, place
 from hpcdem.commands import fdem
+from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.bindings import BINDINGS, Call
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
@@ -32,7 +33,7 @@ Number = float | str | FunctionName
 """Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
-OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{kind: kind for kind in g.BOLTS}}
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{k: k for k in (*g.BOLTS, *g.FLOW)}}
 """What histories call them."""
 
 
@@ -443,8 +444,20 @@ class Nodes(Objects):
         given = {"type": (type,) if along is None else (type, along)}
         self._carry_out("boundary", given, where, "mechanical-move-boundary-constraint")
 
+    def fluid(
+        self,
+        *,
+        pressure: Number | None = None,
+        flow_surface: Number | None = None,
+        flow_rate: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """One of them at flow nodes: pressure [Pa], level of a free surface [m], rate that comes in at each [m2/s]."""
+        given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
+        self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
+
     def remove_boundary(self, *, where: Where = None) -> None:
-        """Take boundary conditions back."""
+        """Take boundary conditions back, those of fluid too."""
         self._carry_out("boundary remove", {}, where)
 
     def initial_velocity(self, velocity: Point, *, where: Where = None) -> None:
@@ -520,6 +533,33 @@ class BoltNodes(Objects):
     def remove_boundary(self, *, where: Where = None) -> None:
         """Take back what was prescribed."""
         self._carry_out("boundary remove", {}, where)
+
+
+@commands
+class FlowNodes(Objects):
+    """Nodes at which a channel ends, with numbers and groups of nodes: `sim.flow_nodes["pressure"]`, see `Objects`."""
+
+    _word, kind, pcdc = "flow_nodes", g.FLOW_NODE, "flow-node"
+
+    def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
+        """They have the groups of nodes: `sim.nodes.group`."""
+        raise CommandError("flow nodes have the groups of nodes: sim.nodes.group")
+
+    def initial(self, *, pressure: float | None = None, saturation: float | None = None, where: Where = None) -> None:
+        """Fluid that they hold now: its pressure [Pa], or the part of their room that is filled. where: of nodes."""
+        chosen = chosen_by(where, g.NODE)
+        self._do("flow-node initial", {"pressure": pressure, "saturation": saturation}, chosen, g.NODE)
+
+
+@commands
+class Channels(Objects):
+    """Joints with a hydraulic model, with numbers and groups of joints: `sim.channels["aperture"]`, see `Objects`."""
+
+    _word, kind, pcdc = "channels", g.CHANNEL, "flow-channel"
+
+    def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
+        """They have the groups of joints: `sim.joints.group`."""
+        raise CommandError("channels have the groups of joints: sim.joints.group")
 
 
 @commands
@@ -605,9 +645,10 @@ class Histories(Words):
         variable: str | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element" or of the "model": of one (id, or
-        nearest to a point), or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many
-        steps. variable: with the value "law-state", which state variable of laws of the user."""
+        """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element", "flow-node", "flow-channel" or
+        of the "model": of one (id, or nearest to a point), or of those of a range or of all by how: "sum", "mean",
+        "minimum", "maximum"; every so many steps. variable: with the value "law-state", which state variable of laws of
+        the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
@@ -688,6 +729,8 @@ class BlockCommands:
     nodes: Nodes
     bolts: Bolts
     bolt_nodes: BoltNodes
+    flow_nodes: FlowNodes
+    channels: Channels
     tables: Tables
     fields: Fields
     histories: Histories
@@ -699,6 +742,7 @@ class BlockCommands:
         self.geometry, self.mesh = Geometry(do), Mesh(do)
         self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
         self.bolts, self.bolt_nodes = Bolts(do), BoltNodes(do)
+        self.flow_nodes, self.channels = FlowNodes(do), Channels(do)
         self.tables, self.fields = Tables(do), Fields(do)
         self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)
 
@@ -717,12 +761,16 @@ class BlockCommands:
         overlap: str | None = None,
         large_strain: bool | None = None,
         energy: bool | None = None,
+        mechanical: bool | None = None,
+        hydraulic: bool | None = None,
+        one_way: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
-        "refuse", "relax" or "keep"; rotations of elements; keep the energy budget."""
+        "refuse", "relax" or "keep"; rotations of elements; keep the energy budget; motion at all; flow of fluid, and
+        whether it does not push."""
         given = {
             "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
-            "energy": energy,
+            "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way,
         }  # fmt: skip
         self._blocks("model option", given)
 
@@ -733,10 +781,21 @@ class BlockCommands:
         auto: bool | None = None,
         safety: float | None = None,
         mass_scaling: float | None = None,
+        hydraulic: float | None = None,
     ) -> None:
-        """The time step of dynamic runs of blocks: given [s], estimated again and again, or reached by mass."""
-        given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling}
+        """The time step of dynamic runs of blocks: given [s], estimated again and again, or reached by mass;
+        hydraulic [s]: that of flow."""
+        given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling, "hydraulic": hydraulic}
         self._blocks("model time-step", given)
+
+    def sub_step(self, *, mechanical: int | None = None, hydraulic: int | None = None) -> None:
+        """Steps of the blocks between two cycles of flow, and sub-steps of such a cycle (0: as many as are stable)."""
+        self._blocks("model sub-step", {"mechanical": mechanical, "hydraulic": hydraulic})
+
+    @property
+    def fluid(self) -> dict[str, float]:
+        """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
+        return fdem.queries.fluid(self._blocks.project())
 
     def creep(
         self,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hpcdem.physics.bolts.model import Bolts
+    from hpcdem.physics.flow.model import Flow
 
 
 def _bolts() -> type[Bolts]:
@@ -19,5 +20,11 @@ def _bolts() -> type[Bolts]:
     return Bolts
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts]]] = {"bolts": _bolts}
+def _fluid() -> type[Flow]:
+    from hpcdem.physics.flow.model import Flow
+
+    return Flow
+
+
+PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[Flow]]] = {"bolts": _bolts, "fluid": _fluid}
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         checkpoints,
         coupling,
         cracks,
+        flow,
         frames,
         geometry,
         histories,
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
     from hpcdem.commands.fdem.project import Project
 
 __all__ = [
-    "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "frames", "geometry", "histories",
-    "meshes", "queries", "settings", "steps", "summary",
+    "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "flow", "frames", "geometry",
+    "histories", "meshes", "queries", "settings", "steps", "summary",
 ]  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
+from hpcdem.physics.flow.model import Flow
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.cracks import TOLERANCE, edges_on
 
@@ -80,17 +81,26 @@ class _Objects:
             self.bolts = bolts
             self.numbers = np.arange(len(bolts) if kind == g.BOLT_NODE else len(bolts.first))
             return
+        some = None
+        if kind in g.FLOW:
+            flow = Flow.there(project.blocks)
+            if flow is None:
+                raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+            some, null_too = flow.numbers(kind), False
+            self.kind = kind = g.FLOW[kind]
         there = np.ones(len(mesh.cells), bool) if null_too else project.alive
         if kind == g.ELEMENT:
             self.numbers = np.flatnonzero(there)
         elif kind == g.NODE:
             corners = mesh.cells[there]
-            self.numbers = np.unique(corners[corners >= 0])
+            self.numbers = np.unique(corners[corners >= 0]) if some is None else some
         else:
             self.edges = edges = project.edges()
             if kind == g.JOINT:
                 sides = edges.faces[edges.inner]
                 self.sides = sides[there[sides // 4].all(axis=1)]
+                if some is not None:
+                    self.sides = self.sides[np.isin(self.sides[:, 0], some)]
                 self.numbers = self.sides[:, 0]
             else:
                 faces = np.sort(edges.faces[edges.faces >= 0])

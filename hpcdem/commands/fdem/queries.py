@@ -8,9 +8,11 @@ import numpy as np
 
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
-from hpcdem.physics.fdem.groups import BOLTS, Range
+from hpcdem.physics.fdem.groups import BOLTS, FLOW, Range
+from hpcdem.physics.flow.model import Flow
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
@@ -22,6 +24,8 @@ def values(project: Project, kind: str, name: str, where: Range | None = None) -
     """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
     if kind in BOLTS:
         return _of_bolts(project, kind, name, where)
+    if kind in FLOW:
+        return _of_flow(project, kind, name, where)
     return diagnostics.values(project.ready(use=False), name, everything(project, kind, where))
 
 
@@ -29,12 +33,27 @@ def total(project: Project, kind: str, name: str, where: Range | None = None) ->
     """Exact sum of a quantity; of nodes over all corners there. Collective."""
     if kind in BOLTS:
         return math.fsum(_of_bolts(project, kind, name, where).tolist())
+    if kind in FLOW:
+        return math.fsum(_of_flow(project, kind, name, where).tolist())
     return diagnostics.total(project.ready(use=False), name, everything(project, kind, where))
 
 
 def _of_bolts(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
     numbers = everything(project, kind, where)  # refuses where there are none
     return Bolts.of(project.ready(use=False)).values(kind, name, numbers)
+
+
+def _of_flow(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
+    numbers = everything(project, kind, where)  # refuses where there is none
+    return Flow.of(project.ready(use=False)).values(kind, name, numbers)
+
+
+def fluid(project: Project) -> dict[str, float]:
+    """The account of the fluid [m2], see `Flow.account`. Collective."""
+    found = Flow.there(project.ready(use=False))
+    if found is None:
+        raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
+    return found.account()
 
 
 def energies(project: Project) -> dict[str, float]:

@@ -13,6 +13,8 @@ from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE
+from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
+from hpcdem.physics.flow.model import Flow
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
@@ -39,13 +41,14 @@ UNITS = {
         "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
         "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
     },
-    **{kind: {name: unit for name, (unit, _) in of.items()} for kind, of in OF_BOLTS.items()},
+    **{kind: {name: unit for name, (unit, _) in of.items()} for kind, of in {**OF_BOLTS, **OF_FLOW}.items()},
     MODEL: {
         "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
         "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
         "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
         "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "energy_error": "J/m",
+        "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -58,6 +61,16 @@ def _of_joints(kind: int) -> Callable[[Any], float]:
 
 def _energy(name: str) -> Callable[[Any], float]:
     return lambda blocks: float(diagnostics.energies(blocks)[name])
+
+
+def _of_fluid(name: str) -> Callable[[Any], float]:
+    def measure(blocks: Blocks) -> float:
+        flow = Flow.there(blocks)
+        if flow is None:
+            return 0.0
+        return float(flow.time) if name == "time" else flow.account()[name]
+
+    return measure
 
 
 _OF_MODEL: dict[str, Callable[[Any], float]] = {
@@ -81,6 +94,10 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "disc_work": _energy("work_discs"),
     "bolt_work": _energy("work_bolts"),
     "energy_error": _energy("closing"),
+    "flow_time": _of_fluid("time"),
+    "fluid_given": _of_fluid("given"),
+    "fluid_stored": _of_fluid("stored"),
+    "fluid_leaked": _of_fluid("leaked"),
 }
 _OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
     "": lambda values: values[0], "sum": lambda values: math.fsum(values.tolist()),
@@ -153,6 +170,10 @@ class History:
         if self.kind in OF_BOLTS:
             values = Bolts.of(blocks).values(self.kind, self.value, np.array(self.numbers, np.int64))
             return float(_OF_SEVERAL[self.how](values))
+        if self.kind in OF_FLOW:
+            values = Flow.of(blocks).values(self.kind, self.value, np.array(self.numbers, np.int64))
+            values = values[~np.isnan(values)] if self.how else values
+            return float(_OF_SEVERAL[self.how](values)) if len(values) else math.nan
         return self._probe_of(blocks).reduced(self.how)
 
 

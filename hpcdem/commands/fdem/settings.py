@@ -29,9 +29,16 @@ def option(
     large_strain: bool | None = None,
     overlap: str | None = None,
     energy: bool | None = None,
+    mechanical: bool | None = None,
+    hydraulic: bool | None = None,
+    one_way: bool | None = None,
 ) -> None:
     """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on."""
+    energy: keep the energy budget from here on; mechanical, hydraulic, one_way: see `Blocks.parts`."""
+    if mechanical is False:
+        coupling.refuse(project, "model option mechanical off")
+    if (mechanical, hydraulic, one_way) != (None, None, None):
+        project.blocks.parts(mechanical=mechanical, hydraulic=hydraulic, one_way=one_way)
     if dynamic is not None:
         project.dynamic = dynamic
     if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
@@ -49,8 +56,13 @@ def time_step(
     auto: bool | None = None,
     safety: float | None = None,
     mass_scaling: float | None = None,
+    hydraulic: float | None = None,
 ) -> None:
-    """The time step of dynamic runs [s]; see `Blocks.time_step`."""
+    """The time step of dynamic runs [s]; see `Blocks.time_step`. hydraulic: of flow, see `Blocks.flow_clock`."""
+    if hydraulic is not None:
+        project.blocks.flow_clock(dt=hydraulic)
+    if (value, auto, safety, mass_scaling) == (None, None, None, None):
+        return
     project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)
     if value or mass_scaling or auto is not None:
         project.adapts = bool(auto)

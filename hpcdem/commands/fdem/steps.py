@@ -77,6 +77,8 @@ def solve(
         words = [f"ratio {ratio:g}"]
     if time is not None and not project.dynamic:
         _check_creep(project, time, cycles)
+    if ratio is not None and not project.blocks.options.mechanical:
+        raise CommandError("without mechanics there are no unbalanced forces: model solve takes cycles or time")
     first = project.step if project.progress is None else project.progress["first"]
     text = ""
     try:
@@ -99,6 +101,8 @@ def solve_elastic(
     much creep time [s] passes, each creep step at once."""
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
+    if not project.blocks.options.mechanical:
+        raise CommandError("model solve elastic moves the blocks: model option mechanical on comes first")
     blocks = project.ready()
     given = {} if ratio is None else {"ratio": ratio}
     if time is not None:
@@ -421,6 +425,8 @@ class _Report:
         time = f" | t {clock.time:.6g} s, dt {clock.dt:.4g} s" if self.project.dynamic else ""
         if blocks.creep.on:
             time += f" | creep time {blocks.creep.time:.6g} s"
+        if not blocks.options.mechanical:
+            return f"step {clock.step}{time}{joints}"
         return f"step {clock.step}{time} | ratio {diagnostics.unbalanced_ratio(blocks):.3g}{joints}"
 
     def finish(self, blocks: Blocks) -> None:

@@ -11,6 +11,7 @@ from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.flow.model import Flow
 
 ENERGY_WORDS = {
     "kinetic": "stored: motion",
@@ -41,6 +42,14 @@ BOLT_WORDS = {
     "closing": "closing error",
 }
 """The same of the account of bolts."""
+FLUID_WORDS = {
+    "given": "given by conditions and at the beginning",
+    "stored": "in the channels",
+    "leaked": "leaked into the rock",
+    "removed": "gone with channels that were taken away",
+    "closing": "closing error",
+}
+"""The same of the account of the fluid, volumes at its density without pressure."""
 ACROSS_WORDS = {
     "work_on_particles": "work on particles",
     "work_on_blocks": "work on blocks",
@@ -70,6 +79,10 @@ def close(project: Project, figure: bool = True) -> None:
         if bolts is not None:
             found = bolts.energies()
             log.table("energy of bolts", ("energy", "J/m"), [(BOLT_WORDS[k], f"{found[k]:.6g}") for k in BOLT_WORDS])
+    flow = Flow.there(blocks)
+    if flow is not None:
+        found = flow.account()
+        log.table("fluid", ("volume", "m2"), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
     _tell_both(project)
     if figure:
         path = last_figure(project)

@@ -9,6 +9,7 @@ from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
+from hpcdem.lang.pcdc.table import FLOW_CONDITION, POROUS
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -169,6 +170,9 @@ def _face_model(call: Call) -> None:
 
 
 def _joint_model(call: Call) -> None:
+    if trial.MODELS[call["model"]] is POROUS.of:
+        fdem.flow.model(call.project, call.properties(), call.where)
+        return
     properties = {name: value for name, value in call.properties().items() if name != "np"}
     fdem.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
 
@@ -191,6 +195,13 @@ def _node_condition(call: Call) -> None:
         case "mechanical-move-boundary-constraint":
             kind, *along = given["type"]
             commands.move(call.project, kind, along[0] if along else (0.0, 0.0), call.where)
+        case FLOW_CONDITION.keyword.name:
+            fdem.flow.condition(call.project, **given, where=call.where)
+
+
+def _free_nodes(call: Call) -> None:
+    fdem.assignments.remove_node_conditions(call.project, call.where)
+    fdem.flow.remove_conditions(call.project, call.where)
 
 
 def _short(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -264,6 +275,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
     "model option": lambda c: fdem.settings.option(c.project, **c.given()),
     "model time-step": lambda c: fdem.settings.time_step(c.project, **c.given()),
+    "model sub-step": lambda c: fdem.flow.sub_step(c.project, **c.given()),
     "model creep": lambda c: fdem.settings.creep(c.project, **c.given()),
     "model step": lambda c: fdem.steps.step(c.project, c["steps"]),
     "model solve": _solve,
@@ -305,10 +317,11 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
     "node function": lambda c: fdem.assignments.load_function(c.project, c["function"]),
-    "node boundary remove": lambda c: fdem.assignments.remove_node_conditions(c.project, c.where),
+    "node boundary remove": _free_nodes,
     "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),
     "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
+    "flow-node initial": lambda c: fdem.flow.initial(c.project, **c.given(), where=c.where),
     "bolt create polyline": _bolt,
     "bolt c-model": lambda c: fdem.bolts.model(c.project, c.properties(), c.where),
     "bolt-element group": _group(g.BOLT_ELEMENT),

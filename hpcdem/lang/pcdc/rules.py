@@ -46,6 +46,11 @@ def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None)
         raise ValueError("segments and length exclude each other: both say where a bolt is divided")
 
 
+def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if len(arguments) > 1:
+        raise ValueError("pressure and saturation exclude each other: below full saturation there is no pressure")
+
+
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if ("values" in arguments) == ("y" in arguments):
         raise ValueError("a curve has either y, the name of a history, or values")
@@ -105,6 +110,7 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 _RULES = {
     "bolt create polyline": _bolt,
     "field create": _field,
+    "flow-node initial": _fluid,
     "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,

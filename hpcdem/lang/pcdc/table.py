@@ -43,9 +43,9 @@ from hpcdem.lang.pcdc.kinds import (
 )  # fmt: skip
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
+from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
 
 THREE_D = "this version computes in two dimensions"
-FLOW = "fluid in fractures comes later; this version computes mechanics"
 HEAT = "heat comes later; this version computes mechanics"
 PROPPANT = "proppant comes later; this version computes mechanics"
 
@@ -280,11 +280,17 @@ STRESS = Model(
             "given beside it enters as a wave of half its size")),
     any_of=True, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
+FLOW_CONDITION = Model(
+    "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
+    "Fluid at nodes, one of the three at each; times of tables are those of flow.",
+    (Option("p{ressure}", (TABLED,), "pressure, not negative", "Pa"),
+     Option("f{low}-s{urface}", (TABLED,), "level of water that stands at the nodes, against gravity: hydrostatic "
+            "pressure below it; above it water can leave (seepage)", "m"),
+     Option("f{low}-r{ate}", (TABLED,), "volume that comes in at each node; negative: is taken out, as far as there is "
+            "fluid", "m2/s")),
+    any_of=True, also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",),
+)  # fmt: skip
 _LATER_NODE = (
-    Model("hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11", "Fluid at nodes.",
-          (Option("p{ressure}", (FLOAT,), "", "Pa"), Option("f{low}-s{urface}", (FLOAT,), "", "m"),
-           Option("f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=FLOW,
-          also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",)),
     Model("therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes.",
           (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
     Model("therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of fluid.",
@@ -317,20 +323,26 @@ COHESIVE = Model(
      Option("np", (POINTS,), "integration points", "1", "3")),
     of=properties.COHESIVE,
 )  # fmt: skip
-_POROUS = (
-    Option("f{luid}-den{sity}", (POSITIVE,), "", "kg/m3"), Option("f{luid}-b{ulk}", (POSITIVE,), "", "Pa"),
-    Option("vis{cosity}", (POSITIVE,), "kinematic", "m2/s"),
-    Option("a{perature}-i{nitial}", (NOT_NEGATIVE,), "", "m", also=("a{perture}-i{nitial}",)),
-    Option("a{perature}-min{umum}", (NOT_NEGATIVE,), "", "m",
-           also=("a{perature}-min{imum}", "a{perture}-min{imum}", "a{perture}-min{umum}")),
-    Option("a{perature}-max{imum}", (NOT_NEGATIVE,), "", "m", also=("a{perture}-max{imum}",)),
-    Option("leak-off", (BOOL,), ""), Option("m{atrix}-p{ore}-p{ressure}", (FLOAT,), "", "Pa"),
-    Option("m{atrix}-p{ermeability}", (NOT_NEGATIVE,), "", "m2"),
-    Option("m{atrix}-p{orosity}-c{ompressibility}", (NOT_NEGATIVE,), "", "1/Pa"),
-    Option("m{atrix}-p{orosity}", (NOT_NEGATIVE,), "", "1"),
+_APERTURES = {
+    "aperature-initial": ("a{perture}-i{nitial}",), "aperature-maximum": ("a{perture}-max{imum}",),
+    "aperature-minumum": ("a{perature}-min{imum}", "a{perture}-min{imum}", "a{perture}-min{umum}"),
+}  # fmt: skip
+_POROUS = tuple(
+    replace(o, values=(BOOL,), unit="", default="off") if o.name == "leak-off" else o for o in declared(
+        POROUS_PROPERTIES, "f{luid}-den{sity}", "f{luid}-b{ulk}", "vis{cosity}", "a{perature}-i{nitial}",
+        "a{perature}-min{umum}", "a{perature}-max{imum}", "leak-off", "m{atrix}-p{ore}-p{ressure}",
+        "m{atrix}-p{ermeability}", "m{atrix}-p{orosity}-c{ompressibility}", "m{atrix}-p{orosity}", also=_APERTURES,
+        uniform=True,
+    )
+)  # fmt: skip
+POROUS = Model(
+    "hydr{aulic}-p{orous}-m{edium}", "10",
+    "Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial plus "
+    "its mean opening, within the limits. It acts beside the cohesive model of the joint. Given again, fluid that has "
+    "no room any more is gone, and new room is dry.",
+    _POROUS, of=POROUS_PROPERTIES,
 )  # fmt: skip
 _LATER_JOINT = (
-    Model("hydr{aulic}-p{orous}-m{edium}", "10", "Fluid in joints.", _POROUS, later=FLOW),
     Model("t{hermal}-f{luid}", "13", "Heat in the fluid of joints.", _HEAT_OF, later=HEAT),
     Model("hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17", "Fluid with proppant in joints.",
           (*_POROUS, Option("p{roppant}-den{sity}", (POSITIVE,), "", "kg/m3"),
@@ -417,16 +429,19 @@ RECORDED = {
         "reaction-y": "N", "host": "1", "distance": "m",
     },
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
+    "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s"},
+    "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s"},
     "model": {
         "time": "s", "creep-time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1",
         "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
         "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
         "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "energy-error": "J/m",
+        "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
-_RECORDED = choice(*(name for of in RECORDED.values() for name in of))
+_RECORDED = choice(*dict.fromkeys(name for of in RECORDED.values() for name in of))
 _EVERY = Option("ev{ery}", (COUNT,), "steps between two records", "", "1")
 
 
@@ -475,12 +490,14 @@ _MODEL = (
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
                        default="refuse"),
-                Option("mech{anical}", (BOOL,), "", later="motion and stress are always computed in this version"),
+                Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid flows",
+                       default="on"),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off"),
-                Option("hyd{raulic}", (BOOL,), "", later=FLOW), Option("therm{al}", (BOOL,), "", later=HEAT),
-                Option("prop{pant}", (BOOL,), "", later=PROPPANT), Option("one-way", (BOOL,), "", later=FLOW)),
+                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
+                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
+                Option("therm{al}", (BOOL,), "", later=HEAT), Option("prop{pant}", (BOOL,), "", later=PROPPANT)),
             needs_option=True, manual=True),
     Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
             "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
@@ -494,7 +511,10 @@ _MODEL = (
                        "1", "0.8"),
                 Option("mass-s{caling}", (NOT_NEGATIVE,), "nodes get as much mass as this time step needs; 0: none, "
                        "and the step is estimated again", "s"),
-                Option("hyd{raulic}", (POSITIVE,), "", later=FLOW), Option("therm{al}", (POSITIVE,), "", later=HEAT)),
+                Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
+                       "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
+                       "s", "0"),
+                Option("therm{al}", (POSITIVE,), "", later=HEAT)),
             needs_option=True, manual=True),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
@@ -523,7 +543,12 @@ _MODEL = (
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic: SciPy on one rank, the same "
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
                             "unknowns on", default="auto"))),
-    Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
+    Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
+            ("pcdc model sub-step mechanical 10 hydraulic 5",),
+            options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow", default="1"),
+                     Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
+                            default="0")),
+            needs_option=True),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",
@@ -702,8 +727,10 @@ _OBJECTS = (
             ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face"),
     _group_command("face-joint", "face-j{oint}"),
     Command("face-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
-            ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",),
-            models=(COHESIVE, *_LATER_JOINT), ranged="face-joint"),
+            ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
+             "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
+             "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
+            models=(COHESIVE, POROUS, *_LATER_JOINT), ranged="face-joint"),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'"),
@@ -715,8 +742,9 @@ _OBJECTS = (
     Command("node bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
              "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
-             "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1"),
-            models=(VELOCITY, FORCE, MOVE, *_LATER_NODE), ranged="node"),
+             "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1",
+             "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'"),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, *_LATER_NODE), ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
@@ -728,7 +756,12 @@ _OBJECTS = (
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True),
-    Command("flow-n{ode}", "", later=FLOW),
+    Command("flow-n{ode} init{ial}", "Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold "
+            "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
+                                               "pcdc flow-node initial pressure 1e6 range x 0 1"),
+            options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
+                     Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1")),
+            ranged="node", needs_option=True),
     Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
             "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
             "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "

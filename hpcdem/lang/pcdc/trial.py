@@ -13,8 +13,10 @@ from hpcdem.lang.pcdc.table import (
     BURGERS,
     COHESIVE,
     CONTACT,
+    FLOW_CONDITION,
     ISO_ELASTIC,
     MOHR_COULOMB,
+    POROUS,
     USER,
     Command,
 )
@@ -24,7 +26,7 @@ from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, POROUS)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -94,6 +96,8 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
         for axis in "xy":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
+    elif name == FLOW_CONDITION.keyword.name and len(arguments) > 1:
+        raise CommandError(f"{' and '.join(arguments)} exclude each other: a flow node has one of them")
 
 
 def _changes(model: properties.Model, given: dict[str, Any]) -> None:
@@ -109,7 +113,10 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
-    if model is BOLT.of and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys():
+    if (
+        model in (BOLT.of, POROUS.of)
+        and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
+    ):
         model.complete(given)
     if model is properties.COHESIVE:
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):

@@ -15,7 +15,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.physics.fdem import groups as g
 
-KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE, **{kind: kind for kind in g.BOLTS}}
+KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE, **{k: k for k in (*g.BOLTS, *g.FLOW)}}
 _VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}
 
 
@@ -61,6 +61,11 @@ class Model:
         """Unbalanced over all forces of the nodes."""
         return self._look(lambda: float(fdem.queries.ratio(self._project)))
 
+    @property
+    def fluid(self) -> dict[str, float]:
+        """The account of the fluid [m2]: given, stored, leaked, removed, closing, relative."""
+        return self._look(lambda: fdem.queries.fluid(self._project))
+
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
         return View(self, "node", number)
@@ -75,9 +80,9 @@ class Model:
         return View(self, "joint", number)
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
-        """Numbers of the elements, nodes, joints, faces, bolt-elements or bolt-nodes that are there: of a group
-        (group=, set=), of a layer
-        (geometry=), or x=(from, to), y= in the mesh; with present=True by where they are now."""
+        """Numbers of the elements, nodes, joints, faces, bolt-elements, bolt-nodes, flow-nodes or flow-channels that
+        are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y= in the mesh; with present=True
+        by where they are now."""
         return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:

@@ -74,7 +74,9 @@ class Traction:
 @dataclass(frozen=True)
 class Options:
     """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`."""
+    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
+    one_way: fluid does not push; flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps
+    (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable one)."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -86,6 +88,12 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    mechanical: bool = True
+    hydraulic: bool = True
+    one_way: bool = False
+    flow_every: int = 1
+    flow_steps: int = 0
+    flow_dt: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -707,6 +715,26 @@ class ModelDefinition:
         changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
         if overlap is not None:
             changes["overlap"] = overlap
+        self._set(**changes)
+
+    def parts(self, mechanical: bool | None = None, hydraulic: bool | None = None, one_way: bool | None = None) -> None:
+        """What is computed: motion of the blocks (on), flow (on); one_way (off): fluid does not push on blocks."""
+        given = {"mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way}
+        self._set(**{name: bool(value) for name, value in given.items() if value is not None})
+
+    def flow_clock(self, every: int | None = None, steps: int | None = None, dt: float | None = None) -> None:
+        """every: steps of the blocks between two cycles of flow; steps: sub-steps of a cycle, 0: as many as are needed;
+        dt [s]: of a sub-step, 0: the time in which the blocks move, or without motion a stable one."""
+        changes: dict[str, Any] = {}
+        for name, number, least in (("flow_every", every, 1), ("flow_steps", steps, 0)):
+            if number is not None:
+                if number < least:
+                    raise CommandError(f"a number of sub-steps must be at least {least}, got {number}")
+                changes[name] = int(number)
+        if dt is not None:
+            changes["flow_dt"] = float(finite("a time step", [dt])[0])
+            if changes["flow_dt"] < 0.0:
+                raise CommandError(f"a time step must not be negative, got {dt:g}")
         self._set(**changes)
 
     def time_step(

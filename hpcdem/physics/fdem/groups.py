@@ -16,6 +16,9 @@ from hpcdem.core.errors import CommandError
 ELEMENT, NODE, FACE, JOINT = "element", "node", "element-face", "face-joint"
 BOLT_ELEMENT, BOLT_NODE = "bolt-element", "bolt-node"
 BOLTS = (BOLT_ELEMENT, BOLT_NODE)
+FLOW_NODE, CHANNEL = "flow-node", "flow-channel"
+FLOW = {FLOW_NODE: NODE, CHANNEL: JOINT}
+"""They have the numbers, groups and places of nodes and joints."""
 KINDS = (ELEMENT, NODE, FACE, JOINT, *BOLTS)
 DEFAULT = "default"
 """The set of groups that name none."""

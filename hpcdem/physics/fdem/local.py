@@ -495,7 +495,7 @@ class Local:
         triangles = self.triangle_rows[: self.count]
         self.mass = self.true_mass.copy()
         own = sim.owned
-        if not o.dynamic:
+        if not o.dynamic or not o.mechanical:
             limits.static_masses(
                 self.stiff, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip

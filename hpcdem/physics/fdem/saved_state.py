@@ -20,6 +20,7 @@ from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.histories import WORDS, Histories
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.state import Crack, Creep
+from hpcdem.physics.fdem.surface_loads import SHARED_OUT
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -87,6 +88,7 @@ def tables(sim: Blocks) -> dict[str, Table]:
         born_at = sim.birthplace.reshape(-1, 8)
         tables["born"] = _whole({"number": sim.born, **{f"p{k}": born_at[:, k] for k in range(8)}}, root)
     tables |= {name: _whole(of, root) for name, of in sim.surface_loads.saved_tables().items()}
+    tables |= {name: to_slabs(sim.comm, ("number",), of) for name, of in sim.surface_loads.saved_rows().items()}
     own = sim.owned
     number, x, v = sim.number[own], sim.x[own], sim.v[own]
     columns: dict[str, np.ndarray] = {"number": number.copy()}
@@ -133,7 +135,9 @@ def restore_part(sim: Blocks, path: Path | str) -> dict[str, Any] | None:
 
 def _replicated(table: str) -> bool:
     """Whether all ranks have all of this table: what is said about the model, see definition.py."""
-    return table not in ("state", "memories", checkpoint.LINKS) and not table.startswith(checkpoint.OF_PARTICLES)
+    return table not in ("state", "memories", checkpoint.LINKS, *SHARED_OUT) and not table.startswith(
+        checkpoint.OF_PARTICLES
+    )
 
 
 def without_particles(tables: checkpoint.Tables) -> checkpoint.Tables:

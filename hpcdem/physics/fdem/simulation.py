@@ -206,6 +206,8 @@ class Blocks(State):
         """
         self.close_model()
         self.check_start()
+        if not self.options.mechanical:
+            return self._standing_step()
         self.untouched = False
         timers, halo, rebuild_state, request = self.timers, self.halo, self.rebuild_state, 0
         budget = self.budget if self.options.dynamic else None
@@ -247,12 +249,41 @@ class Blocks(State):
                 self.open_model()
         return request
 
+    def _standing_step(self) -> int:
+        """A step of everything but the motion: time passes, blocks stand still."""
+        self.clock.step += 1
+        self.clock.time += self.clock.dt
+        self.surface_loads.follow()
+        if self.clock.step % LONGEST_WAIT or self.stop is None:
+            return 0
+        return int(self.comm.max_into(np.array([self.stop.local_request()], np.int64))[0])
+
     def check_start(self) -> None:
         """CommandError if a load lacks something, or nothing has moved yet and bodies overlap, unless that was asked
         for; the model is closed. Collective."""
+        self._check_parts()
         self.surface_loads.check_start()
-        if self.untouched:
+        if self.untouched and self.options.mechanical:
             overlaps.check(self, self.local)
+
+    def _check_parts(self) -> None:
+        """CommandError for what was said of parts of the calculation that are not there."""
+        o = self.options
+        flows = o.hydraulic and "fluid" in self.surface_loads
+        if not o.mechanical:
+            if not flows:
+                raise CommandError("nothing would happen: model option mechanical is off, and no fluid flows")
+            if not o.dynamic:
+                raise CommandError("without mechanics time passes by flow: model option dynamic on comes first")
+            if self.creep.on:
+                raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
+        said = {"one-way": o.one_way, "sub-step": (o.flow_every, o.flow_steps) != (1, 0), "time-step": o.flow_dt > 0.0}
+        lost = [name for name, is_so in said.items() if is_so]
+        if lost and "fluid" not in self.surface_loads:
+            raise CommandError(
+                f"{lost[0]} of flow was said, but no joint has a hydraulic model: face-joint c-model "
+                "hydraulic-porous-medium"
+            )
 
     def _drift(self, first: int, last: int) -> None:
         """Move the owned elements first : last by dt."""
@@ -435,6 +466,7 @@ class Blocks(State):
             joints = np.array([row[0] for row in rows])
             self.broken[joints] = 1
             self.open_faces(joints)
+            self.surface_loads.joints_opened()
 
     def close_again(self) -> None:
         """Close a restored model: its rebuild_state stays as it was."""
@@ -470,7 +502,7 @@ class Blocks(State):
                 self._warn_of_snap_back()
             middle = np.empty((len(self.number), 2))
             radius = build.middles(self.x, mesh.cells, self.number, middle)
-            self._choose_reach(radius, frozen)
+            self._choose_reach(radius, 0.0 if frozen else self.surface_loads.reach(self, middle), frozen)
         middle = self._share_out(middle)
         with self.timers("neighbour"):
             cell = keys(middle, self.rebuild_state.side)
@@ -516,15 +548,15 @@ class Blocks(State):
         self.unused = np.full(len(lead), -1, np.int64)
         self._topology_stale = False
 
-    def _choose_reach(self, radius: float, frozen: bool) -> None:
-        """Buffer and cell side for the next lists, from global values only."""
+    def _choose_reach(self, radius: float, of_loads: float, frozen: bool) -> None:
+        """Buffer and cell side for the next lists, from global values only; of_loads: see `SurfaceLoad.reach`."""
         rebuild_state = self.rebuild_state
         radius = float(self.comm.max_into(np.array([radius]))[0])
         if frozen:
             return
         rebuild_state.skin = self._skin()
         room = ROOM * self.mean_edge if self.options.collision else 0.0
-        needed = max(2.0 * radius, self._longest) * (1.0 + 1e-9) + room
+        needed = max(2.0 * radius, self._longest, of_loads) * (1.0 + 1e-9) + room
         if not needed <= rebuild_state.side <= 1.2 * needed:
             rebuild_state.side = 1.05 * needed
 

@@ -13,6 +13,8 @@ from hpcdem.core.errors import CommandError
 
 ORDER = ("discs", "fluid", "heat", "bolts")
 """In which they are added up, whoever came first: sums keep their bits."""
+SHARED_OUT = ("flow_nodes",)
+"""Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""
 
 
 class SurfaceLoad(ABC):
@@ -40,6 +42,14 @@ class SurfaceLoad(ABC):
     def springs(self, blocks: Any) -> np.ndarray | None:
         """(n_own, 4) stiffness [N/m per m] that it brings to corners of owned elements, for masses and time step."""
         return None
+
+    def reach(self, blocks: Any, middle: np.ndarray) -> float:
+        """Largest distance of elements that must be held by one rank because of it [m]; the model is open, middle
+        (n, 2): of the owned elements. Collective."""
+        return 0.0
+
+    def joints_opened(self) -> None:  # noqa: B027 - most have nothing to do here
+        """Joints broke since the last lists: all ranks know. Not collective."""
 
     def check_start(self) -> None:  # noqa: B027 - most have nothing to do here
         """CommandError if no step can be done with it. Not collective."""
@@ -72,6 +82,11 @@ class SurfaceLoad(ABC):
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Columns that a checkpoint holds of it, by the name of their table; equal on all ranks."""
+        return {}
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        """The same of what is shared out: this rank's rows, with their "number". Names of these tables are in
+        `SHARED_OUT`."""
         return {}
 
 
@@ -128,6 +143,15 @@ class SurfaceLoads:
             if found is not None:
                 out += found
 
+    def reach(self, blocks: Any, middle: np.ndarray) -> float:
+        """Largest distance of elements that must be held by one rank because of them [m]. Collective."""
+        return max((load.reach(blocks, middle) for load in self._loads), default=0.0)
+
+    def joints_opened(self) -> None:
+        """Joints broke since the last lists. Not collective."""
+        for load in self._loads:
+            load.joints_opened()
+
     def check_start(self) -> None:
         """CommandError if no step can be done with them. Not collective."""
         for load in self._loads:
@@ -160,3 +184,7 @@ class SurfaceLoads:
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
         """Columns that a checkpoint holds of them, by the name of their table; equal on all ranks."""
         return {name: columns for load in self._loads for name, columns in load.saved_tables().items()}
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        """The same of what is shared out among the ranks."""
+        return {name: columns for load in self._loads for name, columns in load.saved_rows().items()}

@@ -1,0 +1,74 @@
+"""Fluid in fractures: channels, what is prescribed at flow nodes, how they begin, and their clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import JOINT, NODE, Range
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.model import Flow
+
+Number = float | str
+"""A number, or the name of a table of time."""
+_DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
+
+
+def model(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+    """Joints become channels with these properties (physics.flow.properties)."""
+    if project.coupled is not None:
+        raise CommandError("blocks that are coupled to particles have no fluid in their joints in this version")
+    joints = chosen(project, JOINT, where)
+    blocks = project.ready()
+    known = Flow.there(blocks)
+    flow = Flow.of(blocks)
+    try:
+        flow.assign(joints, properties)
+    except CommandError:
+        if known is None:
+            blocks.surface_loads.remove(flow)
+        raise
+
+
+def _flow(project: Project) -> Flow:
+    found = Flow.there(project.ready())
+    if found is None:
+        raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+    return found
+
+
+def condition(
+    project: Project,
+    pressure: Number | None = None,
+    flow_surface: Number | None = None,
+    flow_rate: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Pressure [Pa], level of a free surface [m] or rate [m2/s, of each node] at flow nodes; the last one holds."""
+    given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
+    said = {name: value for name, value in given.items() if value is not None}
+    if len(said) != 1:
+        raise CommandError(f"a flow node has one of {', '.join(given)}, got {' and '.join(said) or 'none'}")
+    name, value = said.popitem()
+    _flow(project).prescribe(chosen(project, NODE, where), _DOES[name], value)
+
+
+def remove_conditions(project: Project, where: Range | None = None) -> None:
+    """Nothing is prescribed at flow nodes any more; without fluid there is nothing to do."""
+    found = Flow.there(project.ready())
+    if found is not None:
+        found.remove_conditions(chosen(project, NODE, where))
+
+
+def initial(
+    project: Project, pressure: float | None = None, saturation: float | None = None, where: Range | None = None
+) -> None:
+    """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled."""
+    _flow(project).fill(chosen(project, NODE, where), pressure, saturation)
+
+
+def sub_step(project: Project, mechanical: int | None = None, hydraulic: int | None = None) -> None:
+    """Steps of the blocks between two cycles of flow, and sub-steps of such a cycle."""
+    project.blocks.flow_clock(every=mechanical, steps=hydraulic)

@@ -1,0 +1,197 @@
+"""The arithmetic of flow in channels: apertures, flows, volumes and pressures of nodes, loads on faces.
+
+Node state (n, 3): pressure [Pa], saturation, and potential energy of the fluid per volume by its height, -rho g . x
+[Pa]. Flows are those of the manual, 7.5.1, with its slips corrected; nodes keep the volume of their fluid at reference
+density W, so that what flows out of one flows into another: p = K (W / V - 1), or s = W / V where that is below 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit, prange
+
+from hpcdem.physics.fdem.kernels import joints
+
+P, S, E = range(3)
+STATE = 3
+# Columns of the table of channel laws (rows, 6).
+INITIAL, LEAST, MOST, LEAK, PORE = range(5)
+LAW = 5
+# What is prescribed at nodes.
+FREE, PRESSURE, SURFACE, RATE = range(4)
+# Columns of the table of channels (m, 3) of `geometry`.
+APERTURE, CONDUCT, HALF = range(3)
+CHANNEL = 3
+# Columns of nodes (n, 7): fluid, room for it, and what came and went [m2]; by conditions in the last sub-step [m2/s].
+W, V, GIVEN, LEAKED, REMOVED, INFLOW = range(6)
+NODE = 6
+STEEPEST = 1.125
+"""Largest f(s) / s of `part`."""
+
+
+@njit(cache=True, error_model="numpy")
+def part(s):
+    """Part of the transmissivity at a saturation (81)."""
+    return s * s * (3.0 - 2.0 * s)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
+    x = x.reshape(x.size)
+    n = len(one)
+    for c in range(n * t // threads, n * (t + 1) // threads):
+        a, b, row = one[c], other[c], laws[law[c]]
+        _, _, h2, oa, _, ob, _ = joints.openings(x[a], x[a + 1], x[a + 2], x[a + 3], x[b], x[b + 1], x[b + 2], x[b + 3])
+        h = math.sqrt(h2)
+        delta = min(max(row[INITIAL] + 0.5 * (oa + ob) / h, row[LEAST]), row[MOST])
+        out[c, APERTURE] = delta
+        out[c, CONDUCT] = delta * delta * delta / (12.0 * viscosity * h)
+        out[c, HALF] = 0.5 * delta * h
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def geometry(threads, *args):
+    """Aperture [m] (79), conductance delta^3 / (12 mu L) [m2 / (Pa s)] and half of the volume [m2] of channels, out
+    (m, 3). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic [Pa s]."""
+    for t in range(threads):
+        _geometry(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def geometry_threaded(threads, one, other, law, laws, x, viscosity, out):
+    """The same on several threads."""
+    for t in prange(threads):
+        _geometry(t, threads, one, other, law, laws, x, viscosity, out)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def volumes(begin, channel, channels, nodes):
+    """Room for fluid of the owned nodes [m2]: halves of their channels."""
+    for i in range(len(nodes)):
+        v = 0.0
+        for m in range(begin[i], begin[i + 1]):
+            v += channels[channel[m], HALF]
+        nodes[i, V] = v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def longest_step(begin, channel, ends, channels, nodes, state, bulk):
+    """Half of what is stable [s]: the least V / (sum of conductances (K + rise of f |dE|)) of the owned nodes."""
+    least = math.inf
+    for i in range(len(nodes)):
+        k = 0.0
+        for m in range(begin[i], begin[i + 1]):
+            c = channel[m]
+            rise = abs(state[ends[c, 0], E] - state[ends[c, 1], E])
+            k += channels[c, CONDUCT] * (bulk + STEEPEST * rise)
+        if k > 0.0:
+            least = min(least, 0.5 * nodes[i, V] / k)
+    return least
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost):
+    n = len(ends)
+    for c in range(n * t // threads, n * (t + 1) // threads):
+        a, b = ends[c, 0], ends[c, 1]
+        head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E])
+        s = 0.5 * (state[a, S] + state[b, S])
+        up = state[a, S] if head > 0.0 else state[b, S]
+        q[c] = channels[c, CONDUCT] * part(min(s, up)) * head
+        if leaks:
+            row = laws[law[c]]
+            over = 0.5 * (state[a, P] + state[b, P]) - row[PORE]
+            if over > 0.0 and row[LEAK] > 0.0 and since[c] <= before:
+                length = 2.0 * channels[c, HALF] / channels[c, APERTURE]
+                roots = math.sqrt(after - since[c]) - math.sqrt(before - since[c])
+                lost[c] = 2.0 * part(s) * row[LEAK] * over * length * roots  # half of both walls, to each end
+            else:
+                lost[c] = 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flows(threads, *args):
+    """Flow q (m,) [m2/s] from the first to the last end of channels, and what each end loses to the rock in a sub-step
+    lost (m,) [m2], by the state of their ends (m, 2).
+
+    The saturation in `part` is the mean of both ends, at most that of the end that it flows from: dry nodes give
+    nothing away. since (m,) [s]: when leak-off began (inf: it has not); before, after: times of the sub-step.
+    """
+    for t in range(threads):
+        _flows(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def flows_threaded(threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost):
+    """The same on several threads."""
+    for t in prange(threads):
+        _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, state, q, lost)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state):
+    n = len(nodes)
+    for i in range(n * t // threads, n * (t + 1) // threads):
+        into = gone = 0.0
+        for m in range(begin[i], begin[i + 1]):
+            into += side[m] * q[channel[m]]
+            if leaks:
+                gone += lost[channel[m]]
+        w, v, more = nodes[i, W] + dt * into, nodes[i, V], 0.0
+        does, value = table[condition[i], 0], table[condition[i], 1]
+        if does == RATE:
+            more = max(dt * value, -max(w, 0.0))
+        elif does != FREE:
+            p = value - state[i, E] if does == SURFACE else value
+            if does == PRESSURE or p > 0.0:
+                more = v * (1.0 + p / bulk) - w
+            else:
+                more = min(v - w, 0.0)
+        w += more
+        nodes[i, GIVEN] += more
+        nodes[i, INFLOW] = more / dt
+        if leaks:
+            gone = min(gone, max(w, 0.0))
+            w -= gone
+            nodes[i, LEAKED] += gone
+        nodes[i, W] = w
+        if w >= v:
+            state[i, P], state[i, S] = bulk * ((w - v) / v), 1.0
+        else:
+            state[i, P], state[i, S] = 0.0, w / v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fill(threads, *args):
+    """A sub-step dt [s] of the owned nodes: their fluid, pressure and saturation after these flows.
+
+    begin (n + 1,), channel, side (k,): see network.at_nodes; condition (n,): row of the table (rows, 2) of what is
+    prescribed and its value: pressure [Pa]; energy of the surface [Pa]: hydrostatic below it, above it fluid can leave
+    (a seepage face); rate [m2/s], as far as there is fluid to take.
+    """
+    for t in range(threads):
+        _fill(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def fill_threaded(threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state):
+    """The same on several threads."""
+    for t in prange(threads):
+        _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table, bulk, nodes, state)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def loads(edge, ends, nodes, x, state, applied):
+    """Add the pressure on faces to what is applied to corners [N/m]: linear between the nodes (k, 2), L (2 p1 + p2) / 6
+    on the first. edge (k,): where faces begin in x; ends (k, 2): their corners in `applied` (flat)."""
+    x, applied = x.reshape(x.size), applied.reshape(applied.size)
+    for m in range(len(edge)):
+        a = edge[m]
+        nx, ny = x[a + 3] - x[a + 1], x[a] - x[a + 2]  # outward, as long as the face
+        p, q = state[nodes[m, 0], P], state[nodes[m, 1], P]
+        first, last = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0
+        applied[ends[m, 0]] -= first * nx
+        applied[ends[m, 0] + 1] -= first * ny
+        applied[ends[m, 1]] -= last * nx
+        applied[ends[m, 1] + 1] -= last * ny

@@ -1,0 +1,697 @@
+"""Fluid in fractures as a load on blocks: what is said of it, its clock and its step.
+
+What is said (channels, conditions) is known to all ranks by the numbers of the mesh. What moves is shared out: a flow
+node belongs to the rank that owns the first element around it, which sees both faces of all channels that end there;
+state of nodes at the other ends comes by messages from their owners. Sums at a node go by the numbers of channels, so
+the bits depend on neither ranks nor threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.halo.copies import Copies, moved
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem.connectivity import corner_counts, face_points
+from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.network import Network, at_nodes, wet_faces
+from hpcdem.physics.flow.properties import FLUID, POROUS
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+Number = float | str
+"""A number, or the name of a table over model time."""
+LOOK = 100
+"""Cycles of flow after which an estimated sub-step is estimated again."""
+SAFETY = 0.8
+"""Part of half the stability limit that an estimated sub-step may be when blocks move."""
+MANY = 100_000
+"""Sub-steps in a cycle that are too many to be meant."""
+_PROPERTIES = tuple(one.name for one in POROUS.properties)
+_COLUMNS = ("fluid", "volume", "given", "leaked", "removed", "inflow", "pressure", "saturation")
+"""Of nodes, as they are saved: kernels.W .. INFLOW, then P and S."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is prescribed at a flow node: kernels.FREE, PRESSURE [Pa], SURFACE (its height [m] against gravity) or RATE
+    [m2/s]."""
+
+    does: int = kernels.FREE
+    value: Number = 0.0
+
+
+NODE_QUANTITIES: dict[str, tuple[str, str]] = {
+    "pressure": ("Pa", "pressure of the fluid"),
+    "saturation": ("1", "part of the room that is filled"),
+    "fluid": ("m2", "volume of the fluid at its density without pressure"),
+    "volume": ("m2", "room for fluid: half of each channel"),
+    "inflow": ("m2/s", "fluid that a condition brings, in the last sub-step"),
+}
+CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
+    "pressure": ("Pa", "mean pressure of its ends"),
+    "saturation": ("1", "mean saturation of its ends"),
+    "aperture": ("m", "hydraulic aperture"),
+    "flow_rate": ("m2/s", "volume that flows along the lower face of the joint, from its first corner on"),
+    "velocity": ("m/s", "that over the aperture"),
+}
+QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
+"""What can be asked of flow nodes and channels: unit and meaning."""
+
+
+class Flow(SurfaceLoad):
+    """The fluid of a model of blocks. Methods are collective unless they say otherwise; CommandError, alike on all
+    ranks, for what makes no sense.
+
+    row (4 ne,): of the table of properties, by joint, 0: no channel; since (4 ne,): flow time at which leak-off began
+    [s], inf: it has not; condition (np,): row of the conditions. number (n,): flow nodes owned here, ascending;
+    nodes (n, kernels.NODE): what they hold; state (n + copies, kernels.STATE).
+    """
+
+    name: ClassVar[str] = "fluid"
+    of_mesh: ClassVar[bool] = True
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        mesh = blocks.the_mesh()
+        self.row = np.zeros(mesh.cells.size, np.int32)
+        self.since = np.full(mesh.cells.size, math.inf)
+        self.condition = np.zeros(len(mesh.points), np.int32)
+        self.rows: list[tuple[float, ...]] = []
+        self.conditions: list[Condition] = [Condition()]
+        self.number = np.empty(0, np.int64)
+        self.nodes = np.empty((0, kernels.NODE))
+        self.state = np.empty((0, kernels.STATE))
+        self.removed = dict.fromkeys(("given", "leaked", "removed"), 0.0)
+        """Accounts of nodes that are gone [m2]."""
+        self.time = blocks.clock.time
+        self.cycles = self.waited = self.sub_steps = 0
+        self.dt = 0.0
+        self._network: Network | None = None
+        self._reshaped = False
+        self._found_for: list[float] = []
+        self._copies: Copies | None = None
+        self._told: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def there(blocks: Blocks) -> Flow | None:
+        """That of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, Flow)), None)
+
+    @staticmethod
+    def of(blocks: Blocks) -> Flow:
+        """That of a model, made on the first call. Not collective."""
+        found = Flow.there(blocks)
+        if found is None:
+            found = Flow(blocks)
+            blocks.surface_loads.add(found)
+        return found
+
+    # ---- what is said --------------------------------------------------------------------------------------------
+
+    def assign(self, joints: np.ndarray | None, given: Mapping[str, float]) -> None:
+        """Joints (None: all) are channels with these properties. Fluid that has no room any more goes with it; new room
+        is dry."""
+        values = tuple(POROUS.complete(given).values())
+        blocks = self.blocks
+        at = blocks.numbers_of_joints(joints)
+        rows = self.rows if values in self.rows else [*self.rows, values]
+        row = self.row.copy()
+        row[at] = rows.index(values) + 1
+        used = {tuple(rows[r - 1][: len(FLUID)]) for r in np.unique(row[row > 0]).tolist()}
+        if len(used) > 1:
+            name, one, other = next(
+                (name, *sorted({fluid[k] for fluid in used})[:2]) for k, name in enumerate(FLUID)
+                if len({fluid[k] for fluid in used}) > 1
+            )  # fmt: skip
+            raise CommandError(f"there is one fluid in all channels, but {name} is {one:g} and {other:g}")
+        blocks.before_change()
+        self.rows, self.row, self._found_for = rows, row, []
+        self._network, self._reshaped = None, True
+        blocks.changed()
+
+    def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
+        """What holds at flow nodes among these points (None: all) from now on, see `Condition`."""
+        at = self._flow_nodes(nodes)
+        if isinstance(value, str):
+            if value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+            values = self.blocks.tables[value].values
+        else:
+            values = np.array([value], np.float64)
+        if not np.isfinite(values).all():
+            raise CommandError(f"a condition of a flow node must be finite, got {value}")
+        if does == kernels.PRESSURE and values.min() < 0.0:
+            raise CommandError(f"the pressure of a fluid must not be negative, got {values.min():g} Pa")
+        self.blocks.before_change()
+        wanted = Condition(does, value)
+        if wanted not in self.conditions:
+            self.conditions.append(wanted)
+        self.condition[at] = self.conditions.index(wanted)
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray | None) -> None:
+        """Take back what is prescribed at these points (None: all)."""
+        self.blocks.before_change()
+        self.condition[slice(None) if nodes is None else nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def fill(self, nodes: np.ndarray | None, pressure: float | None = None, saturation: float | None = None) -> None:
+        """Flow nodes among these points (None: all) hold fluid of this pressure [Pa], or fill this part of their
+        room."""
+        if (pressure is None) == (saturation is None):
+            raise CommandError("flow nodes begin with a pressure or with a saturation: one of them")
+        given = pressure if saturation is None else saturation
+        assert given is not None
+        if not math.isfinite(given) or given < 0.0 or (saturation is not None and saturation > 1.0):
+            what = "the pressure must not be negative" if saturation is None else "the saturation lies between 0 and 1"
+            raise CommandError(f"{what}, got {given:g}")
+        at = self._flow_nodes(nodes)
+        self.blocks.close_model()
+        mine = np.isin(self.number, at)
+        part = saturation if pressure is None else 1.0 + pressure / self.fluid("fluid_bulk")
+        w = self.nodes[mine, kernels.V] * part
+        self.nodes[mine, kernels.GIVEN] += w - self.nodes[mine, kernels.W]
+        self.nodes[mine, kernels.W] = w
+        self._find_state(mine)
+        self._refresh()
+
+    def _flow_nodes(self, points: np.ndarray | None) -> np.ndarray:
+        """Those of these points (None: all) that are flow nodes."""
+        there = self.network.there
+        if not len(self.network.channels):
+            raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+        asked = np.flatnonzero(there) if points is None else self.blocks.numbers_of_nodes(points)
+        found = asked[there[asked]]
+        if not len(found):
+            raise CommandError(f"no channel ends at node {asked[0]}" + " nor at the others" * (len(asked) > 1))
+        if len(found) < len(asked) and self.blocks.log is not None:
+            self.blocks.log.info(f"no channel ends at {len(asked) - len(found)} of the {len(asked)} nodes: left out")
+        return found
+
+    def uses_table(self, name: str) -> bool:
+        """Whether a node follows this table. Not collective."""
+        return any(self.conditions[row].value == name for row in np.unique(self.condition).tolist())
+
+    def fluid(self, name: str) -> float:
+        """A property of the fluid. Not collective."""
+        row = int(self.row[self.row > 0][0])
+        return self.rows[row - 1][_PROPERTIES.index(name)]
+
+    @property
+    def viscosity(self) -> float:
+        """Dynamic viscosity of the fluid [Pa s]: the kinematic one times the density (C-26). Not collective."""
+        return self.fluid("viscosity") * self.fluid("fluid_density")
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+
+    @property
+    def network(self) -> Network:
+        """Channels and flow nodes of all ranks. Not collective."""
+        if self._network is None:
+            blocks, mesh = self.blocks, self.blocks.the_mesh()
+            channels = np.flatnonzero((self.row > 0) & blocks.joint_exists())
+            self._network = Network.of(mesh.cells, len(mesh.points), channels)
+        return self._network
+
+    def numbers(self, kind: str) -> np.ndarray:
+        """Of all flow nodes or channels, ascending. Not collective."""
+        return self.network.nodes if kind == FLOW_NODE else self.network.channels
+
+    def owned_values(self, kind: str, names: list[str]) -> dict[str, np.ndarray]:
+        """Columns of this rank's flow nodes or channels (those whose first end it owns), with their "number"."""
+        self.blocks.close_model()
+        if kind == FLOW_NODE:
+            made = {
+                "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
+                "saturation": self.state[: len(self.number), kernels.S], "fluid": self.nodes[:, kernels.W],
+                "volume": self.nodes[:, kernels.V], "inflow": self.nodes[:, kernels.INFLOW],
+            }  # fmt: skip
+        else:
+            mine = self._ends[:, 0] < len(self.number)
+            ends, table = self._ends[mine], self._table[mine]
+            self._find_flows(0.0)
+            made = {
+                "number": self._channels[mine], "aperture": table[:, kernels.APERTURE], "flow_rate": self._q[mine],
+                "pressure": self.state[ends, kernels.P].mean(axis=1),
+                "saturation": self.state[ends, kernels.S].mean(axis=1),
+                "velocity": self._q[mine] / table[:, kernels.APERTURE],
+            }  # fmt: skip
+        return {name: made[name].copy() for name in ("number", *names)}
+
+    def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
+        """A quantity of `QUANTITIES` of flow nodes or channels (None: all), on all ranks; NaN where there is none."""
+        if name not in QUANTITIES[kind]:
+            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
+        mine = self.owned_values(kind, [name])
+        numbers = self.numbers(kind) if numbers is None else numbers
+        found = np.full(int(max(numbers.max(initial=-1), mine["number"].max(initial=-1))) + 1, math.nan)
+        found[mine["number"]] = mine[name]
+        bits, nothing = found[numbers].view(np.int64), np.array([math.nan]).view(np.int64)[0]
+        return (self.blocks.comm.sum_into(bits - nothing) + nothing).view(np.float64)
+
+    def account(self) -> dict[str, float]:
+        """Volumes of fluid at its density without pressure, since there are channels [m2]: given by conditions and at
+        the beginning, stored, leaked into the rock, removed with channels that were taken away; closing: what does not
+        add up, relative: that over the largest."""
+        self.blocks.close_model()
+        comm, nodes = self.blocks.comm, self.nodes
+        found = {"stored": exact_sum(nodes[:, kernels.W], comm)}
+        for name, column in (("given", kernels.GIVEN), ("leaked", kernels.LEAKED), ("removed", kernels.REMOVED)):
+            found[name] = exact_sum(np.append(nodes[:, column], self.removed[name] if comm.rank == 0 else 0.0), comm)
+        largest = max(map(abs, found.values()))
+        found["closing"] = found["given"] - found["stored"] - found["leaked"] - found["removed"]
+        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
+        return found
+
+    # ---- tables of this rank -------------------------------------------------------------------------------------
+
+    @property
+    def _on(self) -> bool:
+        return self.blocks.options.hydraulic and len(self.network.channels) > 0
+
+    @property
+    def _pushes(self) -> bool:
+        return self._on and not self.blocks.options.one_way
+
+    def _wet(self) -> np.ndarray:
+        """Faces of owned elements that fluid pushes on, ascending."""
+        blocks, cells = self.blocks, self.blocks.the_mesh().cells
+        number = np.sort(blocks.number[blocks.owned])
+        faces = (4 * number[:, None] + np.arange(4))[np.arange(4) < corner_counts(cells[number])[:, None]]
+        channel = np.zeros(cells.size, bool)
+        channel[self.network.channels] = True
+        return wet_faces(cells, blocks.partner, faces, blocks.closed_faces(), channel, self.network.there)
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        out = np.zeros((blocks.n_own, 4), bool)
+        if self._pushes:
+            cells, faces = blocks.the_mesh().cells, self._wet()
+            row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
+            out[row, k] = out[row, (k + 1) % corner_counts(cells[faces // 4])] = True
+        return out
+
+    def springs(self, blocks: Any) -> np.ndarray | None:
+        """A channel that cannot drain is as stiff as its fluid: K / aperture, in each step."""
+        if not self._pushes or blocks.options.flow_every > 1:
+            return None
+        faces = self._wet()
+        lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
+        faces = faces[(self.row[lower] > 0) & blocks.joint_exists()[lower]]
+        table = self._geometry_of(faces)
+        each = self.fluid("fluid_bulk") * table[:, kernels.HALF] / table[:, kernels.APERTURE] ** 2  # K L / (2 delta)
+        out = np.zeros((blocks.n_own, 4))
+        row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
+        np.add.at(out, (row, k), each)
+        np.add.at(out, (row, (k + 1) % corner_counts(blocks.the_mesh().cells[faces // 4])), each)
+        return out
+
+    def _geometry_of(self, faces: np.ndarray) -> np.ndarray:
+        """The table of kernels.geometry of the channels on these faces."""
+        sides, law, _ = self._sides_of(faces)
+        table = np.empty((len(faces), kernels.CHANNEL))
+        kernels.geometry(1, sides[0], sides[1], law, self._laws(), self.blocks.x, self.viscosity, table)
+        return table
+
+    def _sides_of(self, faces: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, int]:
+        """Where both faces of channels begin in x, their laws, and a face that this rank does not hold, or -1."""
+        blocks, width = self.blocks, self.blocks.x.shape[1]
+        other = blocks.partner[faces]
+        one, two = blocks.where[faces // 4], blocks.where[other // 4]
+        lost = faces[(one < 0) | (two < 0)]
+        sides = np.maximum(one, 0) * width + 2 * (faces % 4), np.maximum(two, 0) * width + 2 * (other % 4)
+        law = (self.row[np.minimum(faces, other)] - 1).astype(np.int64)
+        return sides, law, int(lost[0]) if len(lost) else -1
+
+    def _laws(self) -> np.ndarray:
+        """The table of channel laws (rows, kernels.LAW)."""
+        of = {name: np.array([row[k] for row in self.rows]) for k, name in enumerate(_PROPERTIES)}
+        inside = of["matrix_porosity"] * (1.0 / of["fluid_bulk"] + of["matrix_porosity_compressibility"])
+        viscous = math.pi * of["viscosity"] * of["fluid_density"]
+        leak = np.where(of["leak_off"] > 0.0, np.sqrt(of["matrix_permeability"] * inside / viscous), 0.0)
+        apertures = [of[f"aperature_{name}"] for name in ("initial", "minumum", "maximum")]
+        return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"]]))
+
+    def reach(self, blocks: Any, middle: np.ndarray) -> float:
+        """Largest distance from the first element around a flow node to the others there [m]; middle (n_own, 2): of
+        the owned elements."""
+        network, comm = self.network, blocks.comm
+        if not len(network.channels):
+            return 0.0
+        cells, faces = blocks.the_mesh().cells, network.channels
+        torn = np.zeros(len(network.there), bool)
+        torn[face_points(cells, faces[blocks.open[faces]])] = True
+        torn &= network.there
+        if not torn.any():
+            return 0.0
+        total = len(cells)
+        corner = np.arange(cells.size).reshape(cells.shape)
+        use = (cells >= 0) & blocks.alive[:, None]
+        first = np.full(len(torn), -1, np.int64)
+        first[cells[use][::-1]] = corner[use][::-1] // 4
+        own = cells[blocks.number]
+        mine, k = np.nonzero((own >= 0) & torn[own])
+        wanted, beside = first[own[mine, k]], blocks.partner[4 * blocks.number[mine] + k]
+        other = (beside >= 0) & blocks.alive[beside // 4]
+        mine, wanted = np.append(mine, mine[other]), np.append(wanted, beside[other] // 4)
+        home = blocks.number * comm.size // total
+        _, number, places = comm.to_ranks(home, blocks.number, np.ascontiguousarray(middle))
+        target = wanted * comm.size // total
+        source, asked = comm.to_ranks(target, wanted)
+        order = np.argsort(number)
+        _, came = comm.to_ranks(source, places[order[np.searchsorted(number[order], asked)]])
+        found = np.empty_like(came)
+        found[np.argsort(target, kind="stable")] = came
+        way = middle[mine] - found
+        return math.sqrt(float(comm.max_into(np.array([(way * way).sum(axis=1).max(initial=0.0)]))[0]))
+
+    def storage_rebuilt(self) -> None:
+        """Elements have other rows or owners, or there are other channels."""
+        blocks, network, comm = self.blocks, self.network, self.blocks.comm
+        if not len(network.channels):
+            self._forget_nodes(np.ones(len(self.number), bool))
+            return
+        points, cells = len(network.there), blocks.the_mesh().cells
+        leads = blocks.local.leads[network.nodes]
+        row = blocks.where[leads // 4]
+        own = (row >= blocks.owned.start) & (row < blocks.owned.stop)
+        mine, leads, row = network.nodes[own], leads[own], row[own]
+        self._channels = network.channels[np.isin(network.ends, mine).any(axis=1)]
+        ends = face_points(cells, self._channels)
+        self._pushed = self._wet() if self._pushes else np.empty(0, np.int64)
+        loaded = face_points(cells, self._pushed)
+        wanted = np.setdiff1d(np.concatenate([ends.reshape(-1), loaded.reshape(-1)]), mine)
+        self._forget_nodes(~network.there[self.number])
+        n = len(self.number)
+        had = np.column_stack([self.nodes, self.state[:n, : kernels.E]])
+        rows, owner = moved(comm, points, self.number, had, mine, wanted)
+        order = np.lexsort((wanted, owner))
+        wanted, owner = wanted[order], owner[order]
+        self.number, self.nodes = mine, np.ascontiguousarray(rows[:, : kernels.NODE])
+        self.state = np.zeros((len(mine) + len(wanted), kernels.STATE))
+        self.state[: len(mine), : kernels.E] = rows[:, kernels.NODE :]
+        if self._copies is not None:
+            self._copies.close()
+        self._copies = Copies(comm, mine, wanted, owner, self.state)
+        local = np.full(points, -1, np.int64)
+        local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
+        self._ends = local[ends]
+        self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
+        self._lead = row * blocks.x.shape[1] + 2 * (leads % 4)
+        self._q, self._lost_fluid = np.zeros(len(ends)), np.zeros(len(ends))
+        self._note_leaks()
+        self._bind_loads(loaded, local)
+        self._sides, self._law, lost = self._sides_of(self._channels)
+        self._law_table = self._laws()
+        self._table = np.empty((len(ends), kernels.CHANNEL))
+        self._find_geometry()
+        lost = int(comm.max_into(np.array([lost], np.int64))[0])
+        if lost >= 0:
+            raise PhysicsError(
+                f"step {blocks.clock.step}: the channel on face {lost} spans more than a column of "
+                f"{blocks.rebuild_state.side:g} m: its sides have parted too far"
+            )
+        self._shrink()
+        self._take_heights()
+        self._copies.refresh()
+        self._reshaped = False
+        if self._found_for != self._given():
+            self._find_step()
+        if not blocks.options.mechanical:
+            blocks.clock.dt = self.sub_steps * self.dt
+
+    def _forget_nodes(self, gone: np.ndarray) -> None:
+        """Fluid of nodes (n,) bool that are no longer there is gone with them; their accounts are kept."""
+        comm = self.blocks.comm
+        if not comm.any(bool(gone.any())):
+            return
+        self.nodes[gone, kernels.REMOVED] += self.nodes[gone, kernels.W]
+        for name, column in (("given", kernels.GIVEN), ("leaked", kernels.LEAKED), ("removed", kernels.REMOVED)):
+            self.removed[name] = exact_sum(
+                np.append(self.nodes[gone, column], self.removed[name] if comm.rank == 0 else 0.0), comm
+            )
+        self.state = self.state[: len(gone)][~gone]
+        self.number, self.nodes = self.number[~gone], self.nodes[~gone]
+
+    def _shrink(self) -> None:
+        """Room of the nodes after a change of channels: fluid that has no room any more is gone."""
+        before = self.nodes[:, kernels.V].copy()
+        self._find_volumes()
+        if self._reshaped:
+            less = np.flatnonzero((self.nodes[:, kernels.V] < before) & (before > 0.0))
+            w = self.nodes[less, kernels.W] * (self.nodes[less, kernels.V] / before[less])
+            self.nodes[less, kernels.REMOVED] += self.nodes[less, kernels.W] - w
+            self.nodes[less, kernels.W] = w
+            self._find_state(slice(None))
+
+    def _find_geometry(self) -> None:
+        blocks, (one, other) = self.blocks, self._sides
+        kernel = kernels.geometry if blocks.threads == 1 else kernels.geometry_threaded
+        kernel(blocks.threads, one, other, self._law, self._law_table, blocks.x, self.viscosity, self._table)
+
+    def _find_volumes(self) -> None:
+        kernels.volumes(self._begin, self._channel, self._table, self.nodes)
+
+    def _find_state(self, at: np.ndarray | slice) -> None:
+        """Pressure and saturation of owned nodes from their fluid."""
+        w, v = self.nodes[at, kernels.W], self.nodes[at, kernels.V]
+        full = w >= v
+        own = self.state[: len(self.number)]
+        own[at, kernels.P] = np.where(full, self.fluid("fluid_bulk") * ((w - v) / v), 0.0)
+        own[at, kernels.S] = np.where(full, 1.0, w / v)
+
+    def _take_heights(self) -> None:
+        """Potential energy of the owned nodes, where the first element around each has them."""
+        o, flat = self.blocks.options, self.blocks.x.reshape(-1)
+        rho = self.fluid("fluid_density")
+        self.state[: len(self.number), kernels.E] = -rho * (o.gx * flat[self._lead] + o.gy * flat[self._lead + 1])
+
+    def _refresh(self) -> None:
+        if self._copies is not None:
+            self._copies.refresh()
+
+    def _bind_loads(self, loaded: np.ndarray, local: np.ndarray) -> None:
+        blocks, cells = self.blocks, self.blocks.the_mesh().cells
+        faces = self._pushed
+        row, k = blocks.where[faces // 4], faces % 4
+        self._push_edge = row * blocks.x.shape[1] + 2 * k
+        last = (k + 1) % corner_counts(cells[faces // 4])
+        self._push_corner = np.column_stack([8 * row + 2 * k, 8 * row + 2 * last])
+        self._push_node = local[loaded]
+
+    def _note_leaks(self) -> None:
+        """Leak-off begins where a joint is open and has it."""
+        at = self.network.channels[self.blocks.open[self.network.channels]]
+        leaks = np.array([False, *(row[_PROPERTIES.index("leak_off")] > 0.0 for row in self.rows)])
+        new = at[leaks[self.row[at]] & np.isinf(self.since[at])]
+        self.since[new] = self.time
+        self._since = self.since[self._channels]
+        self._leaks = bool(np.isfinite(self.since).any())
+
+    def joints_opened(self) -> None:
+        """Joints broke: their faces are open now."""
+        if len(self.network.channels) and self.blocks.closed:
+            self._note_leaks()
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """Channels beside these elements are gone, with their fluid."""
+        self._network, self._reshaped, self._found_for = None, True, []
+
+    def mesh_replaced(self) -> None:
+        """There is another mesh: `of_mesh` says that this is gone with the one before."""
+        if self._copies is not None:
+            self._copies.close()
+            self._copies = None
+
+    # ---- the clock -----------------------------------------------------------------------------------------------
+
+    def limit(self) -> float:
+        """The longest sub-step that is stable, with a factor of two in reserve [s]."""
+        args = self._begin, self._channel, self._ends, self._table, self.nodes, self.state
+        least = kernels.longest_step(*args, self.fluid("fluid_bulk"))
+        return float(self.blocks.comm.min_into(np.array([least]))[0])
+
+    def _given(self) -> list[float]:
+        """What the length of a sub-step follows from, beside the channels."""
+        o = self.blocks.options
+        switches = [float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.flow_steps), o.flow_dt]
+        return [*switches, o.gx, o.gy, self.blocks.clock.dt if o.mechanical else 0.0]
+
+    def _find_step(self) -> None:
+        """Sub-steps of a cycle and their length, from what was said and what is stable."""
+        blocks, o, limit = self.blocks, self.blocks.options, self.limit()
+        self._found_for = self._given()
+        period = 0.0 if not o.mechanical or not o.dynamic else o.flow_every * blocks.clock.dt
+        if o.flow_dt > 0.0:
+            self.sub_steps, self.dt = max(1, o.flow_steps), o.flow_dt
+        elif period == 0.0:
+            self.sub_steps, self.dt = max(1, o.flow_steps), limit
+        else:
+            self.sub_steps = o.flow_steps or max(1, math.ceil(period / (SAFETY * limit)))
+            self.dt = period / self.sub_steps
+        if not o.flow_steps and self.sub_steps > MANY:
+            raise CommandError(
+                f"flow would need {self.sub_steps} sub-steps of {limit:.3g} s in {o.flow_every} mechanical steps; "
+                "model time-step hydraulic gives it a clock of its own"
+            )
+        self._tell_step(limit)
+
+    def _tell_step(self, limit: float) -> None:
+        log = self.blocks.log
+        known, before = self._told
+        if log is None or (abs(self.dt - known) <= 0.1 * known and abs(limit - before) <= 0.1 * before):
+            return
+        self._told = self.dt, limit
+        log.info(
+            f"flow: {self.sub_steps} sub-steps of {self.dt:.4g} s per cycle; stability limit {2.0 * limit:.4g} s, half "
+            f"of it {limit:.4g} s"
+        )
+        if self.dt > limit * (1.0 + 1e-9):
+            log.warn_once(
+                f"flow step {self.dt > 2.0 * limit}",
+                f"the hydraulic time step {self.dt:g} s is {self.dt / (2.0 * limit):.2f} of the stability limit "
+                f"{2.0 * limit:.4g} s; a run that blows up should be repeated with a smaller one",
+            )
+
+    def check_start(self) -> None:
+        o, conditions = self.blocks.options, self.conditions
+        if not self._on:
+            return
+        if o.mechanical and not o.dynamic and o.flow_dt == 0.0:
+            raise CommandError("in static runs time of flow passes by model time-step hydraulic, which comes first")
+        surface = [row for row in np.unique(self.condition).tolist() if conditions[row].does == kernels.SURFACE]
+        if surface and o.gx == 0.0 == o.gy:
+            raise CommandError("flow-surface needs gravity: model gravity comes first")
+
+    def follow(self) -> None:
+        """Flow for as long as the step that the elements have moved by."""
+        blocks, o = self.blocks, self.blocks.options
+        if not self._on:
+            return
+        self.waited += 1
+        if o.mechanical and self.waited < o.flow_every:
+            return
+        self.waited = 0
+        with blocks.timers("flow"):
+            if o.mechanical:
+                self._find_geometry()
+                self._find_volumes()
+            if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given()):
+                self._find_step()
+            for _ in range(self.sub_steps):
+                self._sub_step()
+            if o.mechanical and (o.gx != 0.0 or o.gy != 0.0):
+                self._take_heights()
+                self._refresh()
+            self.cycles += 1
+        if self.cycles % LOOK == 0:
+            self._check()
+
+    def _find_flows(self, dt: float) -> None:
+        threads = self.blocks.threads
+        kernel = kernels.flows if threads == 1 else kernels.flows_threaded
+        kernel(
+            threads, self._ends, self._law, self._law_table, self._since, self._leaks, self.time, self.time + dt,
+            self._table, self.state, self._q, self._lost_fluid,
+        )  # fmt: skip
+
+    def _sub_step(self) -> None:
+        threads = self.blocks.threads
+        self._find_flows(self.dt)
+        self.time += self.dt
+        kernel = kernels.fill if threads == 1 else kernels.fill_threaded
+        kernel(
+            threads, self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid, self.dt,
+            self._condition, self._conditions_at(self.time), self.fluid("fluid_bulk"), self.nodes, self.state,
+        )  # fmt: skip
+        self._refresh()
+
+    @property
+    def _condition(self) -> np.ndarray:
+        return self.condition[self.number]
+
+    def _conditions_at(self, time: float) -> np.ndarray:
+        """The table of conditions (rows, 2) at a flow time: heights as potential energies."""
+        o, tables = self.blocks.options, self.blocks.tables
+        table = np.zeros((len(self.conditions), 2))
+        used = np.bincount(self.condition, minlength=len(table)) > 0
+        for row, one in enumerate(self.conditions):
+            if used[row]:
+                value = tables[one.value](time) if isinstance(one.value, str) else one.value
+                height = self.fluid("fluid_density") * math.hypot(o.gx, o.gy)
+                table[row] = one.does, value * height if one.does == kernels.SURFACE else value
+        return table
+
+    def _check(self) -> None:
+        """Stop on all ranks if the flow has blown up."""
+        bad = ~np.isfinite(self.nodes[:, kernels.W])
+        comm = self.blocks.comm
+        first = int(comm.min_into(np.array([self.number[bad].min(initial=len(self.condition))], np.int64))[0])
+        if first < len(self.condition):
+            raise PhysicsError(
+                f"step {self.blocks.clock.step}: the fluid at flow node {first} is not finite; the hydraulic time step "
+                f"{self.dt:g} s is probably too large (stable: {2.0 * self.limit():g} s)"
+            )
+
+    # ---- forces --------------------------------------------------------------------------------------------------
+
+    def add_to(self, applied: np.ndarray) -> None:
+        if self._pushes:
+            kernels.loads(
+                self._push_edge, self._push_corner, self._push_node, self.blocks.x, self.state, applied
+            )  # fmt: skip
+
+    # ---- state on disk -------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        """All but the columns, as JSON values."""
+        return {
+            "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
+            "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
+            "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
+            "reshaped": self._reshaped, "found_for": self._found_for,
+        }  # fmt: skip
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Channels with their properties, and prescribed nodes, of all ranks."""
+        channels, points = np.flatnonzero(self.row), np.flatnonzero(self.condition)
+        return {
+            "flow_channels": {"number": channels, "row": self.row[channels].astype(np.int64),
+                              "since": self.since[channels]},
+            "flow_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
+        }  # fmt: skip
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        """What this rank's flow nodes hold."""
+        held = [*self.nodes.T, *self.state[: len(self.number), : kernels.E].T]
+        columns = {name: np.ascontiguousarray(values) for name, values in zip(_COLUMNS, held)}
+        return {"flow_nodes": {"number": self.number, **columns}}
+
+    @staticmethod
+    def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse of these: the blocks have this fluid; nodes go to their owners with the first storage."""
+        made = Flow.of(blocks)
+        made.rows = [tuple(math.inf if v is None else v for v in row) for row in state["rows"]]
+        made.conditions = [Condition(**one) for one in state["conditions"]]
+        made.removed, made.time = dict(state["removed"]), state["time"]
+        made.cycles, made.waited = state["cycles"], state["waited"]
+        made.sub_steps, made.dt = state["sub_steps"], state["dt"]
+        made._reshaped, made._found_for = state["reshaped"], state["found_for"]
+        channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
+        made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]
+        made.condition[points["number"]] = points["row"]
+        made.number = nodes["number"].astype(np.int64)
+        held = np.column_stack([nodes[name] for name in _COLUMNS])
+        made.nodes = np.ascontiguousarray(held[:, : kernels.NODE])
+        made.state = np.zeros((len(made.number), kernels.STATE))
+        made.state[:, : kernels.E] = held[:, kernels.NODE :]

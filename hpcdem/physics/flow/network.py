@@ -1,0 +1,66 @@
+"""Where fluid can be: pure functions of the mesh and of which joints have a hydraulic model, the same on all ranks.
+
+A *channel* is a joint with a hydraulic model, broken or not, between two elements that are there; it has the number of
+the joint, its lower face. A *flow node* is a point of the mesh at which a channel ends, and has the number of the
+point: however many corners of elements have parted there, they share one pressure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.physics.fdem.connectivity import face_points
+
+
+@dataclass(frozen=True)
+class Network:
+    """channels (m,): joints, ascending; ends (m, 2): points of the mesh where they begin and end, in the direction of
+    the lower face; nodes (n,): points, ascending; there (np,) bool: points that are nodes."""
+
+    channels: np.ndarray
+    ends: np.ndarray
+    nodes: np.ndarray
+    there: np.ndarray
+
+    @staticmethod
+    def of(cells: np.ndarray, n_points: int, channels: np.ndarray) -> Network:
+        """The network of these channels (lower faces, ascending)."""
+        ends = face_points(cells, channels)
+        there = np.zeros(n_points, bool)
+        there[ends] = True
+        return Network(channels, ends, np.flatnonzero(there), there)
+
+
+def at_nodes(ends: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Channels (m,) with these ends (rows of nodes, -1: another's) by the nodes 0 .. n - 1: begin (n + 1,), and for
+    each the channels and -1.0 where it is their first end, 1.0 where it is their last, in the order of channels."""
+    m = len(ends)
+    node, channel = ends.T.reshape(-1), np.tile(np.arange(m), 2)
+    side = np.repeat([-1.0, 1.0], m)
+    keep = (node >= 0) & (node < n)
+    node, channel, side = node[keep], channel[keep], side[keep]
+    order = np.lexsort((channel, node))
+    begin = np.zeros(n + 1, np.int64)
+    begin[1:] = np.cumsum(np.bincount(node, minlength=n))
+    return begin, channel[order], side[order]
+
+
+def wet_faces(
+    cells: np.ndarray,
+    partner: np.ndarray,
+    faces: np.ndarray,
+    closed: np.ndarray,
+    channel: np.ndarray,
+    there: np.ndarray,
+) -> np.ndarray:
+    """Those of these faces (k,) that fluid pushes on: sides of channels, and free faces between two flow nodes.
+
+    closed (4 ne,) bool: faces that hang together with their partner; channel (4 ne,) bool: lower faces of channels;
+    there (np,) bool: points that are flow nodes.
+    """
+    other = partner[faces]
+    is_channel = channel[np.where(other >= 0, np.minimum(faces, other), faces)]
+    between = there[face_points(cells, faces)].all(axis=1)
+    return faces[is_channel | (between & ~closed[faces])]
