@@ -15,7 +15,7 @@ from hpcdem.physics.fdem.kernels import joints
 
 P, S, E = range(3)
 STATE = 3
-# Columns of the table of channel laws (rows, 6).
+# Columns of the table of channel laws (rows, 5).
 INITIAL, LEAST, MOST, LEAK, PORE = range(5)
 LAW = 5
 # What is prescribed at nodes.
@@ -23,7 +23,7 @@ FREE, PRESSURE, SURFACE, RATE = range(4)
 # Columns of the table of channels (m, 3) of `geometry`.
 APERTURE, CONDUCT, HALF = range(3)
 CHANNEL = 3
-# Columns of nodes (n, 7): fluid, room for it, and what came and went [m2]; by conditions in the last sub-step [m2/s].
+# Columns of nodes (n, 6): fluid, room for it, and what came and went [m2]; by conditions in the last sub-step [m2/s].
 W, V, GIVEN, LEAKED, REMOVED, INFLOW = range(6)
 NODE = 6
 STEEPEST = 1.125
@@ -139,6 +139,10 @@ def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table
             if leaks:
                 gone += lost[channel[m]]
         w, v, more = nodes[i, W] + dt * into, nodes[i, V], 0.0
+        if leaks:
+            gone = min(gone, max(w, 0.0))
+            w -= gone
+            nodes[i, LEAKED] += gone
         does, value = table[condition[i], 0], table[condition[i], 1]
         if does == RATE:
             more = max(dt * value, -max(w, 0.0))
@@ -151,10 +155,6 @@ def _fill(t, threads, begin, channel, side, q, leaks, lost, dt, condition, table
         w += more
         nodes[i, GIVEN] += more
         nodes[i, INFLOW] = more / dt
-        if leaks:
-            gone = min(gone, max(w, 0.0))
-            w -= gone
-            nodes[i, LEAKED] += gone
         nodes[i, W] = w
         if w >= v:
             state[i, P], state[i, S] = bulk * ((w - v) / v), 1.0
