@@ -586,13 +586,13 @@ class Flow(SurfaceLoad):
             if o.mechanical:
                 self._find_geometry()
                 self._find_volumes()
+                if o.gx != 0.0 or o.gy != 0.0:
+                    self._take_heights()
+                    self._refresh()
             if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given()):
                 self._find_step()
             for _ in range(self.sub_steps):
                 self._sub_step()
-            if o.mechanical and (o.gx != 0.0 or o.gy != 0.0):
-                self._take_heights()
-                self._refresh()
             self.cycles += 1
         if self.cycles % LOOK == 0:
             self._check()
