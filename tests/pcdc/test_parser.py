@@ -119,6 +119,7 @@ def test_values_of_the_wrong_kind(words, values, message):
 
 
 BOLT = "den 7850 young 200e9 diam 0.02 s-s-r-b 1e9 g-t 0.01 c-r-g 1e6 c-g-b 1e6"
+WATER = "property f-den 1000 f-bulk 2e9 vis 1e-6 a-initial 1e-5 a-min 1e-6"
 REFUSED = [
     ("bolt create polyline (0,0)", "a bolt goes through two points at least, got 1"),
     ("bolt create polyline (0,0) (0,0) (1,1)", "two points of the bolt that follow each other are the same"),
@@ -135,6 +136,19 @@ REFUSED = [
     (f"bolt c-model mech-e-p property {BOLT} range boundary", "read 'boundary' after"),
     ("bolt c-model mech-iso-elastic property density 1", "read 'mech-iso-elastic' after 'bolt c-model'"),
     ("bolt-n boundary b-n-c", "needs at least one of"),
+    ("face-joint c-model hydr-p-m property f-den 1", "lacks f{luid}-b{ulk}, vis{cosity}"),
+    (f"face-joint c-model hydr-p-m {WATER} a-max 1e-7", "must not be above aperature_maximum"),
+    (f"face-joint c-model hydr-p-m {WATER} leak-off on", "leak_off needs matrix_permeability"),
+    (f"face-joint c-model hydr-p-m {WATER} m-permeability 1e-15", "goes with leak_off, which is off"),
+    ("face-joint c-model hydr-p-m aperture-initial -1", "expected a number, not negative"),
+    ("node boundary hydra-c-f-b", "needs at least one of"),
+    ("node boundary hydra-c-f-b pressure 1 flow-rate 2", "pressure and flow-rate exclude each other"),
+    ("flow-node initial", "needs at least one of"),
+    ("flow-node initial pressure 1 saturation 1", "pressure and saturation exclude each other"),
+    ("flow-node initial saturation 1.5", "expected a number from 0 to 1"),
+    ("flow-node initial pressure -1", "expected a number, not negative"),
+    ("model sub-step", "needs at least one of"), ("model sub-step mechanical 0", "a whole number above 0"),
+    ("model time-step hydraulic -1", "expected a number, not negative"),
     ("bolt-n boundary b-n-c velocity-x 1 acceleration-x 1", "exclude each other"),
     ("", "the line ends where a command: model, geometry,"),
     ("foo bar", "read 'foo' after 'pcdc', expected one of model, geometry"),
@@ -217,16 +231,11 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 LATER = [
     ("element c-model therm-iso-h con 1", "heat comes later"),
-    ("face-joint c-model hydr-p-m f-den 1", "fluid in fractures comes later"),
     ("face-joint c-model t-f con 1", "heat comes later"),
     ("face-joint c-model hydr-p-p-m f-den 1", "proppant comes later"),
-    ("node boundary hydraulic-c-f-b p 1", "fluid in fractures comes later"),
     ("node boundary therm-s-b-c t 1", "heat comes later"),
     ("element-face boundary therm-const-h h-f 1", "heat comes later"),
     ("node initial temp 20", "heat comes later"),
-    ("flow-node initial pressure 1", "fluid in fractures comes later"),
-    ("model option hydraulic on", "fluid in fractures comes later"),
-    ("model sub-step mechanical 1", "fluid in fractures comes later"),
     ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
     ("output image 'a'", "hpcdem movie"),
 ]

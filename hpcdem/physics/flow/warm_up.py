@@ -1,0 +1,26 @@
+"""A wet crack between two blocks, which calls every kernel of flow once."""
+
+from __future__ import annotations
+
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.model import Flow
+
+WATER = {
+    "fluid_density": 1000.0, "fluid_bulk": 1e6, "viscosity": 1e-6, "aperature_initial": 1e-4, "aperature_minumum": 1e-5,
+}  # fmt: skip
+
+
+def warm_up(threads: int = 1) -> None:
+    """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    flow = Flow.of(sim)
+    flow.assign(None, WATER)
+    flow.prescribe(None, kernels.PRESSURE, 1.0)
+    sim.step()
