@@ -123,13 +123,13 @@ def install_locked(tmp_path: Path, pip: str) -> tuple[subprocess.CompletedProces
 
 def test_hashes_are_asked_for(tmp_path):
     done, asked = install_locked(tmp_path, "exit 0")
-    assert done.returncode == 0 and done.stderr == "" and done.stdout == "done\n"
+    assert done.returncode == 0 and done.stderr == "" and done.stdout.endswith("done\n")
     assert asked.count("--require-hashes") == asked.count("--requirement ") == 2 and asked.count("--editable .") == 1
 
 
 def test_each_package_of_the_lock_is_asked_for_once(tmp_path):
     done, asked = install_locked(tmp_path, f'for last; do :; done; cat "$last" >>{tmp_path}/parts || true')
-    assert done.stdout == "done\n" and asked.count("install") == 3
+    assert done.stdout.endswith("done\n") and asked.count("install") == 3
     both = (tmp_path / "parts").read_text()
     assert sorted(ENTRY.findall(both)) == sorted(ENTRY.findall(LOCK.read_text(encoding="utf-8"))) != []
 
