@@ -797,6 +797,11 @@ class BlockCommands:
         """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
         return fdem.queries.fluid(self._blocks.project())
 
+    def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:
+        """Rayleigh damping of elements in dynamic runs: ratio of the critical one at a frequency [Hz]; part: both
+        (default), mass or stiffness. ratio 0: no more."""
+        self._blocks("model rayleigh", {"ratio": ratio, "frequency": frequency, "part": part})
+
     def creep(
         self,
         on: bool = True,

@@ -38,7 +38,9 @@ def lattice(aperture: float, edge: float) -> float:
     return math.sqrt(3.0) * aperture**3 / (12.0 * edge)
 
 
-def carter(over: float, time: float, length: float, matrix: tuple[float, float, float], bulk: float, mu: float) -> float:
+def carter(
+    over: float, time: float, length: float, matrix: tuple[float, float, float], bulk: float, mu: float
+) -> float:
     """Volume that both walls take up at a constant pressure over that of the pores (86, 87 with C-31) [m2];
     matrix: permeability, porosity, compressibility."""
     k, porosity, compressibility = matrix

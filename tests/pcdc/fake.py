@@ -21,10 +21,12 @@ from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.connectivity import centroids
 from hpcdem.physics.fdem.convergence import Watch
+from hpcdem.physics.fdem.definition import Options
 from hpcdem.physics.fdem.equilibrium import Balanced
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import MODELS, Rows
 from hpcdem.physics.fdem.state import Creep
+from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 from hpcdem.physics.fdem.tables import Table
 
 
@@ -67,6 +69,7 @@ class FakeBlocks:
         self.mesh: Mesh | None = None
         self.clock, self.creep = Clock(), Creep()
         self.tables: dict[str, Table] = {}
+        self.options, self.surface_loads = Options(), SurfaceLoads()
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
