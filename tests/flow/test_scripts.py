@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.commands import fdem
+from hpcdem.commands.fdem import frames
 from hpcdem.core.errors import CommandError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT, NODE, Ids, InGroup, OnLayer, Span
@@ -111,3 +112,22 @@ def test_what_a_script_cannot_do(tmp_path) -> None:
     before = fdem.queries.fluid(model)["given"]
     fdem.steps.step(model, 3)
     assert fdem.queries.fluid(model)["given"] == before
+
+
+def test_frames_hold_the_fluid_of_joints(tmp_path) -> None:
+    """Channels without a cohesive model are lines of their own."""
+    model = strip(tmp_path)
+    assert "aperture" not in frames.whole(model).of_joints
+    upright = (Span(0, 2.0, 2.0),)
+    cohesive = {"cohesion": 1e6, "tensile_strength": 1e6, "gf1": 10.0, "gf2": 10.0}
+    fdem.assignments.joint_model(model, "classic_intrinsic_cohesive_interface", cohesive, upright)
+    before = frames.whole(model).of_joints
+    fdem.flow.model(model, WATER, where=(Span(1, 1.0, 1.0),))
+    fdem.flow.initial(model, pressure=2e5)
+    found = frames.whole(model).of_joints
+    wet = ~np.isnan(found["aperture"])
+    assert len(before["state"]) == 2 and len(found["state"]) == 6 and wet.sum() == 4
+    assert (found["state"][wet] == 1.0).all() and found["length"][wet] == pytest.approx(1.0)
+    assert found["fluid_pressure"][wet] == pytest.approx(2e5) and found["aperture"][wet] == pytest.approx(1e-5)
+    assert (found["saturation"][wet] == 1.0).all() and np.isnan(found["opening"][wet]).all()
+    assert np.abs(found["flow_rate"][wet]).max() < 1e-15 and np.abs(found["fluid_velocity"][wet]).max() < 1e-9

@@ -22,8 +22,9 @@ from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
-from hpcdem.physics.fdem.groups import ELEMENT, JOINT
+from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.model import Flow
 
 
 def vtk(project: Project, name: str, every: int | None = None) -> None:
@@ -148,6 +149,35 @@ def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndar
     return {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
 
 
+FLUID = {
+    "fluid_pressure": "pressure", "saturation": "saturation", "aperture": "aperture", "flow_rate": "flow_rate",
+    "fluid_velocity": "velocity",
+}  # fmt: skip
+"""Columns of joints that are channels, and the quantities of channels in them."""
+
+
+def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Joints with the fluid in them, NaN where there is none; and the channels between elements that hang together
+    without a cohesive model, of state 1."""
+    flow = Flow.there(blocks)
+    if flow is None or not len(flow.network.channels):
+        return joints
+    mesh = blocks.the_mesh()
+    fluid = flow.owned_values(CHANNEL, list(FLUID.values()))
+    new = np.setdiff1d(fluid["number"], joints["number"])
+    ends = mesh.points[face_points(mesh.cells, new)]
+    known = {"number": new, "state": np.ones(len(new)), "mode": np.zeros(len(new)),
+             "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
+    nothing = np.full(len(new), np.nan)
+    found = {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
+    order = np.argsort(found["number"])
+    at = order[np.searchsorted(found["number"][order], fluid["number"])]
+    for column, name in FLUID.items():
+        found[column] = np.full(len(found["number"]), np.nan)
+        found[column][at] = fluid[name]
+    return found
+
+
 def frame(project: Project) -> MeshFrame:
     """What is written at this moment. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
@@ -156,6 +186,7 @@ def frame(project: Project) -> MeshFrame:
     joints = _with_cracks(
         blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
     )
+    joints = _with_channels(blocks, joints)
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():

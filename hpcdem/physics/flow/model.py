@@ -229,7 +229,8 @@ class Flow(SurfaceLoad):
         return self.network.nodes if kind == FLOW_NODE else self.network.channels
 
     def owned_values(self, kind: str, names: list[str]) -> dict[str, np.ndarray]:
-        """Columns of this rank's flow nodes or channels (those whose first end it owns), with their "number"."""
+        """Columns of this rank's flow nodes or channels (those on whose lower face its elements lie), with their
+        "number"."""
         self.blocks.close_model()
         if kind == FLOW_NODE:
             made = {
@@ -238,7 +239,9 @@ class Flow(SurfaceLoad):
                 "volume": self.nodes[:, kernels.V], "inflow": self.nodes[:, kernels.INFLOW],
             }  # fmt: skip
         else:
-            mine = self._ends[:, 0] < len(self.number)
+            blocks = self.blocks
+            row = blocks.where[self._channels // 4]
+            mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
             ends, table = self._ends[mine], self._table[mine]
             self._find_flows(0.0)
             made = {
@@ -386,7 +389,9 @@ class Flow(SurfaceLoad):
         row = blocks.where[leads // 4]
         own = (row >= blocks.owned.start) & (row < blocks.owned.stop)
         mine, leads, row = network.nodes[own], leads[own], row[own]
-        self._channels = network.channels[np.isin(network.ends, mine).any(axis=1)]
+        at = blocks.where[network.channels // 4]
+        beside = (at >= blocks.owned.start) & (at < blocks.owned.stop)
+        self._channels = network.channels[np.isin(network.ends, mine).any(axis=1) | beside]
         ends = face_points(cells, self._channels)
         self._pushed = self._wet() if self._pushes else np.empty(0, np.int64)
         loaded = face_points(cells, self._pushed)
