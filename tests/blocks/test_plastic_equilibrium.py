@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -175,7 +176,7 @@ def test_convergence_is_quadratic(kind, newton):
     sim = stamp(kind)
     equilibrium.solve_elastic(sim)
     ratios = newton[0].ratios
-    near_by = [(a, b) for a, b in zip(ratios, ratios[1:]) if a < 1e-3 and b > 1e-11]
+    near_by = [(a, b) for a, b in pairwise(ratios) if a < 1e-3 and b > 1e-11]
     assert near_by and all(b < 20.0 * a**1.7 for a, b in near_by)
     assert len(ratios) < 12 and ratios[-1] < 1e-11
 
@@ -247,7 +248,7 @@ def test_increments_count():
         sim.stress_condition(near(sim.mesh, 0, 1.0), normal=-1e6)
         equilibrium.solve_elastic(sim, steps=steps)
         found.append(diagnostics.values(sim, "plastic_shear_strain"))
-    gaps = [np.abs(a - b).max() for a, b in zip(found, found[1:])]
+    gaps = [np.abs(a - b).max() for a, b in pairwise(found)]
     assert gaps[0] > 2.0 * gaps[1] > 2.0 * gaps[2] > 0.0
 
 

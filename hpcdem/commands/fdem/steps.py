@@ -109,9 +109,10 @@ def solve_elastic(
     found = equilibrium.solve_elastic(blocks, cycles=cycles, solver=solver, **given)
     project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
     if project.log is not None:
+        parts = f" in {found.increments} increments" if found.increments > 1 else ""
         project.log.info(
-            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations"
-            f"{f' in {found.increments} increments' if found.increments > 1 else ''}, {found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
+            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations{parts}, "
+            f"{found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
         )
     _write_due(project)
     histories.flush(project)
