@@ -501,8 +501,8 @@ _MODEL = (
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
             "stop at ratio 1e-5. With elastic: straight to static equilibrium by Newton's method, for blocks that are "
             "elastic or yield, whose joints stay before their peak and whose surfaces do not touch. A run towards a "
-            "ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the body that slides away; "
-            "`pcdc.solved['reason']` says how a run ended.",
+            "ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the body that slides "
+            "away; `pcdc.solved['reason']` says how a run ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve elastic steps 10", "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
@@ -524,8 +524,8 @@ _MODEL = (
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
                             "unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
-                            "equal increments, in each of which elements flow once; one that finds no balance is halved", "",
-                            "1"))),
+                            "equal increments, in each of which elements flow once; one that finds no balance is "
+                            "halved", "", "1"))),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
