@@ -150,7 +150,8 @@ def test_little_of_a_source_in_the_middle_comes_back():
     found = {sides: shaken_in_the_middle(sides) for sides in ("free field", "quiet", "held")}
     back = {sides: (np.abs(v - wide).max(axis=0) / np.abs(wide).max(axis=0)).max() for sides, v in found.items()}
     assert back["free field"] < 0.1 and back["held"] > 1.0
-    assert found["free field"] == pytest.approx(found["quiet"], abs=1e-12 * np.abs(wide).max())
+    # Dashpots of quiet faces see the present length and normal of a face, the others that of the mesh.
+    assert found["free field"] == pytest.approx(found["quiet"], rel=0.0, abs=1e-5 * np.abs(wide).max())
 
 
 def test_a_rigid_base_leads_the_columns_too():
