@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hpcdem.physics.bolts.model import Bolts
+    from hpcdem.physics.fdem.free_field import FreeField
     from hpcdem.physics.flow.model import Flow
 
 
@@ -26,5 +27,15 @@ def _fluid() -> type[Flow]:
     return Flow
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[Flow]]] = {"bolts": _bolts, "fluid": _fluid}
+def _free_field() -> type[FreeField]:
+    from hpcdem.physics.fdem.free_field import FreeField
+
+    return FreeField
+
+
+PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[Flow] | type[FreeField]]] = {
+    "bolts": _bolts,
+    "fluid": _fluid,
+    "free_field": _free_field,
+}
 """How to get each class: its import brings kernels, which must wait for their cache folder."""
