@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, creep
 from hpcdem.physics.flow import kernels, reference
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import Network, at_nodes
@@ -337,4 +338,12 @@ def test_what_cannot_act_is_refused() -> None:
         sim.step()
     sim.parts(mechanical=False)
     with pytest.raises(CommandError, match="without mechanics time passes by flow"):
+        sim.step()
+    sim.option(dynamic=True)
+    Bolts.of(sim)
+    with pytest.raises(CommandError, match="bolts move with the blocks"):
+        sim.step()
+    sim.surface_loads.remove(Bolts.of(sim))
+    creep.switch(sim, True)
+    with pytest.raises(CommandError, match="elements creep while blocks move"):
         sim.step()

@@ -275,6 +275,9 @@ class Blocks(State):
                 raise CommandError("nothing would happen: model option mechanical is off, and no fluid flows")
             if not o.dynamic:
                 raise CommandError("without mechanics time passes by flow: model option dynamic on comes first")
+            others = [load.name for load in self.surface_loads if load.name != "fluid"]
+            if others:
+                raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
             if self.creep.on:
                 raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
         said = {"one-way": o.one_way, "sub-step": (o.flow_every, o.flow_steps) != (1, 0), "time-step": o.flow_dt > 0.0}
