@@ -738,6 +738,11 @@ class BlockCommands:
         given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling}
         self._blocks("model time-step", given)
 
+    def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:
+        """Rayleigh damping of elements in dynamic runs: ratio of the critical one at a frequency [Hz]; part: both
+        (default), mass or stiffness. ratio 0: no more."""
+        self._blocks("model rayleigh", {"ratio": ratio, "frequency": frequency, "part": part})
+
     def creep(
         self,
         on: bool = True,

@@ -202,7 +202,7 @@ def test_the_loop_over_quads_that_yield_is_flow_and_then_forces(large):
             args = list(local._quad_args)
             args[0], args[6] = max(parts, 1), s0
             out = [np.zeros((len(sim.number), elements.FORCE)) for _ in range(2)]
-            args += [*out, True, 1.0, -9.81, 3, np.zeros((7, elements.TALLY), np.int64)]
+            args += [*out, True, 1.0, -9.81, 0.5, 1e-6, 3, np.zeros((7, elements.TALLY), np.int64)]
             own = sim.n_left, local.quad_initial, local.quad_law
             if parts:
                 plastic_quads.yielding(*args, *own, soft, memory, table)

@@ -42,6 +42,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model time-step value 1e-7 auto off", "sim.time_step(value=1e-7, auto=False)"),
     ("pcdc model creep on dt 10 change 0.1 least 1 greatest 100",
      "sim.creep(True, dt=10, change=0.1, least=1, greatest=100)"),
+    ("pcdc model rayleigh 0.05 frequency 12 part stiffness",
+     "sim.rayleigh(0.05, frequency=12, part='stiffness')"),
     ("pcdc model creep off", "sim.creep(False)"),
     ("pcdc model step 100", "sim.step(100)"),
     ("pcdc model solve ratio 1e-6 window 10 limit 0 on-failure continue",

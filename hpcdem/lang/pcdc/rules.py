@@ -89,6 +89,14 @@ def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
             raise ValueError(f"{word} goes with {with_}")
 
 
+def _rayleigh(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    others = [word for word in ("frequency", "part") if word in arguments]
+    if arguments["ratio"] == 0.0 and others:
+        raise ValueError(f"ratio 0 takes no {others[0]}")
+    if arguments["ratio"] != 0.0 and not isinstance(arguments["ratio"], Pending) and "frequency" not in arguments:
+        raise ValueError("a ratio goes with frequency, at which the damping has it")
+
+
 def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "every" in arguments and "off" in arguments:
         raise ValueError("every and off exclude each other")
@@ -108,6 +116,7 @@ _RULES = {
     "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,
+    "model rayleigh": _rayleigh,
     "model solve": _solve,
     "history create": _history,
     "chart add": _curve,

@@ -524,6 +524,14 @@ _MODEL = (
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
                             "unknowns on", default="auto"))),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
+    Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
+            "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
+            "pi beta f.",
+            ("pcdc model rayleigh 0.05 frequency 12", "pcdc model rayleigh 0.02 frequency 5 part stiffness",
+             "pcdc model rayleigh 0"),
+            (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: none any more", "1"),),
+            (Option("freq{uency}", (POSITIVE,), "where the ratio is this; with both parts it is least there", "Hz"),
+             Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both"))),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",

@@ -479,7 +479,7 @@ class Local:
             return math.inf
         least = limits.time_step(
             self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
-            o.safety, target, self.true_mass.copy() if mass is None else mass,
+            o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
 
@@ -577,10 +577,14 @@ class Local:
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
-            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
-        )
+            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, o.mass_damping,
+            o.stiffness_damping, alpha, step, self.tally,
+        )  # fmt: skip
         if len(self.quad_rows):
-            args = *self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally
+            args = (
+                *self._quad_args, force, of_joints, keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping, step,
+                self.tally,
+            )  # fmt: skip
             if self.yields:
                 self._yielding_quads(
                     *args, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],

@@ -390,8 +390,8 @@ def _outside_of(n, item, row, lanes, who, whose):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _yielding(
     t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally, first_row, initial, yields, soft, memory,
-    surfaces,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial, yields, soft,
+    memory, surfaces,
 ):  # fmt: skip
     lanes, tile = np.zeros(YIELDING_LANES * CAPACITY), np.zeros(LANES * CAPACITY)
     item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
@@ -410,8 +410,8 @@ def _yielding(
         name_quads(first, n, rows, item, row)
         gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
         _gather_yield(whole, item, flat_yields, flat_surfaces, lanes)
-        _look_0(whole, small, lanes)
-        _look_1(whole, small, lanes)
+        _look_0(whole, small, beta, lanes)
+        _look_1(whole, small, beta, lanes)
         m = _outside_of(n, item, row, lanes, who, whose)
         if m > 0:
             for k in range(0, m, TILE):
@@ -420,11 +420,12 @@ def _yielding(
                     step, flat_memory, flat_s0, surfaces, tile,
                 )  # fmt: skip
             gather_stresses(whole, item, flat_s0, lanes)
-            overlay_loop_0(whole, small, lanes)
-            overlay_loop_1(whole, small, lanes)
+            overlay_loop_0(whole, small, beta, lanes)
+            overlay_loop_1(whole, small, beta, lanes)
         tied = finish_quads(
             first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
-            flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, step, lanes, room, tally[t],
+            flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
+            tally[t],
         )  # fmt: skip
 
 
@@ -439,15 +440,15 @@ def yielding(threads, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def yielding_threaded(
     threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally, first_row, initial, yields, soft, memory,
-    surfaces,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial, yields, soft,
+    memory, surfaces,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _yielding(
             t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
-            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally, first_row, initial, yields,
-            soft, memory, surfaces,
+            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally, first_row, initial,
+            yields, soft, memory, surfaces,
         )  # fmt: skip
 
 
