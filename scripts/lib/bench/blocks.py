@@ -7,7 +7,7 @@
 | flowing-20k | the same so weak that two thirds of it flow in a step |
 | yielded-20k | the same with joints behind their peak |
 | quads-20k | quads as one body, contact armed, in vibration |
-| plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: that does not, of which all flows in a step |
+| plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: none of it does, all of it flows |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
