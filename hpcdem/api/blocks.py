@@ -778,14 +778,16 @@ class BlockCommands:
         on_failure: str | None = None,
         elastic: bool = False,
         solver: str | None = None,
+        steps: int | None = None,
     ) -> None:
-        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium.
+        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
+        in so many steps of what is new in the loads.
         In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {
             "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
-            "elastic": elastic, "solver": solver,
+            "elastic": elastic, "solver": solver, "steps": steps,
         }  # fmt: skip
         self._before_steps()
         self._blocks("model solve", given)

@@ -51,6 +51,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model solve cycles 5 time 0.5", "sim.solve(cycles=5, time=0.5)"),
     ("pcdc model solve elastic time 1e6", "sim.solve(elastic=True, time=1e6)"),
     ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
+    ("pcdc model solve elastic steps 4", "sim.solve(elastic=True, steps=4)"),
     ("pcdc geometry create polyline (0,0) (1,2) as-layer 'l'", "sim.geometry.polyline([(0, 0), (1, 2)], 'l')"),
     ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'l'",
      "sim.geometry.polygon([(0, 0), (4, 0), (2, 3)], 'l')"),

@@ -76,8 +76,9 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
-    if "solver" in arguments and "elastic" not in arguments:
-        raise ValueError("solver goes with elastic; steps need none")
+    for word in ("solver", "steps"):
+        if word in arguments and "elastic" not in arguments:
+            raise ValueError(f"{word} goes with elastic; a run by steps needs none")
 
 
 def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:

@@ -570,8 +570,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            memory, s0, _, table, history = self._plastic_state()
-            self._flow_triangles(memory, s0, table, history)
+            self._flow_triangles(self.plastic_state(), step)
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
         if self.laws:
@@ -593,33 +592,33 @@ class Local:
             else:
                 self._quads(*args)
 
-    def _plastic_state(self) -> tuple[np.ndarray, ...]:
+    def plastic_state(self) -> tuple[np.ndarray, ...]:
         """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""
         return self.sim.cold["plastic"], self.s0, self.quad_s0, self.yield_table, self.strength.history
 
-    def _flow(
-        self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, table: np.ndarray, history: np.ndarray
-    ) -> None:
-        """Elements outside their yield surface at the present positions flow: the arrays of `_plastic_state`, or copies
-        of them, become those after it."""
+    def flow(self, state: tuple[np.ndarray, ...], step: int) -> None:
+        """Elements outside their yield surface at the present positions flow: the arrays of `plastic_state`, or copies
+        of them, become those after it. step: in which they do."""
+        self._flow_triangles(state, step)
+        memory, _, s0, table, history = state
         sim = self.sim
-        self._flow_triangles(memory, s0, table, history)
         if len(self.quad_rows):
-            of_quads = plastic_quads.flows if sim.threads == 1 else plastic_quads.flows_threaded
-            of_quads(
+            kernel = plastic_quads.flows if sim.threads == 1 else plastic_quads.flows_threaded
+            kernel(
                 sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
-                self.quad_law, self.strength._replace(history=history), not sim.options.large_strain, sim.clock.step,
-                memory, quad_s0, table,
+                self.quad_law, self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0,
+                table,
             )  # fmt: skip
 
-    def _flow_triangles(self, memory: np.ndarray, s0: np.ndarray, table: np.ndarray, history: np.ndarray) -> None:
-        """The triangles among them. (Quads flow in the loop over their forces.)"""
+    def _flow_triangles(self, state: tuple[np.ndarray, ...], step: int) -> None:
+        """The triangles among them. (In a step quads flow in the loop over their forces.)"""
+        memory, s0, _, table, history = state
         sim = self.sim
         kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
         kernel(
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            self.strength._replace(history=history), not sim.options.large_strain, sim.clock.step, memory, s0, table,
+            self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0, table,
         )  # fmt: skip
 
     def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
@@ -687,9 +686,9 @@ class Local:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], after the flow of this moment, which the next forces will see:
         copies."""
-        after = tuple(part.copy() for part in self._plastic_state())
+        after = tuple(part.copy() for part in self.plastic_state())
         if self.yields:
-            self._flow(*after)
+            self.flow(after, self.sim.clock.step)
         return after[0], after[1], after[2]
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
@@ -762,7 +761,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *(self._plastic_state() if self.yields else ()),
+                *(self.plastic_state() if self.yields else ()),
                 *((sim.cold["creep"],) if self._creeps_now() else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
                 *((self.s0,) if self.laws or self._creeps_now() else ()),
