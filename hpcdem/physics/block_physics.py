@@ -10,14 +10,20 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hpcdem.physics.bolts.model import Bolts
+    from hpcdem.physics.fdem.structures import Structure
 
 
-def _bolts() -> type[Bolts]:
+def _bolts() -> type[Structure]:
     from hpcdem.physics.bolts.model import Bolts
 
     return Bolts
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts]]] = {"bolts": _bolts}
+def _liners() -> type[Structure]:
+    from hpcdem.physics.liners.model import Liners
+
+    return Liners
+
+
+PHYSICS: Mapping[str, Callable[[], type[Structure]]] = {"bolts": _bolts, "liners": _liners}
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

@@ -76,7 +76,7 @@ def view_of_flow(state: MeshState) -> View:
     whole = view(state)
     cells = state.cells[plastic_shear(state) > 0.01 * plastic_range(state)[1]]
     points = [state.points[cells[cells >= 0]]]
-    if state.bolts:
+    if "bolts" in state.supports:
         points.append(areas(state)[0].reshape(-1, 2))
     there = np.concatenate(points)
     if not len(there):
