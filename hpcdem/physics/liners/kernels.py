@@ -28,6 +28,9 @@ MASS, INERTIA, WEIGHT_X, WEIGHT_Y = range(4)
 # Work (5,) [J/m]: on the rock; lost in beams and in the bond; by conditions; by gravity.
 ON_ROCK, IN_BEAMS, IN_BOND, BY_CONDITIONS, BY_GRAVITY = range(5)
 WORK = 5
+SMOOTH = 22.5
+"""Beams that meet at twice this angle [degrees] or more make a corner."""
+COS_SMOOTH = math.cos(math.radians(SMOOTH))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -41,6 +44,25 @@ def shape(ax, ay, bx, by, turn_a, turn_b, angle):
     first -= 2.0 * math.pi * math.floor(first / (2.0 * math.pi) + 0.5)
     second -= 2.0 * math.pi * math.floor(second / (2.0 * math.pi) + 0.5)
     return length, ux / length, uy / length, first, second
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def tangents(ends, along, state, mean, tangent):
+    """Unit vectors along the rock at points, tangent (2 m, 2): the mean of both beams at a node, or else a liner could
+    not slide along a polygon; where it has a corner, more than SMOOTH from the mean, that of the beam itself."""
+    mean[:] = 0.0
+    for e in range(len(ends)):
+        if not state[e] & REMOVED:
+            for k in range(2):
+                mean[ends[e, k], 0] += along[e, 0]
+                mean[ends[e, k], 1] += along[e, 1]
+    for e in range(len(ends)):
+        for k in range(2):
+            i, q = ends[e, k], 2 * e + k
+            size = math.sqrt(mean[i, 0] * mean[i, 0] + mean[i, 1] * mean[i, 1])
+            tangent[q, 0], tangent[q, 1] = along[e, 0], along[e, 1]
+            if size > 0.0 and (mean[i, 0] * along[e, 0] + mean[i, 1] * along[e, 1]) > COS_SMOOTH * size:
+                tangent[q, 0], tangent[q, 1] = mean[i, 0] / size, mean[i, 1] / size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -112,7 +134,7 @@ def bend(ends, x, turn, elements, angle, along, form, force, plastic, state, wor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def bond(ends, along, state, bound, points, step, rock, gap, slip, pressure, shear, bond_state, work):
+def bond(ends, tangent, state, bound, points, step, rock, gap, slip, pressure, shear, bond_state, work):
     """New pressures and shear forces (2 m,) [N/m] of the bond, from the ways of the nodes and of the rock.
 
     p = -K_n gap, 0 where a parted one is open; it parts where p < -T. f -= K_s ds, |f| <= C + p tan(phi), without C
@@ -123,7 +145,7 @@ def bond(ends, along, state, bound, points, step, rock, gap, slip, pressure, she
         bond_state[q] &= ~(SLIPS | OPEN)
         if not bound[q] or state[e] & REMOVED:
             continue
-        i, tx, ty = ends[e, q % 2], along[e, 0], along[e, 1]
+        i, tx, ty = ends[e, q % 2], tangent[q, 0], tangent[q, 1]
         dx, dy = step[i, 0] - rock[q, 0], step[i, 1] - rock[q, 1]
         open_by, slid = dx * ty - dy * tx, dx * tx + dy * ty
         k, p = points[q, ACROSS], pressure[q]
@@ -150,7 +172,7 @@ def bond(ends, along, state, bound, points, step, rock, gap, slip, pressure, she
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def node_forces(ends, along, form, force, state, pressure, shear, nodes, conditions, total, on_rock):
+def node_forces(ends, along, tangent, form, force, state, pressure, shear, nodes, conditions, total, on_rock):
     """Forces and moments on nodes, total (n, 3), and of points on the rock, on_rock (2 m, 2) [N/m]."""
     for i in range(len(total)):
         total[i, 0] = conditions[i, FORCE_X] + nodes[i, WEIGHT_X]
@@ -172,6 +194,7 @@ def node_forces(ends, along, form, force, state, pressure, shear, nodes, conditi
         total[b, 2] -= force[e, 2]
         for k in range(2):
             q, i = 2 * e + k, ends[e, k]
+            tx, ty = tangent[q, 0], tangent[q, 1]
             fx, fy = pressure[q] * ty + shear[q] * tx, shear[q] * ty - pressure[q] * tx
             total[i, 0] += fx
             total[i, 1] += fy

@@ -347,7 +347,7 @@ class Liners(Structure):
         if m:
             after = (k + 1) % corner_counts(self.blocks.the_mesh().cells[beams["face"] // 4])
         self._corner = np.column_stack([k, after]).reshape(-1)
-        self._along = np.zeros((m, 2))
+        self._along, self._tangent, self._mean = np.zeros((m, 2)), np.zeros((2 * m, 2)), np.zeros((n, 2))
         self._total, self._on_rock = np.zeros((n, 3)), np.zeros((2 * m, 2))
         self._step, self._rock = np.zeros((n, 2)), np.zeros((2 * m, 2))
         length, poisson = beams["length"], self._column("poisson_ratio")
@@ -391,6 +391,7 @@ class Liners(Structure):
                 *nodes["x"][a], *nodes["x"][b], 0.0, 0.0, beams["angle"][e]
             )
         if n:
+            kernels.tangents(beams["ends"], self._along, beams["state"], self._mean, self._tangent)
             self._find_forces()
 
     def _set_masses(self) -> None:
@@ -422,8 +423,8 @@ class Liners(Structure):
         self._node_table[:, kernels.WEIGHT_X] = self._true_mass * o.gx
         self._node_table[:, kernels.WEIGHT_Y] = self._true_mass * o.gy
         kernels.node_forces(
-            beams["ends"], self._along, beams["form"], beams["force"], beams["state"], beams["pressure"].reshape(-1),
-            beams["shear"].reshape(-1), self._node_table, self._conditions_at(time, time), self._total, self._on_rock,
+            beams["ends"], self._along, self._tangent, beams["form"], beams["force"], beams["state"],
+            beams["pressure"].reshape(-1), beams["shear"].reshape(-1), self._node_table, self._conditions_at(time, time), self._total, self._on_rock,
         )  # fmt: skip
 
     # ---- called by the blocks ----------------------------------------------------------------------------------------
@@ -479,13 +480,14 @@ class Liners(Structure):
                 clock.dt, ALPHA if static else 0.0, nodes["reaction"], self._step, work,
             )  # fmt: skip
             kernels.bond(
-                beams["ends"], self._along, beams["state"], self._bound, self._point_table, self._step, self._rock,
+                beams["ends"], self._tangent, beams["state"], self._bound, self._point_table, self._step, self._rock,
                 *(beams[name].reshape(-1) for name in ("gap", "slip", "pressure", "shear", "bond_state")), work,
             )  # fmt: skip
             kernels.bend(
                 beams["ends"], nodes["x"], nodes["turn"], self._element_table, beams["angle"], self._along,
                 beams["form"], beams["force"], beams["plastic"], beams["state"], work,
             )  # fmt: skip
+            kernels.tangents(beams["ends"], self._along, beams["state"], self._mean, self._tangent)
             self._find_forces()
             kernels.work_on_rock(before, self._on_rock, self._rock, work)
 
