@@ -666,9 +666,10 @@ class Histories(Words):
         variable: str | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element") or of the "model": of one (id, or
-        nearest to a point), or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many
-        steps. variable: with the value "law-state", which state variable of laws of the user."""
+        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element") or
+        of the "model": of one (id, or nearest to a point), or of those of a range or of all by how: "sum", "mean",
+        "minimum", "maximum"; every so many steps. variable: with the value "law-state", which state variable of
+        laws of the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,

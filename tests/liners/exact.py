@@ -11,9 +11,9 @@ no slip: t2 = 1 + 2 a2, m2 = (1 - 2 a2 + 2 b2) / 2, a2 = beta b2,
 beta = ((6 + F) C (1 - nu) + 2 F nu) / (3 F + 3 C + 2 C F (1 - nu)),
 b2 = C (1 - nu) / (2 (C (1 - nu) + 4 nu - 6 beta - 3 beta C (1 - nu))).
 
-Their moment is that of Fluegge's shell, E I (w'' + w) / R^2 of the deflection w. Beams know how much their cross-sections
-turn, (w'' - v') / R^2, v: along the ring. The two differ by the strain (v' + w) / R over R, so by T2 I / (A R), T2: the
-part of T with cos 2 theta; as much as t^2 / (12 R^2) of T R, which bonded liners of soft rock feel.
+Their moment is that of Fluegge's shell, E I (w'' + w) / R^2 of the deflection w. Beams know how much their
+cross-sections turn, (w'' - v') / R^2, v: along the ring. The two differ by the strain (v' + w) / R over R, so by
+T2 I / (A R), T2: the part of T with cos 2 theta; in bonded liners of soft rock M is so small that this shows.
 """
 
 from __future__ import annotations

@@ -169,7 +169,9 @@ class _Objects:
         if first == last and not mask.any():
             known = _Objects(self.project, self.kind, True).numbers
             if first in known:
-                how = f"{supports.class_of(self.kind).word} delete" if self.kind in g.SUPPORTS else "element c-model null"
+                how = (
+                    f"{supports.class_of(self.kind).word} delete" if self.kind in g.SUPPORTS else "element c-model null"
+                )
                 raise CommandError(f"{self.kind} {first} was taken out ({how})")
             raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
         return mask

@@ -369,11 +369,11 @@ BOLT_FORCE = Model(
     "takes it.", FORCE.options, any_of=True,
 )  # fmt: skip
 
-# ---- liners, beyond the manual -----------------------------------------------------------------------------------------
+# ---- liners, beyond the manual -------------------------------------------------------------------------------------
 
 LINER = Model(
     "beam", "",
-    "Beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane. Either a shell of this "
+    "Beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane. Either a shell of a "
     "thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force is held "
     "between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt + Nc)^2: what a "
     "rectangle bears that is plastic all over. The bond to the rock is elastic, slips at bond-cohesion + pressure "
@@ -800,9 +800,10 @@ _OBJECTS = (
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
             ("pcdc bolt delete range group 'roof'",), ranged="bolt-element"),
-    Command("liner cr{eate}", "Puts a liner on the free faces that the range chooses, as things are now: at any stage of "
-            "a run, without force in it. A face has one beam; where faces or liners meet at a point of the mesh they "
-            "are joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes "
+    Command("liner cr{eate}",
+            "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
+            "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "
+            "joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes "
             "them is the rock of their faces.",
             ("pcdc liner create group 'shotcrete' range geometry 'tunnel'", "pcdc liner create range boundary y 2 3"),
             options=(Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",

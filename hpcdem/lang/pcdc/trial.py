@@ -110,7 +110,10 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
-    if model in (BOLT.of, LINER.of) and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys():
+    if (
+        model in (BOLT.of, LINER.of)
+        and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
+    ):
         model.complete(given)
     if model is properties.COHESIVE:
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):

@@ -18,7 +18,8 @@ from hpcdem.physics.fdem.local import ALPHA
 from hpcdem.physics.fdem.structures import MARGIN, REMOVED, Columns, Number, Structure, empty
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.simulation import Blocks
+    pass
+
 
 @dataclass(frozen=True)
 class Condition:
@@ -482,6 +483,7 @@ class Bolts(Structure):
         lost[self.ends()[~gone].reshape(-1)] = False
         for name, nothing in (("host", -1), ("plate", 0), ("weight", 0), ("condition", 0), ("v", 0), ("reaction", 0)):
             nodes[name][lost] = nothing
+
 
 def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (k, 4, 2) of the corners of elements (k, 4) at points in them."""

@@ -54,8 +54,7 @@ class Structure(SurfaceLoad):
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.nodes = {name: np.zeros((0, *wide(k)), of) for name, (of, k) in self.of_nodes.items()}
-        self.elements = {name: np.zeros((0, *wide(k)), of) for name, (of, k) in self.of_elements.items()}
+        self.nodes, self.elements = empty(self.of_nodes, 0), empty(self.of_elements, 0)
         self.rows: list[tuple[float, ...]] = []
         self.conditions: list[Any] = [self.condition_type()]
         self.work = np.zeros(self.flows)

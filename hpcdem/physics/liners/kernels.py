@@ -80,7 +80,7 @@ def hinges(first, second, most, k):
     turn_a = turn_b = 0.0
     a, b = first, second
     for _ in range(2):
-        if abs(a) > most and abs(b) > most or (turn_a != 0.0 and abs(b) > most) or (turn_b != 0.0 and abs(a) > most):
+        if (abs(a) > most and abs(b) > most) or (turn_a != 0.0 and abs(b) > most) or (turn_b != 0.0 and abs(a) > most):
             to_a, to_b = math.copysign(most, a), math.copysign(most, b)
             over_a, over_b = first - to_a, second - to_b
             turn_a, turn_b = (2.0 * over_a - over_b) / (6.0 * k), (2.0 * over_b - over_a) / (6.0 * k)

@@ -192,9 +192,7 @@ class Liners(Structure):
                 found.setdefault(point, ([], []))[1 - side].append(node)
         return found
 
-    def _numbered(
-        self, goes_on: np.ndarray, old: list[tuple[int, int]], closed: list[tuple[int, int]]
-    ) -> np.ndarray:
+    def _numbered(self, goes_on: np.ndarray, old: list[tuple[int, int]], closed: list[tuple[int, int]]) -> np.ndarray:
         """(m, 2) nodes of new elements in the order of their chains; old: ends that have a node already; closed: first
         and last element of chains that come back to their beginning."""
         known, last = dict(old), {last: first for first, last in closed}
@@ -279,7 +277,8 @@ class Liners(Structure):
             case "gap":
                 return beams["gap"].max(axis=1)
             case "slip":
-                return np.where(np.abs(beams["slip"][:, 0]) >= np.abs(beams["slip"][:, 1]), *beams["slip"].T)
+                at = np.abs(beams["slip"]).argmax(axis=1)
+                return beams["slip"][np.arange(len(at)), at]
             case "bond_state":
                 return beams["bond_state"][:, 0] | beams["bond_state"][:, 1]
         return beams["host"].copy()
@@ -335,7 +334,7 @@ class Liners(Structure):
         rows = [(one.does_x, one.does_y, one.does_turn) for one in self.conditions]
         return (np.array(rows) != FREE)[self.nodes["condition"]]
 
-    # ---- tables of the kernels -----------------------------------------------------------------------------------------
+    # ---- tables of the kernels -------------------------------------------------------------------------------------
 
     def _arrange(self) -> None:
         nodes, beams = self.nodes, self.elements
@@ -385,11 +384,9 @@ class Liners(Structure):
         self._node_table[:, kernels.MASS], self._node_table[:, kernels.INERTIA] = self._true_mass, self._true_inertia
         self._prepared_for = None
         self._mine, self._rows = np.empty(0, np.int64), np.empty(0, np.int64)
-        for e in range(m):
-            a, b = beams["ends"][e]
-            _, self._along[e, 0], self._along[e, 1], _, _ = kernels.shape(
-                *nodes["x"][a], *nodes["x"][b], 0.0, 0.0, beams["angle"][e]
-            )
+        for e, (a, b) in enumerate(beams["ends"].tolist()):
+            way = nodes["x"][b] - nodes["x"][a]
+            self._along[e] = way / math.sqrt(way[0] * way[0] + way[1] * way[1])
         if n:
             kernels.tangents(beams["ends"], self._along, beams["state"], self._mean, self._tangent)
             self._find_forces()
@@ -424,7 +421,8 @@ class Liners(Structure):
         self._node_table[:, kernels.WEIGHT_Y] = self._true_mass * o.gy
         kernels.node_forces(
             beams["ends"], self._along, self._tangent, beams["form"], beams["force"], beams["state"],
-            beams["pressure"].reshape(-1), beams["shear"].reshape(-1), self._node_table, self._conditions_at(time, time), self._total, self._on_rock,
+            beams["pressure"].reshape(-1), beams["shear"].reshape(-1), self._node_table,
+            self._conditions_at(time, time), self._total, self._on_rock,
         )  # fmt: skip
 
     # ---- called by the blocks ----------------------------------------------------------------------------------------
@@ -479,9 +477,12 @@ class Liners(Structure):
                 nodes["x"], nodes["v"], nodes["turn"], nodes["spin"], self._total, conditions, self._node_table,
                 clock.dt, ALPHA if static else 0.0, nodes["reaction"], self._step, work,
             )  # fmt: skip
+            gap, slip, pressure, shear, bond_state = (
+                beams[name].reshape(-1) for name in ("gap", "slip", "pressure", "shear", "bond_state")
+            )
             kernels.bond(
                 beams["ends"], self._tangent, beams["state"], self._bound, self._point_table, self._step, self._rock,
-                *(beams[name].reshape(-1) for name in ("gap", "slip", "pressure", "shear", "bond_state")), work,
+                gap, slip, pressure, shear, bond_state, work,
             )  # fmt: skip
             kernels.bend(
                 beams["ends"], nodes["x"], nodes["turn"], self._element_table, beams["angle"], self._along,
