@@ -44,12 +44,13 @@ def test_it_parts_at_its_tensile_strength_and_is_pressed_again() -> None:
     drawn(sim, liners, 490, at_y=1e-7)
     assert liners.values("liner-element", "bond_pressure") == pytest.approx(-0.49e6, rel=1e-3)
     drawn(sim, liners, 20)
-    assert (liners.elements["bond_state"] == kernels.PARTED | kernels.OPEN).all()
+    both = kernels.PARTED | kernels.OPEN
+    assert (liners.elements["bond_state"] & both == both).all()
     assert not liners.elements["pressure"].any()
     assert liners.values("liner-element", "gap") == pytest.approx(5.1e-5, rel=1e-3)
     drawn(sim, liners, 710, at_y=-1e-7)  # 2e-5 m into the rock
     assert liners.values("liner-element", "bond_pressure") == pytest.approx(0.2e6, rel=1e-3)
-    assert (liners.elements["bond_state"] == kernels.PARTED).all()
+    assert (liners.elements["bond_state"] & both == kernels.PARTED).all()
 
 
 def test_it_slips_at_cohesion_and_friction() -> None:
