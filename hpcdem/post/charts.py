@@ -96,9 +96,11 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
     for axes, label in ((left, "(a)"), (right, "(b)")):
         axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
     if modes:  # over the diagram there is room for all of them in one line
+        tight = len(modes) > 2
         figure.legend(
             handles=modes, loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=right.transAxes, ncols=4,
-            frameon=False, fontsize=0.9 * FONT, borderaxespad=0.15, handlelength=1.2, columnspacing=1.0,
+            frameon=False, fontsize=(0.75 if tight else 0.9) * FONT, borderaxespad=0.15,
+            handlelength=1.2, columnspacing=0.8 if tight else 1.0,
             handletextpad=0.4,
         )  # fmt: skip
     right.set_prop_cycle(color=COLOURS)

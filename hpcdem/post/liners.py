@@ -23,13 +23,20 @@ def areas(state: MeshState, first: str, last: str) -> tuple[np.ndarray, np.ndarr
     at = np.column_stack([nodes["position_x"], nodes["position_y"]])
     a, b = at[elements["first_node"][there]], at[elements["last_node"][there]]
     values = np.column_stack([elements[first], elements[last]])[there]
-    way = b - a
-    out = np.column_stack([way[:, 1], -way[:, 0]]) / np.hypot(way[:, 0], way[:, 1])[:, None]
+    across = np.column_stack([b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]])
+    out = np.zeros((2, len(at), 2))  # at each node the mean of both elements, so that areas fit together
+    for end in ("first_node", "last_node"):
+        np.add.at(out[0], elements[end][there], across / np.hypot(across[:, 0], across[:, 1])[:, None])
+    size = np.hypot(out[0, :, 0], out[0, :, 1])
+    out = np.divide(out[0], size[:, None], out=out[1], where=size[:, None] > 0.0)
     if not len(a):
         return np.empty((0, 4, 2)), values
     size = float(np.ptp(np.concatenate([a, b]), axis=0).max())
     far = HEIGHT * size * values / max(float(np.abs(values).max(initial=0.0)), 1e-300)
-    return np.stack([a, b, b + far[:, 1:] * out, a + far[:, :1] * out], axis=1), values
+    return np.stack(
+        [a, b, b + far[:, 1:] * out[elements["last_node"][there]], a + far[:, :1] * out[elements["first_node"][there]]],
+        axis=1,
+    ), values
 
 
 def draw(axes: Any, state: MeshState) -> list[Any]:
