@@ -803,6 +803,11 @@ class BlockCommands:
         given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling}
         self._blocks("model time-step", given)
 
+    def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:
+        """Rayleigh damping of elements in dynamic runs: ratio of the critical one at a frequency [Hz]; part: both
+        (default), mass or stiffness. ratio 0: no more."""
+        self._blocks("model rayleigh", {"ratio": ratio, "frequency": frequency, "part": part})
+
     def creep(
         self,
         on: bool = True,
@@ -838,14 +843,16 @@ class BlockCommands:
         on_failure: str | None = None,
         elastic: bool = False,
         solver: str | None = None,
+        steps: int | None = None,
     ) -> None:
-        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium.
+        """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
+        in so many steps of what is new in the loads.
         In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {
             "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
-            "elastic": elastic, "solver": solver,
+            "elastic": elastic, "solver": solver, "steps": steps,
         }  # fmt: skip
         self._before_steps()
         self._blocks("model solve", given)

@@ -149,7 +149,9 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
     if options.check:
         log.info(check.summary(text, name))
         return
-    check.read(text, name)
+    read = check.read(text, name)
+    if session.comm.rank == 0:  # which makes the meshes
+        check.packages(read)
     session.text = text
     session.job = Job(name, "pcdc", options.arguments, session.threads)
     enter_session(session)  # particles that the script makes belong to it

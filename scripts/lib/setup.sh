@@ -60,25 +60,39 @@ wheels_venv() {
 }
 
 fill_from_wheels() {
-    say "Setting up $1 from wheels with $("$2" --version) (once; some 20 s where the network is quick) ..."
-    make_venv "$1" "$2" && install_locked "$1" && install "$1" --editable ".[$3]"
+    say "Setting up $1 from wheels with $("$2" --version) (once; some 15 s where the network is quick) ..."
+    make_venv "$1" "$2" || return
+    if ! install_locked "$1" || [[ $3 != mpi ]]; then install "$1" --editable ".[$3]"; fi
 }
 
-# install_locked DIR: the versions of requirements.lock, each checked by its hash. Where they do not fit, as with a Python
-# or processor that has no such wheels, it says so and leaves the choice to the ranges of pyproject.toml. pip would
-# compile all modules of all packages to byte code, one after the other: half of its time. Those that every run begins
-# with are compiled here, on all cores; Python does the others when it first imports them.
+# install_locked DIR: hpcdem with the extra mpi, in the versions of requirements.lock, each checked by its hash; half of
+# them at a time, as pip takes one after the other. Where they do not fit, as with a Python or processor that has no such
+# wheels, it says so and leaves the choice to the ranges of pyproject.toml. pip would compile all modules of all packages
+# to byte code, half of its time. Those that every run begins with are compiled here, on all cores; Python does the
+# others when it first imports them.
 install_locked() {
-    local said packages
-    if said=$("$1/bin/pip" install -q --disable-pip-version-check --require-hashes --only-binary :all: --no-compile \
-        --requirement requirements.lock 2>&1); then
+    local parts job jobs=() failed= packages
+    parts=$(mktemp -d)
+    awk -v all="$(grep -c '^[^# ]' requirements.lock)" -v dir="$parts" \
+        '/^[^# ]/ { n++ } !/^#/ { print > (dir "/" (2 * n > all)) }' requirements.lock
+    for job in 0 1; do
+        "$1/bin/pip" install -q --disable-pip-version-check --require-hashes --only-binary :all: --no-compile --no-deps \
+            --requirement "$parts/$job" >"$parts/said-$job" 2>&1 &
+        jobs+=($!)
+    done
+    "$1/bin/pip" install -q --disable-pip-version-check --no-deps --editable . >"$parts/said-2" 2>&1 &
+    jobs+=($!)
+    for job in "${jobs[@]}"; do wait "$job" || failed=yes; done
+    if [[ -z $failed ]]; then
         packages=$("$1/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["platlib"])')
         "$1/bin/python" -m compileall -q -j 0 "$packages"/{numpy,numba,llvmlite,pydantic} || true
-        return
+    else
+        say "The versions of requirements.lock cannot be had for $("$1/bin/python" --version 2>&1) on $(uname -sm):"
+        say "  $(cat "$parts"/said-* | grep -i error | tail -n 1)"
+        say "Going on with the newest versions that pyproject.toml allows."
     fi
-    say "The versions of requirements.lock cannot be had for $("$1/bin/python" --version 2>&1) on $(uname -sm):"
-    say "  $(grep -i error <<<"$said" | tail -n 1)"
-    say "Going on with the newest versions that pyproject.toml allows."
+    rm -r "$parts"
+    [[ -z $failed ]]
 }
 
 # debian_venv DIR EXTRAS: Debian's MPI, parallel HDF5, PETSc and Slurm; pip adds the rest around Debian's numpy.

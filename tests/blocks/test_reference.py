@@ -66,11 +66,11 @@ def of_elements(sim: Blocks) -> np.ndarray:
     for r in range(len(sim.number)):
         nodes = corners(sim, r)
         n = len(nodes)
-        solid = reference.Solid(LAME, MU2, eta[r], stress0, small)
+        solid = reference.Solid(LAME, MU2, eta[r], stress0, small, sim.options.stiffness_damping)
         forces = reference.triangle_forces if n == 3 else reference.quad_forces
         x, v = (rows[r, : 2 * n].reshape(-1, 2) for rows in (sim.x, sim.v))
         force[r, :n] = forces(sim.reference.points[nodes], x, v, solid)
-        force[r, :n] += local.true_mass[r, :n, None] * (1.0, -9.81)
+        force[r, :n] += local.true_mass[r, :n, None] * ((1.0, -9.81) - sim.options.mass_damping * v)
     return force
 
 
@@ -122,8 +122,11 @@ def rows_of(sim: Blocks, found: Evaluation) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
 def test_elements_and_nodes(kind: str, large: bool) -> None:
     """Stress, viscosity, gravity; nodes of several corners are kicked by the sum of their forces."""
-    for dynamic in (True, False):
+    for dynamic, part in ((True, None), (True, "mass"), (True, "stiffness"), (False, None)):
         sim = disturbed(kind, False, large_strain=large, dynamic=dynamic)
+        if part is not None:
+            sim.rayleigh(0.3, 1000.0, part)
+            sim.close_model()
         disturb(sim, False, 1)
         force, found = of_elements(sim), sim.local.evaluation(contact=False)
         scale = np.abs(force).max()
@@ -192,7 +195,7 @@ def test_the_place_of_a_quad_in_the_lanes_changes_no_bit(kind: str) -> None:
             args[0] = parts
             args[11], args[13], args[14] = tables[0], tables[1], tables[2]
             tally = np.zeros((parts, elements.TALLY), np.int64)
-            elements.quads(*args, *out, True, 1.0, -9.81, 3, tally)
+            elements.quads(*args, *out, True, 1.0, -9.81, 0.0, 0.0, 3, tally)
         found.append([*out, tables[0], tables[1], tables[2]])
     assert all((a == b).all() for a, b in zip(*found))
     assert np.bincount(found[0][3], minlength=4).tolist()[:3] > [40, 40, 40]

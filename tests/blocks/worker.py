@@ -51,7 +51,7 @@ def empty(kind: str, threads: int) -> Blocks:
 
 
 def impact(sim: Blocks, shape: str = "cross") -> None:
-    """A jointed block falls apart on a fixed plate."""
+    """A jointed block falls apart on a fixed plate, with Rayleigh damping."""
     block = shaken(rectangle(16, 6, 1.6, 0.6, kind=shape), 0.2)
     plate = rectangle(24, 1, 2.4, 0.1, x0=-0.4, y0=-0.101, kind=shape)
     sim.take_mesh(joined(block, plate))
@@ -65,6 +65,7 @@ def impact(sim: Blocks, shape: str = "cross") -> None:
     sim.joint_model(inner[:, 0], COHESIVE, WEAK)
     sim.velocity_condition(np.arange(len(block.points), len(sim.mesh.points)), vx=0.0, vy=0.0)
     changes.set_velocity(sim, np.arange(len(block.points)), vx=0.5, vy=-2.0)
+    sim.rayleigh(0.02, 400.0)
     sim.gravity(0.0, -9.81)
     diagnostics.account_energy(sim)
 

@@ -8,6 +8,7 @@ from types import ModuleType
 import pytest
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.lang.pcdc import check
 from hpcdem.pre.mesh import geometry, optional
 from hpcdem.pre.mesh.dxf import read_dxf
 from hpcdem.pre.mesh.imported import import_mesh
@@ -57,3 +58,17 @@ def test_those_who_need_one_say_so(monkeypatch, tmp_path):
         import_mesh(tmp_path / "m.msh")
     with pytest.raises(HpcdemError, match="Import of DXF drawings needs the package ezdxf"):
         read_dxf(tmp_path / "m.dxf")
+
+
+def test_a_script_is_refused_at_its_first_line_that_needs_a_missing_package(monkeypatch):
+    script = check.read(
+        "x = 1\npcdc mesh structured (0,0) (1,1) cells 1 1\npcdc mesh import 'a.msh'\npcdc mesh create from-layer 'a' "
+        "size 1\npcdc mesh create from-layer 'b' size 1\n",
+        "script.sc",
+    )
+    check.packages(script)
+    for name, line in (("meshio", 3), ("gmsh", 4)):
+        with monkeypatch.context() as without:
+            without.setitem(sys.modules, name, None)
+            with pytest.raises(HpcdemError, match=rf"^script\.sc:{line}: .*needs the package {name}"):
+                check.packages(script)

@@ -1,6 +1,8 @@
 """Static solves of a model with joints, rollers, a hole and stages, on any number of ranks; writes what came out.
 
-python equilibrium_worker.py SOLVER OUT
+python equilibrium_worker.py SOLVER OUT [yields]
+
+yields: instead, rock that yields under a stamp, in increments, the second of which softens.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, rectangle, shaken
 
 NAMES = (
@@ -29,8 +32,11 @@ def communicator():
     return MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.Get_size() > 1 else SerialComm()
 
 
-def main(solver: str, out: str) -> None:
+def main(solver: str, out: str, yields: str = "") -> None:
     sim = Blocks(communicator())
+    if yields:
+        stamp(sim, solver, out)
+        return
     mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
@@ -55,6 +61,32 @@ def main(solver: str, out: str) -> None:
     found.update({f"later_{name}": diagnostics.values(sim, name) for name in NAMES})
     found["ratios"] = np.array([first.ratio, second.ratio, diagnostics.unbalanced_ratio(sim)])
     found["counts"] = np.array([first.iterations, first.factors, first.unknowns, second.iterations, sim.clock.step])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
+def stamp(sim: Blocks, solver: str, out: str) -> None:
+    mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
+    sim.take_mesh(mesh)
+    soil = {
+        "density": 2000.0, "bulk": 3.9e9, "shear": 2.8e9, "friction": 30.0, "dilation": 10.0, "cohesion": 3.45e6,
+        "tensile": 1e6,
+    }  # fmt: skip
+    changes.element_model(sim, None, "mech_mohr_coulomb", soil)
+    x, y = mesh.points.T
+    sim.velocity_condition(np.flatnonzero(y < 1e-9), vx=0.0, vy=0.0)
+    sim.velocity_condition(np.flatnonzero((y > 0.8 - 1e-9) & (np.abs(x - 1.0) < 0.45)), vx=0.0, vy=-1.2e-3)
+    sim.gravity(0.0, -9.81)
+    sim.option(dynamic=False, collision=False)
+    first = equilibrium.solve_elastic(sim, solver=solver, steps=3)
+    sim.table("c", [(0.0, 3.45e6), (0.01, 3e6)])
+    sim.element_property(None, {"cohesion": Over("c", PLASTIC_STRAIN)})
+    changes.null(sim, np.flatnonzero(np.hypot(*(mesh.centroids() - [0.4, 0.4]).T) < 0.1), relax=50)
+    second = equilibrium.solve_elastic(sim, solver=solver)
+    names = (*NAMES, "plastic_shear_strain", "plastic_volume_strain", "plastic_work", "plastic_state")
+    found = {name: diagnostics.values(sim, name) for name in names if name not in ("opening", "slip")}
+    found["ratios"] = np.array([first.ratio, second.ratio])
+    found["counts"] = np.array([first.iterations, first.increments, second.iterations, second.increments])
     if sim.comm.rank == 0:
         np.savez(out, **found)
 

@@ -12,8 +12,8 @@ from tests.conftest import Launcher
 WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 
-def run(folder: Path, ranks: int, solver: str) -> dict[str, np.ndarray]:
-    done = Launcher().python(ranks, WORKER, solver, f"{solver}{ranks}.npz", cwd=folder)
+def run(folder: Path, ranks: int, solver: str, *more: str) -> dict[str, np.ndarray]:
+    done = Launcher().python(ranks, WORKER, solver, f"{solver}{ranks}.npz", *more, cwd=folder)
     assert done.returncode == 0, done.stderr[-2000:]
     with np.load(folder / f"{solver}{ranks}.npz") as found:
         return dict(found)
@@ -46,3 +46,31 @@ def test_petsc_on_several_ranks(alone, ranks, tmp_path):
     found = run(tmp_path, ranks, "petsc")
     for name in ("stress_xx", "stress_yy", "stress_xy", "displacement_x", "displacement_y", "opening"):
         assert np.nanmax(np.abs(found[name] - alone[name])) < 1e-9 * np.nanmax(np.abs(alone[name])), name
+
+
+@pytest.fixture(scope="module")
+def yielding(tmp_path_factory) -> dict[str, np.ndarray]:
+    return run(tmp_path_factory.mktemp("yielding"), 1, "direct", "yields")
+
+
+def test_rock_that_yields_is_in_balance(yielding):
+    assert yielding["ratios"].max() < 1e-8 and yielding["counts"][1] >= 3
+    assert np.nanmax(yielding["plastic_shear_strain"]) > 1e-3
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_the_same_bits_of_rock_that_yields(yielding, ranks, tmp_path):
+    found = run(tmp_path, ranks, "direct", "yields")
+    assert set(found) == set(yielding)
+    for name, values in yielding.items():
+        assert np.array_equal(found[name], values, equal_nan=True), name
+
+
+@pytest.mark.mpi
+@pytest.mark.petsc
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_rock_that_yields_by_petsc_on_several_ranks(yielding, ranks, tmp_path):
+    found = run(tmp_path, ranks, "petsc", "yields")
+    for name in ("stress_xx", "stress_yy", "displacement_x", "displacement_y", "plastic_shear_strain", "plastic_work"):
+        assert np.nanmax(np.abs(found[name] - yielding[name])) < 1e-9 * np.nanmax(np.abs(yielding[name])), name

@@ -57,7 +57,7 @@ def _without(options: tuple[Option, ...], *names: str) -> list[Option]:
 
 
 EXCLUDING = {
-    "model time-step": ("value", "mass-scaling"), "model solve": ("time", "elastic", "cycles", "solver"),
+    "model time-step": ("value", "mass-scaling"), "model solve": ("time", "elastic", "cycles", "solver", "steps"),
     "history create": ("id", "nearest", "mean", "minimum", "sum", "variable"),
     "bolt create polyline": ("length",),
     "chart add": ("values",), "field create": ("weibull", "lognormal"), "output vtk": ("off",),

@@ -52,6 +52,16 @@ def test_names_that_are_not_there():
         groups.members("top")
 
 
+def test_a_group_of_elements_is_not_one_of_their_joints(bench):
+    bench(BOX)
+    for kind in (g.JOINT, g.FACE, g.NODE):
+        with pytest.raises(
+            CommandError, match=rf"no set 'domain' of .*'rock' is a group of elements: face-of .*{kind}s"
+        ):
+            numbers(bench, kind, g.InGroup("rock", "domain"))
+        assert numbers(bench, kind, g.OfElements("rock", "domain"))
+
+
 def test_places(bench):
     bench(BOX)
     # Two triangles per square, rows of four squares; the centres of a pair lie at 1/3 and 2/3 of its side.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,8 @@ import pytest
 
 from hpcdem.commands.fdem.records import UNITS
 from hpcdem.core.errors import ScriptError
+from hpcdem.lang.pcdc import check, trial
 from hpcdem.lang.pcdc import table as t
-from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import Unfit
 from hpcdem.lang.pcdc.parser import parse
 from hpcdem.lang.pcdc.reference import page
@@ -117,3 +118,11 @@ def test_histories_record_what_the_commands_can():
     }
     for kind, values in t.RECORDED.items():
         assert {python(name): unit for name, unit in values.items()} == UNITS[kinds[kind]]
+
+
+def test_scripts_of_the_chinese_guide_are_read():
+    text = PAGE.with_name("pcdc.zh.md").read_text(encoding="utf-8")
+    scripts = re.findall(r"^```python\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+    assert len(scripts) > 1
+    for script in scripts:
+        assert "warning" not in check.summary(script, "guide.sc")

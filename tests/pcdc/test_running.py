@@ -53,15 +53,18 @@ def test_equilibrium_at_once(bench):
     assert [how for _, how in bench.blocks.told("solve_elastic")] == [
         {"cycles": 1, "solver": "auto"}, {"cycles": 4, "ratio": 1e-6, "solver": "petsc"}
     ]  # fmt: skip
-    assert bench.blocks.clock.step == 5 and not bench.blocks.told("advance")
+    bench("pcdc model solve elastic steps 7\n")
+    assert bench.blocks.told("solve_elastic")[-1][1] == {"cycles": 1, "solver": "auto", "steps": 7}
+    assert bench.blocks.clock.step == 6 and not bench.blocks.told("advance")
     assert [row[0] for row in bench.project.histories["t"].rows] == [5]
-    assert "line 5: solve elastic: ratio 1e-11 after 3 iterations, 42 unknowns, direct, " in bench.blocks.log.lines[-1]
+    assert "line 5: solve elastic: ratio 1e-11 after 3 iterations, 42 unknowns, direct, " in bench.blocks.log.lines[-2]
 
 
 @pytest.mark.parametrize(
     "words, told",
     [("elastic time 1", "elastic with time is for static runs"),
-     ("ratio 1e-3 solver petsc", "solver goes with elastic"),
+     ("ratio 1e-3 solver petsc", "solver goes with elastic"), ("ratio 1e-3 steps 3", "steps goes with elastic"),
+     ("elastic steps 0", "steps"),
      ("elastic solver cg", "auto, direct, petsc"), ("elastic cycles 0", "cycles")],
 )  # fmt: skip
 def test_words_that_do_not_go_with_equilibrium_at_once(bench, words, told):

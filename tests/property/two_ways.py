@@ -25,6 +25,7 @@ from hpcdem import session
 from hpcdem.core.errors import HpcdemError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
+from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.runtime.progress import Log
 from hpcdem.runtime.stop_requests import StopRequests
@@ -93,8 +94,12 @@ class Units:
         return x * self.m / self.t**2
 
     def toughness(self, x: float) -> float:
-        """Energy per area, and forces."""
+        """Energy per area, and forces per metre of thickness."""
         return x * self.m * self.l / self.t**2
+
+    def force(self, x: float) -> float:
+        """Of one bolt, whose spacing is a length."""
+        return x * self.m * self.l**2 / self.t**2
 
 
 @dataclass
@@ -305,9 +310,13 @@ class Writer:
                      f"({u.length(0.7)!r},{u.length(self.high + gap + 0.2)!r}) cells 2 1 type {kind} group 'whole' "
                      "set 'sets'")  # fmt: skip
         self.creeps = self.kind == BLOCKS and kind == "tri" and self.rng("creep").random() < 0.3
+        self.yields = not self.creeps and self.rng("plastic").random() < 0.4
+        self.bolted = self.rng("bolts").random() < 0.35
         self._element_model()
         if self.jointed:
             self._joint_model()
+        if self.bolted:
+            self._bolts()
         if draw.random() < 0.5:
             self._surfaces()
         vy = u.speed(draw.choice((-2.0, -4.0)))
@@ -375,12 +384,41 @@ class Writer:
                          "pcdc element property")  # fmt: skip
             self.add("pcdc model creep on")
             return
-        self._assign("pcdc element c-model mech-iso-e", self.rock, self.where("element"), "properties", 3,
-                     "pcdc element property")  # fmt: skip
+        model = "mech-iso-e"
+        if self.yields:
+            u, rng, model = self.units, self.rng("strength"), "mech-m-c"
+            friction = rng.choice((0.0, 25.0))
+            self.rock = {name: self.rock[name] for name in ("density", "young", "poisson-ratio")} | {
+                "cohesion": u.stress(rng.choice((5e3, 2e4))), "tensile": u.stress(1e4), "friction": friction,
+                "dilation": min(rng.choice((0.0, 10.0)), friction), "damp-factor": self.rock["damp-factor"],
+            }  # fmt: skip
+        self._assign(f"pcdc element c-model {model}", self.rock, self.where("element"), "properties",
+                     5 if self.yields else 3, "pcdc element property")  # fmt: skip
 
     def _joint_model(self) -> None:
         self._assign("pcdc face-joint c-model c-i-c-i", self.joint, self.where("joint"), "joints", 4,
                      "pcdc face-joint property")  # fmt: skip
+
+    def _bolts(self) -> None:
+        """One or two across the lower body, weak enough to slip and to yield; one of them may be tightened."""
+        u, rng = self.units, self.rng("bars")
+        values = {
+            "density": u.density(7850.0), "young": u.stress(rng.choice((1e9, 1e10))), "diameter": u.length(0.02),
+            "tensile-yield-force": u.force(rng.choice((50.0, 400.0))), "spacing": u.length(rng.choice((0.5, 1.0))),
+            "shear-stiffness-rock-bolt": u.stress(1e8), "grout-thickness": u.length(0.005),
+            "cohesion-rock-grout": u.stress(rng.choice((1e3, 1e4))), "cohesion-grout-bolt": u.stress(1e4),
+            "friction-rock-grout": rng.choice((0.0, 20.0)), "pretension-force": u.force(rng.choice((0.0, 10.0))),
+        }  # fmt: skip
+        height = self.high - self.low
+        for k in range(rng.choice((1, 2))):
+            x0, y0 = u.length(0.28 + 0.1 * k), u.length(self.low + 0.1 * height)
+            x1, y1 = u.length(0.65), u.length(self.low + (0.9 - 0.5 * k) * height)
+            ending = " plate" if rng.random() < 0.4 else f" segments {rng.choice((3, 7))}" if rng.random() < 0.5 else ""
+            self.add(f"pcdc bolt create polyline ({x0!r},{y0!r}) ({x1!r},{y1!r}){ending}")
+        where = " range id 0 1000000" if self.has("ranges") else ""
+        if self.has("properties"):  # the same again, and one of them twice
+            self.add(f"pcdc bolt c-model mech-e-p property {_words(values | {'young': 2.0 * values['young']})}{where}")
+        self.add(f"pcdc bolt c-model mech-e-p property {_words(values)}{where}")
 
     def _surfaces(self) -> None:
         u = self.units
@@ -566,6 +604,12 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
         if blocks.creep.on:
             found["creep"] = diagnostics.values(blocks, "creep_strain_xy")
             found["creep time"] = np.array([blocks.creep.time / u.t])
+        if blocks.yielding().any():
+            found["plastic"] = diagnostics.values(blocks, "plastic_shear_strain")
+        bolts = Bolts.there(blocks)
+        if bolts is not None:
+            found["axial force"] = bolts.values("bolt-element", "axial_force") / u.force(1.0)
+            found["slip"] = bolts.values("bolt-node", "slip") / u.l
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
         found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():

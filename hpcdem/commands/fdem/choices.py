@@ -137,7 +137,7 @@ class _Objects:
             raise CommandError(f"{term} makes no sense for elements")
         match term:
             case g.InGroup(group, set_name):
-                return np.isin(self.numbers, self.groups[self.kind].members(group, set_name))
+                return np.isin(self.numbers, self._members(group, set_name))
             case g.InSet(set_name):
                 of = self.groups[self.kind].of_set(set_name)
                 return np.isin(self.numbers, np.concatenate([np.empty(0, np.int64), *of.values()]))
@@ -161,6 +161,17 @@ class _Objects:
                 rows = find_edges(self.edges, self.mesh.cracks, len(self.mesh.points))
                 return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
         raise AssertionError(term)
+
+    def _members(self, group: str, set_name: str) -> np.ndarray:
+        try:
+            return self.groups[self.kind].members(group, set_name)
+        except CommandError as error:
+            of_elements = self.groups[g.ELEMENT].sets.get(set_name, {})
+            if self.kind not in (g.NODE, g.FACE, g.JOINT) or group not in of_elements:
+                raise
+            raise CommandError(
+                f"{error}. '{group}' is a group of elements: face-of chooses their {self.kind}s"
+            ) from None
 
     def _ids(self, first: int, last: int) -> np.ndarray:
         if first > last:

@@ -1,4 +1,4 @@
-"""model new, gravity, option, time-step; reset."""
+"""model new, gravity, option, time-step, rayleigh, creep; reset."""
 
 from __future__ import annotations
 
@@ -54,6 +54,11 @@ def time_step(
     project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)
     if value or mass_scaling or auto is not None:
         project.adapts = bool(auto)
+
+
+def rayleigh(project: Project, ratio: float, frequency: float | None = None, part: str = "both") -> None:
+    """Rayleigh damping of dynamic runs, frequency in Hz; see `ModelDefinition.rayleigh`."""
+    project.blocks.rayleigh(ratio, frequency, part)
 
 
 def creep(

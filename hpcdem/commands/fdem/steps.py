@@ -93,14 +93,15 @@ def solve(
 
 
 def solve_elastic(
-    project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto", time: float | None = None
-) -> None:
+    project: Project, cycles: int = 1, ratio: float | None = None, solver: str = "auto", time: float | None = None,
+    steps: int | None = None,
+) -> None:  # fmt: skip
     """Static equilibrium at once, see `equilibrium.solve_elastic`; the histories and frames that are due then. time: so
     much creep time [s] passes, each creep step at once."""
     project.refuse_inside("model solve elastic")
     coupling.refuse(project, "model solve elastic")
     blocks = project.ready()
-    given = {} if ratio is None else {"ratio": ratio}
+    given: dict[str, Any] = {name: value for name, value in (("ratio", ratio), ("steps", steps)) if value is not None}
     if time is not None:
         _creep_at_once(project, time, solver, given)
         return
@@ -108,8 +109,9 @@ def solve_elastic(
     found = equilibrium.solve_elastic(blocks, cycles=cycles, solver=solver, **given)
     project.solved = {"reason": "ratio", "ratio": found.ratio, "steps": cycles}
     if project.log is not None:
+        parts = f" in {found.increments} increments" if found.increments > 1 else ""
         project.log.info(
-            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations, "
+            f"{_where(project)}solve elastic: ratio {found.ratio:.3g} after {found.iterations} iterations{parts}, "
             f"{found.unknowns} unknowns, {found.solver}, {duration(clocks.monotonic() - began)}"
         )
     _write_due(project)

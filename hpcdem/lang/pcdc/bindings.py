@@ -276,6 +276,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
     "model option": lambda c: fdem.settings.option(c.project, **c.given()),
     "model time-step": lambda c: fdem.settings.time_step(c.project, **c.given()),
+    "model rayleigh": lambda c: fdem.settings.rayleigh(c.project, **c.given()),
     "model creep": lambda c: fdem.settings.creep(c.project, **c.given()),
     "model step": lambda c: fdem.steps.step(c.project, c["steps"]),
     "model solve": _solve,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import warnings
 from collections import Counter
 
-from hpcdem.core.errors import ScriptError
+from hpcdem.commands.fdem.packages import NEEDED
+from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.kinds import Pending, TableName
 from hpcdem.lang.pcdc.source import Source
@@ -25,6 +26,16 @@ def read(text: str, file: str) -> Source:
         except (RecursionError, MemoryError):
             raise source.too_deep(script, lambda text: compile(text, file, "exec")) from None
     return script
+
+
+def packages(script: Source) -> None:
+    """ScriptError at the first line whose package is not here: before kernels are compiled for it."""
+    needed = {statement.command.name: statement for statement in reversed(script.statements)}
+    for name in NEEDED.keys() & needed.keys():
+        try:
+            NEEDED[name]()
+        except HpcdemError as error:
+            raise needed[name].error(str(error)) from None
 
 
 def summary(text: str, file: str) -> str:

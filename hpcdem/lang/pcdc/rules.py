@@ -76,8 +76,9 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
-    if "solver" in arguments and "elastic" not in arguments:
-        raise ValueError("solver goes with elastic; steps need none")
+    for word in ("solver", "steps"):
+        if word in arguments and "elastic" not in arguments:
+            raise ValueError(f"{word} goes with elastic; a run by steps needs none")
 
 
 def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -87,6 +88,14 @@ def _creep(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     for word, with_ in (("change", "dt"), ("least", "change"), ("greatest", "change")):
         if word in arguments and with_ not in arguments:
             raise ValueError(f"{word} goes with {with_}")
+
+
+def _rayleigh(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    others = [word for word in ("frequency", "part") if word in arguments]
+    if arguments["ratio"] == 0.0 and others:
+        raise ValueError(f"ratio 0 takes no {others[0]}")
+    if arguments["ratio"] != 0.0 and not isinstance(arguments["ratio"], Pending) and "frequency" not in arguments:
+        raise ValueError("a ratio goes with frequency, at which the damping has it")
 
 
 def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -108,6 +117,7 @@ _RULES = {
     "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,
+    "model rayleigh": _rayleigh,
     "model solve": _solve,
     "history create": _history,
     "chart add": _curve,

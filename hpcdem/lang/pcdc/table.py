@@ -540,12 +540,12 @@ _MODEL = (
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
-            "stop at ratio 1e-5. With elastic: straight to static equilibrium by linear equations, for elastic blocks "
-            "whose joints stay before their peak and whose surfaces do not touch. A run towards a ratio that gets "
-            "nowhere (window, limit) ends the script with exit code 3 and names the body that slides away; "
-            "`pcdc.solved['reason']` says how a run ended.",
+            "stop at ratio 1e-5. With elastic: straight to static equilibrium by Newton's method, for blocks that are "
+            "elastic or yield, whose joints stay before their peak and whose surfaces do not touch. A run towards a "
+            "ratio that gets nowhere (window, limit) ends the script with exit code 3 and names the body that slides "
+            "away; `pcdc.solved['reason']` says how a run ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
-             "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
+             "pcdc model solve elastic steps 10", "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
                      Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
@@ -563,8 +563,19 @@ _MODEL = (
                      Option("ela{stic}", (), "at once, without steps"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic: SciPy on one rank, the same "
                             "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
-                            "unknowns on", default="auto"))),
+                            "unknowns on", default="auto"),
+                     Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
+                            "equal increments, in each of which elements flow once; one that finds no balance is "
+                            "halved", "", "1"))),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.", later=FLOW),
+    Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
+            "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
+            "pi beta f.",
+            ("pcdc model rayleigh 0.05 frequency 12", "pcdc model rayleigh 0.02 frequency 5 part stiffness",
+             "pcdc model rayleigh 0"),
+            (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: none any more", "1"),),
+            (Option("freq{uency}", (POSITIVE,), "where the ratio is this; with both parts it is least there", "Hz"),
+             Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both"))),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",

@@ -164,7 +164,8 @@ class Budget:
         local, o, dt = sim.local, sim.options, sim.clock.dt
         energy.book(
             sim.n_left, sim.n_own, local.triangle_rows[: local.count], local.quad_rows, local.c, local.q, sim.x, before,
-            after, a, b, of_joints, local.true_mass, o.gx, o.gy, dt, work,
+            after, a, b, of_joints, local.true_mass, o.gx, o.gy, o.mass_damping,
+            o.stiffness_damping, dt, work,
         )  # fmt: skip
         pairs = local.pairs
         energy.book_contact(pairs.rows, sim.n_left, pairs.corners, pushed, before, after, a, b, dt, work)

@@ -43,6 +43,8 @@ SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """What becomes of bodies that overlap before the first step."""
+RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
+"""Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,8 @@ class Traction:
 @dataclass(frozen=True)
 class Options:
     """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`."""
+    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mass_damping [1/s], stiffness_damping [s]: Rayleigh
+    damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -86,6 +89,8 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    mass_damping: float = 0.0
+    stiffness_damping: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -747,9 +752,38 @@ class ModelDefinition:
             changes = {"dt": 0.0, "mass_scaling": 0.0, "auto": False, **changes}
         self._set(**changes)
 
+    def rayleigh(self, ratio: float, frequency: float | None = None, part: str = "both") -> None:
+        """Rayleigh damping C = alpha M + beta K, dynamic runs: `ratio` of the critical one at `frequency` [Hz].
+
+        part "both": xi = (alpha / omega + beta omega) / 2 is least there, alpha = xi omega, beta = xi / omega; "mass":
+        alpha = 2 xi omega alone; "stiffness": beta = 2 xi / omega alone. M: true masses, K: stiffness of the elements,
+        without joints and contact. ratio 0: no more. CommandError in static mode.
+        """
+        if part not in RAYLEIGH:
+            raise CommandError(f"the part of Rayleigh damping is one of {', '.join(RAYLEIGH)}, got {part}")
+        xi = float(finite("the ratio of Rayleigh damping", [ratio])[0])
+        if not 0.0 <= xi < 1.0:
+            raise CommandError(f"the ratio of Rayleigh damping must lie in [0, 1), got {xi:g}")
+        if xi == 0.0:
+            self._set(mass_damping=0.0, stiffness_damping=0.0)
+            return
+        if frequency is None:
+            raise CommandError("Rayleigh damping needs the frequency at which it has its ratio")
+        omega = 2.0 * math.pi * float(finite("the frequency of Rayleigh damping", [frequency])[0])
+        if omega <= 0.0:
+            raise CommandError(f"the frequency of Rayleigh damping must be positive, got {frequency:g} Hz")
+        of_mass, of_stiffness = RAYLEIGH[part]
+        self._set(mass_damping=of_mass * xi * omega, stiffness_damping=of_stiffness * xi / omega)
+
     def _set(self, **changes: Any) -> None:
+        options = replace(self.options, **changes)
+        if not options.dynamic and (options.mass_damping or options.stiffness_damping):
+            raise CommandError(
+                "Rayleigh damping acts in dynamic runs only: it is said after dynamic on, and taken back by ratio 0 "
+                "before dynamic off"
+            )
         self.before_change()
-        self.options = replace(self.options, **changes)
+        self.options = options
         self.changed()
 
     # ---- tables of the kernels -----------------------------------------------------------------------------------

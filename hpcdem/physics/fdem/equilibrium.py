@@ -1,7 +1,11 @@
-"""The static solve: equilibrium of elastic blocks at once, by Newton's method with the tangent of the forces.
+"""The static solve: equilibrium of blocks at once, by Newton's method with the tangent of the forces.
 
 The unbalanced forces are those of the kernels that step, so the answer is a state of the explicit code at rest; only
-the tangent is of its own (physics/fdem/kernels/stiffness.py). Positions of all nodes are known to every rank meanwhile.
+the tangent is of its own (physics/fdem/kernels/stiffness.py, plastic_stiffness.py). Positions of all nodes are known to
+every rank meanwhile.
+
+What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
+tries on the way: `Local.evaluation` puts everything back. `_follow` lets them flow where balance was found.
 """
 
 from __future__ import annotations
@@ -17,11 +21,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels import stiffness
+from hpcdem.physics.fdem.kernels import plastic_stiffness, stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
 from hpcdem.physics.fdem.linear import MANY, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.local import Evaluation
-from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 
 AIM = 1e-12
@@ -38,19 +41,43 @@ WORST = 1e-3
 """Worst balance that is put down to rounding."""
 HALVINGS = 8
 """Of an iteration's way before it is given up."""
+CUTS = 6
+"""How often an increment of the loads is halved that finds no balance."""
+TRIES = 3
+"""Elastic ways in an increment that need not bring forces nearer to balance."""
+STILL = 1e-6
+"""Change of stress by flow, over the largest stress, that does not count, where one flow makes the next one necessary:
+strength that follows tables, quads."""
+PASSES = 100
+"""Most balances at one load, each after the flow of the one before."""
 SOLVERS = ("auto", "direct", "petsc")
 
 
 @dataclass(frozen=True)
 class Balanced:
     """How `solve_elastic` ended. ratio: unbalanced over contributing forces; iterations, factors: of Newton's
-    method; unknowns: components that could move; solver: who solved the linear systems."""
+    method; unknowns: components that could move; solver: who solved the linear systems; increments of the loads."""
 
     ratio: float
     iterations: int
     factors: int
     unknowns: int
     solver: str
+    increments: int = 1
+
+
+@dataclass
+class _Balance:
+    """What Newton's method came to: positions (nn, 2), unbalanced over all forces, iterations, factors, joints behind
+    their peak; error: why this is no balance, "" if it is; ratios: on the way."""
+
+    x: np.ndarray
+    ratio: float
+    iterations: int
+    factors: int
+    past: int
+    error: str
+    ratios: list[float]
 
 
 @dataclass
@@ -65,37 +92,37 @@ class _Nodes:
     v: np.ndarray
 
 
-def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto") -> Balanced:
+def solve_elastic(
+    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1
+) -> Balanced:
     """Put the model into static equilibrium with the loads of this moment, at once.
 
-    Elements are elastic and joints must stay before their peak, so the answer does not depend on the way; it is the
-    one to which relaxation goes. Prescribed velocities act for `cycles` units of time (static mode), what elements
-    that were taken out left behind has died down, velocities are zero afterwards. Counts as `cycles` steps.
+    Elements are elastic or yield after Mohr and Coulomb, and joints must stay before their peak. Without elements that
+    yield the answer does not depend on the way, and is the one to which relaxation goes. Prescribed velocities act for
+    `cycles` units of time (static mode), what elements that were taken out left behind has died down, velocities are
+    zero afterwards. Counts as `cycles` steps.
 
     ratio: unbalanced over contributing forces that must be reached; what rounding allows is aimed at. solver:
     "direct" (SciPy on rank 0: the same bits on any number of ranks), "petsc", "auto": PETSc, if it is there, from
-    400 000 unknowns on, else direct.
+    400 000 unknowns on, else direct. steps: what is out of balance, and prescribed movement, is brought on in so many
+    equal increments, in each of which elements flow once; one that finds no balance is halved, up to `CUTS` times.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
-    that touch (before or in the answer), elements that can yield, joints behind their peak (before or in the answer),
-    no convergence.
+    that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
+    convergence.
     """
     if cycles < 1 or not ratio > 0.0 or solver not in SOLVERS:
         raise CommandError(f"cycles and ratio must be positive, solver one of {', '.join(SOLVERS)}")
+    if steps < 1:
+        raise CommandError(f"steps must be positive, got {steps}")
     for load in sim.surface_loads:
         raise CommandError(
             f"the static solve knows no {load.name}: model solve relaxes blocks with them to equilibrium"
         )
-    yielding = np.flatnonzero(sim.yielding())
-    if len(yielding):
-        raise CommandError(
-            f"element {yielding[0]} can yield ({len(yielding)} have the model {MECH_MOHR_COULOMB.name}): the static "
-            "solve takes elastic elements; model solve relaxes others to equilibrium"
-        )
     if laws := user_laws.in_use(sim):
         raise CommandError(
-            f"{user_laws.some(sim)} has the law {laws[0].title}: the static solve takes elastic elements; model solve "
-            "relaxes others to equilibrium"
+            f"{user_laws.some(sim)} has the law {laws[0].title}: the static solve has no tangent of it; model solve "
+            "relaxes such elements to equilibrium"
         )
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
@@ -104,20 +131,43 @@ def solve_elastic(sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: s
     nodes = _all_nodes(sim)
     unknowns = _unknowns(sim, nodes, cycles)
     _refuse_loose_bodies(sim, nodes, unknowns)
-    with _at_rest(sim, nodes):
-        x, balanced = _newton(sim, nodes, unknowns, ratio, _linear_solver(sim, solver, unknowns, nodes))
-    relaxations, sim.relaxations = sim.relaxations, []
-    _settle(sim, nodes, x, unknowns.given / cycles)
-    touching = _touching(sim)
-    inverted = float(_inverted(sim))
-    if touching or sim.comm.max_into(np.array([inverted]))[0]:
+    if sim.yielding().any():
+        sim.before_change()  # what flows is the doing of a command
+        sim.close_model()
+    relaxations, remembered = sim.relaxations, _remembered(sim)
+    try:
+        with _at_rest(sim, nodes):
+            x, balanced = _follow(
+                sim, nodes, unknowns, ratio, _linear_solver(sim, solver, unknowns, nodes), steps, cycles
+            )
+        sim.relaxations = []
+        _settle(sim, nodes, x, unknowns.given / cycles)
+        _refuse_touching(sim, _touching(sim), "touch in the equilibrium that was found")
+        if sim.comm.any(_inverted(sim)):
+            raise CommandError("an element is turned inside out in the equilibrium that was found: loads are too large")
+    except CommandError:
         sim.relaxations = relaxations
+        sim.before_change()
+        _put_back(sim, *remembered)
         _settle(sim, nodes, nodes.x, nodes.v)
-        if touching:
-            _refuse_touching(sim, touching, "touch in the equilibrium that was found")
-        raise CommandError("an element is turned inside out in the equilibrium that was found: loads are too large")
+        raise
     sim.clock.step += cycles
     return balanced
+
+
+def _remembered(sim: Blocks) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Numbers of the owned elements and what they remember of yielding."""
+    kept = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
+    return sim.number[sim.owned].copy(), kept
+
+
+def _put_back(sim: Blocks, number: np.ndarray, kept: dict[str, np.ndarray]) -> None:
+    """What elements remember is that of `_remembered` again, whoever owns them now; the model is open. Collective."""
+    parts = sim.comm.allgather((number, kept)) if sim.comm.size > 1 else [(number, kept)]
+    every = np.concatenate([part[0] for part in parts])
+    place = np.argsort(every)[np.searchsorted(np.sort(every), sim.number)]
+    for name in kept:
+        sim.cold[name][:] = np.concatenate([part[1][name] for part in parts])[place]
 
 
 # ---- who can move --------------------------------------------------------------------------------------------
@@ -354,44 +404,150 @@ def _linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: _Nodes) 
     return (Petsc if there else Direct)(sim.comm, unknowns, nodes.owner)
 
 
-def _newton(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc
+def _follow(
+    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int
 ) -> tuple[np.ndarray, Balanced]:
-    """Positions of the nodes in equilibrium (nn, 2)."""
-    x, left, renew = nodes.x, 1.0 if unknowns.given.any() else 0.0, True
-    iterations = factors = past = 0
-    rounding = noise = 0.0
-    force, ratio, total = _unbalanced(sim, nodes, unknowns, x)
+    """Positions of the nodes in equilibrium (nn, 2), by increments: what is out of balance at the beginning grows
+    smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
+    yields, step = sim.local.yields, sim.clock.step + cycles - 1
+    solver.flows = yields
+    x, iterations, factors, increments = nodes.x, 0, 0, 0
+    unit, done = 1 << CUTS if yields else 1, 0
+    whole, size = steps * unit, unit
+    missing = np.zeros(x.shape)
     try:
-        while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
-            if renew:
-                _place_corners(sim, x)
-                pieces, past = tangent(sim)
-                rounding = _rounding(sim, pieces, x)
-                solver.factor(pieces)
-                factors += 1
-            way = solver.solve(force, left)
-            iterations += 1
-            found = _along(sim, nodes, unknowns, x, way, ratio, left, enough)
-            if found is None:
-                if renew or ratio <= enough:
-                    break  # as near as rounding allows, or never
-                renew = True
+        if yields:
+            _flow(sim, x, step)
+        if whole > 1:
+            missing = _unbalanced(sim, nodes, unknowns, x)[0]
+        while done < whole:
+            size = min(size, whole - done)
+            left = 1.0 - (done + size) / whole
+            found = _balance(sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step)
+            iterations, factors = iterations + found.iterations, factors + found.factors
+            if found.error and size > 1:
+                size //= 2
                 continue
-            part, x, force, after, total = found
-            left = max(left * (1.0 - part), 0.0)
-            noise = rounding / total if total > 0.0 else 0.0
-            slow = after > 0.5 * ratio
-            done = left == 0.0 and slow and (after <= noise or (renew and after <= enough))
-            renew, ratio = left > 0.0 or after > max(RENEW * ratio, noise), after
-            if done:
-                break
-        _place_corners(sim, x)
-        _, past = tangent(sim, matrices=False)
+            _refuse_yielded(sim, found.past, "would pass their peak")
+            if found.error:
+                raise CommandError(found.error + _reached(sim, done / whole))
+            x, done, increments = found.x, done + size, increments + 1
+            size = min(2 * size if done % (2 * size) == 0 else size, unit)
     finally:
         solver.close()
-    _refuse_yielded(sim, past, "would pass their peak")
-    if left > 0.0 or not ratio <= max(enough, min(noise, WORST)):
+    if found.ratio > enough and sim.log is not None:
+        sim.log.info(
+            f"unbalanced over all forces is {found.ratio:.3g} instead of {enough:g}: strains are so small that "
+            "positions are rounded more coarsely than that"
+        )
+    return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
+
+
+def _reached(sim: Blocks, part: float) -> str:
+    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads" if sim.local.yields else ""
+
+
+def _balance(
+    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
+    missing: np.ndarray, given: float, step: int,
+) -> _Balance:  # fmt: skip
+    """Balance of an increment, see `_newton`, where elements that can yield have flowed; as it was, if there is none.
+
+    One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, and in
+    quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on."""
+    first = _newton(sim, nodes, unknowns, enough, solver, x, missing, given)
+    if not sim.local.yields or first.error:
+        return first
+    before = [part.copy() for part in sim.local.plastic_state()]
+    found, again = first, sim.wide or "softening" in sim.cold
+    for _ in range(PASSES):
+        _flow(sim, found.x, step)
+        if not again:
+            return found
+        found.ratio = _unbalanced(sim, nodes, unknowns, found.x, missing)[1]
+        if found.ratio <= enough and _still_to_flow(sim) <= STILL:
+            return found
+        after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0)
+        after.iterations, after.factors = after.iterations + found.iterations, after.factors + found.factors
+        found = after
+        if found.error:
+            break
+    for part, values in zip(sim.local.plastic_state(), before):
+        part[:] = values
+    found.error = found.error or f"the static solve does not converge: elements still flow after {PASSES} balances"
+    return found
+
+
+def _still_to_flow(sim: Blocks) -> float:
+    """Largest change of a stress by the flow of this moment over the largest stress. Collective."""
+    local = sim.local
+    _, after, of_quads = local.flowed()
+    largest = np.abs(local.stresses(energies=False)[0]).max(initial=0.0)
+    parts = [np.abs(new - old).max(initial=0.0) for new, old in ((after, local.s0), (of_quads, local.quad_s0))]
+    change, largest = sim.comm.max_into(np.array([max(parts), largest])).tolist()
+    return change / largest if largest > 0.0 else 0.0
+
+
+def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
+    """Elements outside their yield surface flow at these positions of the nodes (nn, 2), for good."""
+    _place_corners(sim, x)
+    sim.local.flow(sim.local.plastic_state(), step)
+
+
+def _newton(
+    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
+    missing: np.ndarray, given: float,
+) -> _Balance:  # fmt: skip
+    """Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
+    prescribed on."""
+    left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yields
+    # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
+    # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
+    # neighbours such a way may well bring more unbalanced forces.
+    elastic, tries = True, TRIES if yields else 0
+    iterations = factors = past = 0
+    rounding = noise = 0.0
+    force, ratio, total = _unbalanced(sim, nodes, unknowns, x, missing)
+    ratios, error = [ratio], ""
+    while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
+        if renew:
+            _place_corners(sim, x)
+            pieces, past = tangent(sim, flows=not elastic)
+            rounding = _rounding(sim, pieces, x)
+            try:
+                solver.factor(pieces)
+            except CommandError as singular:
+                error = str(singular)
+                break
+            factors += 1
+        try:
+            way = solver.solve(force, left)
+        except CommandError as singular:
+            error = str(singular)
+            break
+        iterations += 1
+        bold = elastic and tries > 0 and ratio > enough
+        tries -= bold
+        found = _along(sim, nodes, unknowns, x, way, ratio, left > 0.0 or bold, enough, missing)
+        if found is None:
+            if ratio <= enough or (renew and (elastic or not tries)):
+                break  # as near as rounding allows, or never
+            renew, elastic = True, renew or not yields
+            continue
+        part, x, force, after, total = found
+        left = max(left * (1.0 - part), 0.0)
+        noise = rounding / total if total > 0.0 else 0.0
+        slow = after > 0.5 * ratio and not bold
+        done = left == 0.0 and slow and (after <= noise or (renew and after <= enough))
+        elastic = not yields
+        renew = left > 0.0 or after > max(0.0 if yields else RENEW * ratio, noise)
+        ratio = after
+        ratios.append(ratio)
+        if done:
+            break
+    _place_corners(sim, x)
+    _, past = tangent(sim, matrices=False)
+    if not error and (left > 0.0 or not ratio <= max(enough, min(noise, WORST))):
         noise = rounding / total if 0.0 < total < math.inf else noise
         why = (
             f"positions are rounded to the last bit, which alone makes about {noise:.1g}: coordinates are too "
@@ -399,16 +555,11 @@ def _newton(
             if noise > enough
             else "the loads may be more than the model can bear: use relaxation (model solve)"
         )
-        raise CommandError(
+        error = (
             f"the static solve does not converge: unbalanced over all forces is {ratio:.3g} after {iterations} "
             f"iterations, {enough:g} is asked for; {why}"
         )
-    if ratio > enough and sim.log is not None:
-        sim.log.info(
-            f"unbalanced over all forces is {ratio:.3g} instead of {enough:g}: strains are so small that positions "
-            "are rounded more coarsely than that"
-        )
-    return x, Balanced(ratio, iterations, factors, unknowns.count, solver.name)
+    return _Balance(x, ratio, iterations, factors, past, error, ratios)
 
 
 def _along(
@@ -418,18 +569,20 @@ def _along(
     x: np.ndarray,
     way: np.ndarray,
     ratio: float,
-    left: float,
+    bold: bool,
     enough: float,
+    missing: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float, float] | None:
     """The largest of the parts 1, 1/2, 1/4 ... of the way that brings forces nearer to balance, and what is there:
-    position, forces, ratio, sum of forces. While prescribed movements are made they may be out of balance."""
+    position, forces, ratio, sum of forces. bold: they may as well be farther from it, as while prescribed movements
+    are made."""
     part = 1.0
     for _ in range(HALVINGS):
         trial = x + part * way
-        force, after, total = _unbalanced(sim, nodes, unknowns, trial)
-        if after < ratio or (left > 0.0 and after < 1.0):
+        force, after, total = _unbalanced(sim, nodes, unknowns, trial, missing)
+        if after < ratio or (bold and after < 1.0):
             return part, trial, force, after, total
-        if ratio <= enough and left == 0.0:
+        if ratio <= enough and not bold:
             return None
         part *= 0.5
     return None
@@ -444,13 +597,15 @@ def _rounding(sim: Blocks, pieces: list[Pieces], x: np.ndarray) -> float:
     return exact_sum(np.concatenate(parts), sim.comm) * float(np.finfo(np.float64).eps)
 
 
-def _unbalanced(sim: Blocks, nodes: _Nodes, unknowns: Unknowns, x: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """Forces (nn, 2) on nodes at these positions, conditions left out, the ratio, and the sum of the sizes of all
-    forces [N/m]; equal on all ranks. The ratio is infinite where forces are no numbers."""
+def _unbalanced(
+    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, x: np.ndarray, missing: np.ndarray | float = 0.0
+) -> tuple[np.ndarray, float, float]:
+    """Forces (nn, 2) on nodes at these positions, conditions and `missing` left out, the ratio, and the sum of the
+    sizes of all forces [N/m]; equal on all ranks. The ratio is infinite where forces are no numbers."""
     with np.errstate(invalid="ignore", over="ignore"):
         _place_corners(sim, x)
         seen = sim.local.evaluation(contact=False)
-    force, sizes = _node_forces(sim, seen), diagnostics.contributing(sim, seen)
+    force, sizes = _node_forces(sim, seen) - missing, diagnostics.contributing(sim, seen)
     if sim.comm.any(not np.isfinite(sizes).all()) or not np.isfinite(force).all():
         return force, math.inf, math.inf
     total = exact_sum(sizes, sim.comm)
@@ -475,8 +630,9 @@ def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
     return out
 
 
-def tangent(sim: Blocks, matrices: bool = True) -> tuple[list[Pieces], int]:
-    """Stiffness of the owned elements and joints at the present positions, and joints behind their peak."""
+def tangent(sim: Blocks, matrices: bool = True, flows: bool = True) -> tuple[list[Pieces], int]:
+    """Stiffness of the owned elements and joints at the present positions, and joints behind their peak. flows: less
+    what the flow of elements takes from it."""
     local, small = sim.local, not sim.options.large_strain
     slots = _lower_slots(sim)
     joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
@@ -488,10 +644,20 @@ def tangent(sim: Blocks, matrices: bool = True) -> tuple[list[Pieces], int]:
     past = int((left < 0.0).sum())
     if not matrices:
         return [], past
-    rows = local.triangle_rows[: local.count]
-    triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(local.quad_rows), 8, 8))
-    stiffness.triangles(rows, sim.x, *local.linear(), small, triangles)
-    stiffness.quads(local.quad_rows, sim.x, local.q, local.quad_s0, small, quads)
+    rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
+    triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
+    (c, s0), quad_s0 = local.linear(), local.quad_s0
+    if local.yields:
+        _, flowed, quad_s0 = local.flowed()
+        held = local.creeping if local.creeps else np.empty(0, np.int64)
+        flowed[held] = s0[held]
+        s0 = flowed
+    stiffness.triangles(rows, sim.x, c, s0, small, triangles)
+    stiffness.quads(quad_rows, sim.x, local.q, quad_s0, small, quads)
+    if local.yields and flows:
+        table = local.yield_table
+        plastic_stiffness.triangles(rows, sim.x, local.c, local.s0, local.law, table, small, triangles)
+        plastic_stiffness.quads(quad_rows, sim.x, local.q, local.quad_s0, local.quad_law, table, small, quads)
     of_triangles, of_quads = number[rows], number[local.quad_rows]
     face = local.slot_face[slots]
     ends = []

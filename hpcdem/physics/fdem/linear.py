@@ -106,9 +106,11 @@ class Unknowns:
 
 
 class Direct:
-    """Factors on rank 0, by SciPy."""
+    """Factors on rank 0, by SciPy. flows: of a matrix with plastic flow, which need not be nearly symmetric: rows are
+    exchanged where the diagonal is small."""
 
     name = "direct (SciPy)"
+    flows = False
 
     def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
         self.comm, self.unknowns = comm, unknowns
@@ -136,13 +138,13 @@ class Direct:
         matrix = coo_matrix((values, (rows.astype(np.int32), columns.astype(np.int32))), (n, n)).tocsc()
         # Stiffness is nearly symmetric with a large diagonal: no rows need to be exchanged, and the ordering for
         # symmetric patterns fills in least. Scaling by the diagonal makes stiff joints and soft rock alike.
-        diagonal = matrix.diagonal()
+        diagonal = np.abs(matrix.diagonal()) if self.flows else matrix.diagonal()
         if not (np.isfinite(matrix.data).all() and (diagonal > 0.0).all()):
             return SINGULAR
         self._scale = 1.0 / np.sqrt(diagonal)
         matrix.data *= np.repeat(self._scale, np.diff(matrix.indptr)) * self._scale[matrix.indices]
         try:
-            self._factors = splu(matrix, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+            self._factors = splu(matrix, "MMD_AT_PLUS_A", 0.1 if self.flows else 0.0, options={"SymmetricMode": True})
         except RuntimeError:
             return SINGULAR
         except MemoryError:
@@ -165,7 +167,10 @@ class Direct:
 
 
 class Petsc:
-    """Rows shared out as nodes are owned: MUMPS if PETSc has it, else GMRES with algebraic multigrid."""
+    """Rows shared out as nodes are owned: MUMPS if PETSc has it, else GMRES with algebraic multigrid. flows: as of
+    `Direct`, without effect."""
+
+    flows = False
 
     def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
         """owner (nn,): rank of each node."""

@@ -479,7 +479,7 @@ class Local:
             return math.inf
         least = limits.time_step(
             self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
-            o.safety, target, self.true_mass.copy() if mass is None else mass,
+            o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
 
@@ -569,29 +569,32 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self._flow(*self._plastic_state())
+            self.flow(self.plastic_state(), step)
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
-            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, alpha, step, self.tally
-        )
+            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, o.mass_damping,
+            o.stiffness_damping, alpha, step, self.tally,
+        )  # fmt: skip
         if len(self.quad_rows):
-            self._quads(*self._quad_args, force, of_joints, keep, o.gx, o.gy, step, self.tally)
+            self._quads(
+                *self._quad_args, force, of_joints, keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping, step,
+                self.tally,
+            )  # fmt: skip
 
-    def _plastic_state(self) -> tuple[np.ndarray, ...]:
+    def plastic_state(self) -> tuple[np.ndarray, ...]:
         """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""
         return self.sim.cold["plastic"], self.s0, self.quad_s0, self.yield_table, self.strength.history
 
-    def _flow(
-        self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, table: np.ndarray, history: np.ndarray
-    ) -> None:
-        """Elements outside their yield surface at the present positions flow: the arrays of `_plastic_state`, or copies
-        of them, become those after it."""
+    def flow(self, state: tuple[np.ndarray, ...], step: int) -> None:
+        """Elements outside their yield surface at the present positions flow: the arrays of `plastic_state`, or copies
+        of them, become those after it. step: in which they do."""
+        memory, s0, quad_s0, table, history = state
         sim, one = self.sim, self.sim.threads == 1
-        small, step = not sim.options.large_strain, sim.clock.step
+        small = not sim.options.large_strain
         soft = self.strength._replace(history=history)
         kernel = plasticity.flows if one else plasticity.flows_threaded
         kernel(
@@ -670,9 +673,9 @@ class Local:
         """What elements remember of yielding (n_own, 9 or 36) and the stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], after the flow of this moment, which the next forces will see:
         copies."""
-        after = tuple(part.copy() for part in self._plastic_state())
+        after = tuple(part.copy() for part in self.plastic_state())
         if self.yields:
-            self._flow(*after)
+            self.flow(after, self.sim.clock.step)
         return after[0], after[1], after[2]
 
     def plastic_columns(self, at: slice | np.ndarray) -> np.ndarray:
@@ -745,7 +748,7 @@ class Local:
             for table in (
                 sim.v, pairs.history, pairs.largest, pairs.touching, self.slot_law, self.slot_state, self.head,
                 self.follow, self.tally, self.outside, self.felt,
-                *(self._plastic_state() if self.yields else ()),
+                *(self.plastic_state() if self.yields else ()),
                 *((sim.cold["creep"],) if self._creeps_now() else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
                 *((self.s0,) if self.laws or self._creeps_now() else ()),

@@ -15,13 +15,15 @@ ONE = np.eye(2)
 
 
 class Solid(NamedTuple):
-    """Lame's lambda, 2 mu [Pa], viscosity [Pa s], initial stress (2, 2) [Pa], and whether strains are small."""
+    """Lame's lambda, 2 mu [Pa], viscosity [Pa s], initial stress (2, 2) [Pa], whether strains are small, and the
+    stiffness-proportional damping [s]."""
 
     lame: float
     two_mu: float
     eta: float
     stress0: np.ndarray
     small: bool
+    beta: float = 0.0
 
 
 class Deformation(NamedTuple):
@@ -51,7 +53,8 @@ def deformation(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, small: bool) -> 
 
 def forces_of_strain(d: Deformation, strain: np.ndarray, rate: np.ndarray, solid: Solid) -> np.ndarray:
     """Forces (3, 2) [N/m] on the corners: f_l = -A sigma grad N_l, sigma = R (sigma_0 + lambda tr(e) + 2 mu e + eta
-    de/dt) R^T."""
+    de/dt) R^T, e the strain and beta times its rate."""
+    strain = strain + solid.beta * rate
     sigma = solid.stress0 + solid.lame * np.trace(strain) * ONE + solid.two_mu * strain + solid.eta * rate
     return -d.area * d.gradients @ (d.rotation @ sigma @ d.rotation.T)
 

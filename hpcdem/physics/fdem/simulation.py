@@ -496,6 +496,11 @@ class Blocks(State):
             raise CommandError(f"element {bare[0]} has no model ({len(bare)} elements in all)")
         if not self.alive.any():
             raise CommandError("there are no elements left")
+        if self.options.stiffness_damping and user_laws.in_use(self):
+            raise CommandError(
+                f"the stiffness of {user_laws.some(self)}, which has a law of the user, is not known: Rayleigh damping "
+                "can have its part mass only"
+            )
 
     def renew_topology(self) -> None:
         """Which corners are one node."""

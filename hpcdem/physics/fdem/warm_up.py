@@ -71,6 +71,8 @@ def _flow(mesh: Mesh, threads: int) -> None:
     changes.element_model(sim, None, "mech_mohr_coulomb", weak)
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
+    sim.close_model()
+    equilibrium.tangent(sim)
     diagnostics.account_energy(sim)
     convergence.advance(sim, 2)
     diagnostics.energies(sim)

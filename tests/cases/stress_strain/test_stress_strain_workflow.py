@@ -172,22 +172,29 @@ def test_stress_grows_with_depth_where_a_detachment_is_weak(manual: Chapter) -> 
 @pytest.mark.slow
 @pytest.mark.mpi
 def test_thrusts_of_the_example_are_bands_of_their_sign(launch: Launcher, tmp_path: Path) -> None:
-    """examples/push.py, whole: bands across the beds, positive where they rise to the right (forethrusts), negative
-    where they rise to the left; the strongest is a forethrust."""
-    done = launch(2, ROOT / "examples" / "push.py", "--outdir", tmp_path / "data", "--no-figure", timeout=900)
-    assert done.returncode == 0, done.stdout + done.stderr
-    chosen = tmp_path / "datass"
-    chosen.mkdir()
-    for file in list_frames(tmp_path / "data"):
-        if file.step > 8000 or (file.step == 8000 and file.path.stem.endswith("_ini")):
-            shutil.copy(file.path, chosen)
-    done = launch(2, "-s", chosen)
-    assert done.returncode == 0, done.stdout + done.stderr
-    last = read_section(max((chosen / "ss" / "data").glob("*.npz")))
-    found = bands(last, 0.1, 40)
-    assert len(found) >= 3
-    assert all(clockwise == (angle > 0.0) for angle, clockwise, _ in found)
-    assert [clockwise for _, clockwise, _ in found[:2]] == [True, True]  # two thrust sheets
-    assert not all(clockwise for _, clockwise, _ in found)  # and conjugates of them
-    _, _, strain = last.mean_strain()
-    assert (strain > 1.0).sum() > 2 * (strain < -1.0).sum()
+    """examples/push.py, whole, with five seeds, as the number of bands of one run is chance: bands across the beds,
+    positive where they rise to the right (forethrusts), negative where they rise to the left; the strongest is a
+    forethrust, and conjugates have less strain."""
+    text = (ROOT / "examples" / "push.py").read_text()
+    assert "SET seed 20\n" in text
+    forethrusts = []
+    for seed in (20, 1, 2, 3, 4):
+        folder = tmp_path / str(seed)
+        chosen = folder / "datass"
+        chosen.mkdir(parents=True)
+        (folder / "push.py").write_text(text.replace("SET seed 20\n", f"SET seed {seed}\n"))
+        done = launch(2, folder / "push.py", "--no-figure", timeout=900)
+        assert done.returncode == 0, done.stdout + done.stderr
+        for file in list_frames(folder / "data"):
+            if file.step > 8000 or (file.step == 8000 and file.path.stem.endswith("_ini")):
+                shutil.copy(file.path, chosen)
+        done = launch(2, "-s", chosen)
+        assert done.returncode == 0, done.stdout + done.stderr
+        last = read_section(max((chosen / "ss" / "data").glob("*.npz")))
+        found = bands(last, 0.1, 40)
+        assert found and all(clockwise == (angle > 0.0) for angle, clockwise, _ in found)
+        assert found[0][1]
+        _, _, strain = last.mean_strain()
+        assert (strain > 1.0).sum() > 2 * (strain < -1.0).sum() > 0
+        forethrusts.append(sum(clockwise for _, clockwise, _ in found))
+    assert sum(forethrusts) > len(forethrusts)  # here and there two thrust sheets

@@ -96,8 +96,8 @@ def _gather_edge(n, first, k, x, partner, law, table, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stress(n, small, lanes):
-    """Corner forces from the stress, viscous part included: f_l = sigma n s / 2, n s of the face opposite to l."""
+def _stress(n, small, beta, lanes):
+    """Corner forces from the stress, viscous parts included: f_l = sigma n s / 2, n s of the face opposite to l."""
     for e in range(U(n)):
         x1, y1 = lanes[X1 + e], lanes[Y1 + e]
         ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
@@ -109,9 +109,11 @@ def _stress(n, small, lanes):
         vx1, vy1 = lanes[VX1 + e], lanes[VY1 + e]
         dux, duy, dwx, dwy = lanes[VX2 + e] - vx1, lanes[VY2 + e] - vy1, lanes[VX3 + e] - vx1, lanes[VY3 + e] - vy1
         g11, g12, g21, g22 = dux * a + dwx * c, dux * b + dwx * d, duy * a + dwy * c, duy * b + dwy * d
-        p, m, eta = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e], lanes[VISC + e]
-        s11 = lanes[S11 + e] + (p + m * e11) + eta * (cs * g11 + sn * g21)
-        s22 = lanes[S22 + e] + (p + m * e22) + eta * (cs * g22 - sn * g12)
+        p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
+        d11, d22, eta = cs * g11 + sn * g21, cs * g22 - sn * g12, lanes[VISC + e] + beta * m
+        swell = beta * lanes[LAM + e] * (d11 + d22)
+        s11 = lanes[S11 + e] + (p + m * e11) + (eta * d11 + swell)
+        s22 = lanes[S22 + e] + (p + m * e22) + (eta * d22 + swell)
         s12 = lanes[S12 + e] + m * e12 + 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
         xx, yy, xy = laws.turned(s11, s22, s12, cs, sn)
         if small:
@@ -183,14 +185,17 @@ def _any_quad_past_peak(n, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum(n, gx, gy, lanes):
-    """Stress, gravity and joints of each corner; edge k begins at corner k and ends at the next one."""
+def _sum(n, gx, gy, drag, lanes):
+    """Stress, gravity, drag on the mass, joints of each corner; edge k begins at corner k and ends at the next one."""
     for e in range(U(n)):
-        wx, wy = lanes[MASS + e] * gx, lanes[MASS + e] * gy
+        m = lanes[MASS + e]
+        wx, wy = m * (gx - drag * lanes[VX1 + e]), m * (gy - drag * lanes[VY1 + e])
         lanes[FX1 + e] = (lanes[FX1 + e] + wx) + (lanes[A0 + e] + lanes[A2 + _B + e])
         lanes[FY1 + e] = (lanes[FY1 + e] + wy) + (lanes[A0 + _NEXT + e] + lanes[A2 + _B + _NEXT + e])
+        wx, wy = m * (gx - drag * lanes[VX2 + e]), m * (gy - drag * lanes[VY2 + e])
         lanes[FX2 + e] = (lanes[FX2 + e] + wx) + (lanes[A1 + e] + lanes[A0 + _B + e])
         lanes[FY2 + e] = (lanes[FY2 + e] + wy) + (lanes[A1 + _NEXT + e] + lanes[A0 + _B + _NEXT + e])
+        wx, wy = m * (gx - drag * lanes[VX3 + e]), m * (gy - drag * lanes[VY3 + e])
         lanes[FX3 + e] = (lanes[FX3 + e] + wx) + (lanes[A2 + e] + lanes[A1 + _B + e])
         lanes[FY3 + e] = (lanes[FY3 + e] + wy) + (lanes[A2 + _NEXT + e] + lanes[A1 + _B + _NEXT + e])
 
@@ -312,7 +317,7 @@ def _store_joints(n, first, rows, force, lanes):
 def _triangles(
     t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
     table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-    of_joints, keep_joints, gx, gy, alpha, step, tally,
+    of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
 ):  # fmt: skip
     lanes = np.zeros(LANES * CAPACITY)
     x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
@@ -323,7 +328,7 @@ def _triangles(
         first = b * BLOCK
         n = min(BLOCK, count - first)
         _gather(n, first, rows, wide, x, v, c, s0, stressed, lanes)
-        _stress(n, small, lanes)
+        _stress(n, small, beta, lanes)
         _gather_edge(n, first, 0, x, partner, law, flat_table, lanes)
         _edge_loop_0(n, lanes)
         _gather_edge(n, first, 1, x, partner, law, flat_table, lanes)
@@ -337,7 +342,7 @@ def _triangles(
             )  # fmt: skip
         if keep_joints:
             _store_joints(n, first, rows, of_joints, lanes)
-        _sum(n, gx, gy, lanes)
+        _sum(n, gx, gy, drag, lanes)
         _add_contacts(b, contact_begin, contact_lane, contact_slot, pushed, lanes)
         if some_special[b]:
             _store(n, first, rows, special, force, lanes)
@@ -356,7 +361,7 @@ def triangles(threads, *args):
     laws as long as the joint is before its peak, else 0; kind: that row whatever its state; state, history: see
     joints.py; head (blocks,), follow (3 count,) i4: lists of joints behind their peak; contact_*: which contact forces
     `pushed` (k, 8) fall on which lane of which block; special (count,), some_special (blocks,) bool; force, of_joints
-    (n, 8) [N/m]; alpha: local damping; tally (threads, 8) i8.
+    (n, 8) [N/m]; drag [1/s], beta [s]: Rayleigh damping; alpha: local damping; tally (threads, 8) i8.
     """
     for t in range(threads):
         _triangles(t, threads, *args)
@@ -366,14 +371,14 @@ def triangles(threads, *args):
 def triangles_threaded(
     threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
     table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-    of_joints, keep_joints, gx, gy, alpha, step, tally,
+    of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _triangles(
             t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
             follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-            of_joints, keep_joints, gx, gy, alpha, step, tally,
+            of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
         )  # fmt: skip
 
 
@@ -461,7 +466,7 @@ def _overlay_loop(overlay):
     first = overlay == 0
 
     @njit(cache=True, nogil=True, error_model="numpy")
-    def loop(n, small, lanes):
+    def loop(n, small, beta, lanes):
         for e in range(U(n)):
             x1, y1, x2, y2 = lanes[xi + e], lanes[xi + _NEXT + e], lanes[xj + e], lanes[xj + _NEXT + e]
             x3, y3, x4, y4 = lanes[xk + e], lanes[xk + _NEXT + e], lanes[xl + e], lanes[xl + _NEXT + e]
@@ -486,10 +491,11 @@ def _overlay_loop(overlay):
             a11, a22, a12 = _rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
             b11, b22, b12 = _rate(x1, y1, x3, y3, x4, y4, f, g, h, m, cs2, sn2)
             rate = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
-            shift = 0.5 * (rate - (a11 + a22))
-            s11, s22, s12 = s11 + eta * (a11 + shift), s22 + eta * (a22 + shift), s12 + eta * a12
+            eta, swell, shift = eta + beta * two_mu, beta * lame * rate, 0.5 * (rate - (a11 + a22))
+            s11, s22 = s11 + (eta * (a11 + shift) + swell), s22 + (eta * (a22 + shift) + swell)
             shift = 0.5 * (rate - (b11 + b22))
-            t11, t22, t12 = t11 + eta * (b11 + shift), t22 + eta * (b22 + shift), t12 + eta * b12
+            t11, t22 = t11 + (eta * (b11 + shift) + swell), t22 + (eta * (b22 + shift) + swell)
+            s12, t12 = s12 + eta * a12, t12 + eta * b12
             ax1, ay1, ax2, ay2 = _part_forces(ux1, uy1, wx1, wy1, cs1, sn1, s11, s22, s12)
             bx1, by1, bx3, by3 = _part_forces(ux2, uy2, wx2, wy2, cs2, sn2, t11, t22, t12)
             if first:
@@ -647,8 +653,8 @@ def _slow_quad_joints(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum_quads(n, gx, gy, lanes):
-    """Stress, gravity and joints of each corner; edge k begins at corner k and ends at the next one."""
+def _sum_quads(n, gx, gy, drag, lanes):
+    """Stress, gravity, drag on the mass, joints of each corner; edge k begins at corner k and ends at the next one."""
     for e in range(U(n)):
         bx1, by1 = lanes[A0 + e] + lanes[A3 + _B + e], lanes[A0 + _NEXT + e] + lanes[A3 + _B + _NEXT + e]
         bx2, by2 = lanes[A1 + e] + lanes[A0 + _B + e], lanes[A1 + _NEXT + e] + lanes[A0 + _B + _NEXT + e]
@@ -656,14 +662,14 @@ def _sum_quads(n, gx, gy, lanes):
         bx4, by4 = lanes[A3 + e] + lanes[A2 + _B + e], lanes[A3 + _NEXT + e] + lanes[A2 + _B + _NEXT + e]
         lanes[B1 + e], lanes[B1 + _NEXT + e], lanes[B2 + e], lanes[B2 + _NEXT + e] = bx1, by1, bx2, by2
         lanes[B3 + e], lanes[B3 + _NEXT + e], lanes[B4 + e], lanes[B4 + _NEXT + e] = bx3, by3, bx4, by4
-        lanes[FX1 + e] = (lanes[FX1 + e] + lanes[Q_M1 + e] * gx) + bx1
-        lanes[FY1 + e] = (lanes[FY1 + e] + lanes[Q_M1 + e] * gy) + by1
-        lanes[FX2 + e] = (lanes[FX2 + e] + lanes[Q_M2 + e] * gx) + bx2
-        lanes[FY2 + e] = (lanes[FY2 + e] + lanes[Q_M2 + e] * gy) + by2
-        lanes[FX3 + e] = (lanes[FX3 + e] + lanes[Q_M3 + e] * gx) + bx3
-        lanes[FY3 + e] = (lanes[FY3 + e] + lanes[Q_M3 + e] * gy) + by3
-        lanes[FX4 + e] = (lanes[FX4 + e] + lanes[Q_M4 + e] * gx) + bx4
-        lanes[FY4 + e] = (lanes[FY4 + e] + lanes[Q_M4 + e] * gy) + by4
+        lanes[FX1 + e] = (lanes[FX1 + e] + lanes[Q_M1 + e] * (gx - drag * lanes[VX1 + e])) + bx1
+        lanes[FY1 + e] = (lanes[FY1 + e] + lanes[Q_M1 + e] * (gy - drag * lanes[VY1 + e])) + by1
+        lanes[FX2 + e] = (lanes[FX2 + e] + lanes[Q_M2 + e] * (gx - drag * lanes[VX2 + e])) + bx2
+        lanes[FY2 + e] = (lanes[FY2 + e] + lanes[Q_M2 + e] * (gy - drag * lanes[VY2 + e])) + by2
+        lanes[FX3 + e] = (lanes[FX3 + e] + lanes[Q_M3 + e] * (gx - drag * lanes[VX3 + e])) + bx3
+        lanes[FY3 + e] = (lanes[FY3 + e] + lanes[Q_M3 + e] * (gy - drag * lanes[VY3 + e])) + by3
+        lanes[FX4 + e] = (lanes[FX4 + e] + lanes[Q_M4 + e] * (gx - drag * lanes[VX4 + e])) + bx4
+        lanes[FY4 + e] = (lanes[FY4 + e] + lanes[Q_M4 + e] * (gy - drag * lanes[VY4 + e])) + by4
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -680,7 +686,7 @@ def _put_quads(n, row, at, force, lanes):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _quads(
     t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
 ):  # fmt: skip
     lanes = np.zeros(QUAD_LANES * CAPACITY)
     item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
@@ -697,8 +703,8 @@ def _quads(
             item[e] = first + min(e, n - 1)
             row[e] = rows[item[e]]
         _gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
-        _overlay_loop_0(whole, small, lanes)
-        _overlay_loop_1(whole, small, lanes)
+        _overlay_loop_0(whole, small, beta, lanes)
+        _overlay_loop_1(whole, small, beta, lanes)
         if tied:
             lanes[A0 : A0 + U(16 * CAPACITY)] = 0.0
         some = latest = np.uint8(NONE)
@@ -719,7 +725,7 @@ def _quads(
                     n, first, rows, flat_x, v, c, partner, law, kind, base, state, history, flat_table, flat_beyond,
                     step, lanes, room, tally[t],
                 )  # fmt: skip
-        _sum_quads(whole, gx, gy, lanes)
+        _sum_quads(whole, gx, gy, drag, lanes)
         for e in range(n):
             slot = slot_of[first + e]
             if slot >= 0:
@@ -747,13 +753,13 @@ def quads(threads, *args):
 @njit(cache=True, parallel=True, error_model="numpy")
 def quads_threaded(
     threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
 ):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _quads(
             t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
-            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, step, tally,
+            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
         )  # fmt: skip
 
 

@@ -14,7 +14,18 @@ import numpy as np
 from numba import njit
 
 from hpcdem.physics.fdem.kernels import joints, laws
-from hpcdem.physics.fdem.kernels.elements import ETA, PARTS, Q_AREA, Q_ETA, _part_rate, _part_stretch
+from hpcdem.physics.fdem.kernels.elements import (
+    ETA,
+    LAMBDA,
+    PARTS,
+    Q_AREA,
+    Q_ETA,
+    Q_LAMBDA,
+    Q_TWO_MU,
+    TWO_MU,
+    _part_rate,
+    _part_stretch,
+)
 from hpcdem.physics.fdem.kernels.joints import DAMAGE, FAR, NEAR, OPENED, SLIPPED
 
 # Columns of the work of an element (n_own, 8) [J/m]; the last are for nodes of which it has the lowest corner.
@@ -23,8 +34,8 @@ WORK = 8
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _viscous_triangle(xy, vel, c, out):
-    """Corner forces (6,) of the viscous stress."""
+def _viscous_triangle(xy, vel, c, beta, out):
+    """Corner forces (6,) of the viscous stress, with that of the Rayleigh damping beta [s]."""
     ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
     f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
     f21, f22 = uy * c[0] + wy * c[2], uy * c[1] + wy * c[3]
@@ -32,19 +43,20 @@ def _viscous_triangle(xy, vel, c, out):
     dux, duy, dwx, dwy = vel[2] - vel[0], vel[3] - vel[1], vel[4] - vel[0], vel[5] - vel[1]
     g11, g12 = dux * c[0] + dwx * c[2], dux * c[1] + dwx * c[3]
     g21, g22 = duy * c[0] + dwy * c[2], duy * c[1] + dwy * c[3]
-    eta = c[ETA]
+    eta, d11, d22 = c[ETA] + beta * c[TWO_MU], cs * g11 + sn * g21, cs * g22 - sn * g12
+    swell = beta * c[LAMBDA] * (d11 + d22)
     s12 = 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
-    xx, yy, xy_ = laws.turned(eta * (cs * g11 + sn * g21), eta * (cs * g22 - sn * g12), s12, cs, sn)
+    xx, yy, xy_ = laws.turned(eta * d11 + swell, eta * d22 + swell, s12, cs, sn)
     out[0], out[1] = 0.5 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.5 * (xy_ * (wy - uy) - yy * (wx - ux))
     out[2], out[3] = 0.5 * (xy_ * wx - xx * wy), 0.5 * (yy * wx - xy_ * wy)
     out[4], out[5] = -out[0] - out[2], -out[1] - out[3]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _viscous_quad(xy, vel, c, out):
+def _viscous_quad(xy, vel, c, beta, out):
     """The same for the eight of a quad."""
     out[:] = 0.0
-    eta = c[Q_ETA]
+    eta = c[Q_ETA] + beta * c[Q_TWO_MU]
     for overlay in range(2):
         rate, area = 0.0, 0.0
         for p in (2 * overlay, 2 * overlay + 1):
@@ -56,8 +68,9 @@ def _viscous_quad(xy, vel, c, out):
         for p in (2 * overlay, 2 * overlay + 1):
             ux, uy, wx, wy, cs, sn, _, _, _ = _part_stretch(p, xy, c, False)
             r11, r22, r12 = _part_rate(p, vel, c, cs, sn)
-            shift = 0.5 * (rate - (r11 + r22))
-            xx, yy, xy_ = laws.turned(eta * (r11 + shift), eta * (r22 + shift), eta * r12, cs, sn)
+            shift, swell = 0.5 * (rate - (r11 + r22)), beta * c[Q_LAMBDA] * rate
+            xx, yy = eta * (r11 + shift) + swell, eta * (r22 + shift) + swell
+            xx, yy, xy_ = laws.turned(xx, yy, eta * r12, cs, sn)
             fx1, fy1 = 0.25 * (xx * (wy - uy) - xy_ * (wx - ux)), 0.25 * (xy_ * (wy - uy) - yy * (wx - ux))
             fx2, fy2 = 0.25 * (xy_ * wx - xx * wy), 0.25 * (yy * wx - xy_ * wy)
             i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
@@ -70,25 +83,28 @@ def _viscous_quad(xy, vel, c, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def book(first, n_own, triangle_rows, quad_rows, c, q, x, before, after, a, b, of_joints, mass, gx, gy, dt, work):
+def book(
+    first, n_own, triangle_rows, quad_rows, c, q, x, before, after, a, b, of_joints, mass, gx, gy, drag, beta, dt, work
+):  # fmt: skip
     """Add to work (n_own, 8) what joints, viscosity and gravity did on the owned elements.
 
     first: storage row of the first owned element; before, after (n, w): velocities before and after the kick, taken
-    with the weights a and b; of_joints (n, 8) [N/m]; mass (n, 4): true masses [kg/m].
+    with the weights a and b; of_joints (n, 8) [N/m]; mass (n, 4): true masses [kg/m]; drag [1/s], beta [s]:
+    Rayleigh damping.
     """
     force = np.zeros(8)
     for i in range(len(triangle_rows) + len(quad_rows)):
         if i < len(triangle_rows):
             r, n = triangle_rows[i], 3
-            _viscous_triangle(x[r], before[r], c[i], force)
+            _viscous_triangle(x[r], before[r], c[i], beta, force)
         else:
             r, n = quad_rows[i - len(triangle_rows)], 4
-            _viscous_quad(x[r], before[r], q[i - len(triangle_rows)], force)
+            _viscous_quad(x[r], before[r], q[i - len(triangle_rows)], beta, force)
         joint = viscous = pull = 0.0
         for k in range(2 * n):
             v = a * before[r, k] + b * after[r, k]
             joint += of_joints[r, k] * v
-            viscous += force[k] * v
+            viscous += (force[k] - drag * mass[r, k // 2] * before[r, k]) * v
             pull += mass[r, k // 2] * (gx if k % 2 == 0 else gy) * v
         work[r - first, BY_JOINTS] += joint * dt
         work[r - first, VISCOUS] += viscous * dt

@@ -7,7 +7,8 @@ omega^2 of a corner of mass m is at most the sum of
 - contact: 2 k / m, k = 3 P (1 / h_t + 1 / h_c) L / 2 per face of length L, h: altitudes.
 
 dt < (2 / omega) (sqrt(1 + xi^2) - xi) with viscous damping, xi = eta omega_e^2 / (2 (lambda + 2 mu) omega) +
-c / (m omega), c: what the dashpots of the contacts can give at the corner, twice as much between two of them.
+c / (m omega), c: what the dashpots of the contacts can give at the corner, twice as much between two of them; and
+(alpha / omega + beta omega_e^2 / omega) / 2 of Rayleigh damping.
 """
 
 from __future__ import annotations
@@ -67,19 +68,19 @@ def _omega_quad(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _corner(omega_e2, true_mass, mass, spring, drag, eta, modulus):
-    """Stable time step of a corner; added mass lowers what the element gives in proportion."""
+def _corner(omega_e2, true_mass, mass, spring, dashpot, drag, eta, modulus):
+    """Stable time step of a corner; added mass lowers what the element and the drag on its mass give in proportion."""
     own = omega_e2 * true_mass / mass
-    return _stable(own + 2.0 * spring / mass, own, eta, modulus, drag / mass)
+    return _stable(own + 2.0 * spring / mass, own, eta, modulus, (dashpot + 0.5 * drag * true_mass) / mass)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, dashpots, safety, target, mass):
+def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, dashpots, drag, beta, safety, target, mass):
     """Largest stable time step over the corners of the owned elements [s].
 
     triangles, quads: tables of elements.py; first: storage row of the first owned element; springs (n_own, 4) [N/m per
-    m] of joints and contact; dashpots (n_own, 4) [N s/m per m] of contact; mass (n, 4): true masses. With target > 0
-    masses are raised until safety times the limit is no less than it.
+    m] of joints and contact; dashpots (n_own, 4) [N s/m per m] of contact; drag [1/s], beta [s]: Rayleigh damping; mass
+    (n, 4): true masses. With target > 0 masses are raised until safety times the limit is no less than it.
     """
     least = math.inf
     for i in range(len(triangle_rows) + len(quad_rows)):
@@ -89,12 +90,13 @@ def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, dashpo
         else:
             r, n, c = quad_rows[i - len(triangle_rows)], 4, quads[i - len(triangle_rows)]
             omega2, eta, modulus = _omega_quad(c), c[Q_ETA], c[Q_LAMBDA] + c[Q_TWO_MU]
+        eta += beta * modulus
         for k in range(n):
-            true = mass[r, k]
-            dt = _corner(omega2, true, true, springs[r - first, k], dashpots[r - first, k], eta, modulus)
+            true, spring, dashpot = mass[r, k], springs[r - first, k], dashpots[r - first, k]
+            dt = _corner(omega2, true, true, spring, dashpot, drag, eta, modulus)
             while safety * dt < target:
                 mass[r, k] *= max((target / (safety * dt)) ** 2, 1.0 + 1e-6)
-                dt = _corner(omega2, true, mass[r, k], springs[r - first, k], dashpots[r - first, k], eta, modulus)
+                dt = _corner(omega2, true, mass[r, k], spring, dashpot, drag, eta, modulus)
             least = min(least, dt)
     return least
 

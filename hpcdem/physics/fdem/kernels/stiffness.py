@@ -40,7 +40,7 @@ LEAST = 1e-3
 
 
 @njit(cache=True, error_model="numpy")
-def _gradients(x, i, j, k, c, at, small, g):
+def gradients(x, i, j, k, c, at, small, g):
     """Gradients (3, 2) [1/m] of the shape functions of a triangle with the corners i, j, k of the row x (flat), and its
     area: those of the mesh, whose inverse matrix begins at c[at], or the present ones."""
     if small:
@@ -89,7 +89,7 @@ def triangles(rows, x, c, s0, small, out):
     for i in range(len(rows)):
         xy, k = x[rows[i]], out[i]
         k[:] = 0.0
-        area = _gradients(xy, 0, 1, 2, c[i], 0, small, g)
+        area = gradients(xy, 0, 1, 2, c[i], 0, small, g)
         triangle_stress(xy, c[i], s0[i], small, stress)
         mu = 0.5 * c[i, TWO_MU]
         _shear_part(g, area, mu, stress, small, at, k)
@@ -114,7 +114,7 @@ def quads(rows, x, c, s0, small, out):
             for p in (2 * overlay, 2 * overlay + 1):
                 for q in range(3):
                     at[q] = PARTS[p, q]
-                area = _gradients(xy, at[0], at[1], at[2], c[i], 4 * p, small, g)
+                area = gradients(xy, at[0], at[1], at[2], c[i], 4 * p, small, g)
                 _shear_part(g, 0.5 * area, mu, stress, small, at, k)
                 weight = c[i, Q_AREA + p]
                 areas += weight
