@@ -27,8 +27,8 @@ def areas(state: MeshState, first: str, last: str) -> tuple[np.ndarray, np.ndarr
     out = np.zeros((2, len(at), 2))  # at each node the mean of both elements, so that areas fit together
     for end in ("first_node", "last_node"):
         np.add.at(out[0], elements[end][there], across / np.hypot(across[:, 0], across[:, 1])[:, None])
-    size = np.hypot(out[0, :, 0], out[0, :, 1])
-    out = np.divide(out[0], size[:, None], out=out[1], where=size[:, None] > 0.0)
+    norm = np.hypot(out[0, :, 0], out[0, :, 1])
+    out = np.divide(out[0], norm[:, None], out=out[1], where=norm[:, None] > 0.0)
     if not len(a):
         return np.empty((0, 4, 2)), values
     size = float(np.ptp(np.concatenate([a, b]), axis=0).max())

@@ -16,7 +16,7 @@ def _section(values: dict[str, Any]) -> None:
     if thick is None and not {"area", "inertia"} <= values.keys():
         raise CommandError("a liner needs its thickness, or area and inertia of its section (of steel sets)")
     values.setdefault("area", thick)
-    values.setdefault("inertia", thick**3 / 12.0 if thick is not None else None)
+    values.setdefault("inertia", thick * thick * thick / 12.0 if thick is not None else None)
     values.setdefault("thickness", math.sqrt(12.0 * values["inertia"] / values["area"]))
     tension, pressure = values["tensile_strength"], values["compressive_strength"]
     if math.isinf(tension) != math.isinf(pressure):
