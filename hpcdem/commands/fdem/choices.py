@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcdem.commands.fdem import supports
 from hpcdem.core.errors import CommandError
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
 from hpcdem.pre.mesh import geometry

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from hpcdem.commands.fdem import supports
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.io import vtkhdf_mesh
@@ -19,6 +18,7 @@ from hpcdem.io.behind import Deliveries, under_way
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES

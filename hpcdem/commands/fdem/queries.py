@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from hpcdem.commands.fdem import supports
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import SUPPORTS, Range
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.commands.fdem import supports
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, SUPPORTS
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hpcdem.commands.fdem import frames, histories, supports
+from hpcdem.commands.fdem import frames, histories
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 
 ENERGY_WORDS = {
