@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.free_field import FreeField
     from hpcdem.physics.fdem.structures import Structure
 
 
@@ -25,5 +26,13 @@ def _liners() -> type[Structure]:
     return Liners
 
 
-PHYSICS: Mapping[str, Callable[[], type[Structure]]] = {"bolts": _bolts, "liners": _liners}
+def _free_field() -> type[FreeField]:
+    from hpcdem.physics.fdem.free_field import FreeField
+
+    return FreeField
+
+
+PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField]]] = {
+    "bolts": _bolts, "liners": _liners, "free_field": _free_field,
+}  # fmt: skip
 """How to get each class: its import brings kernels, which must wait for their cache folder."""
