@@ -32,7 +32,7 @@ Number = float | str | FunctionName
 """Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
-OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{kind: kind for kind in g.BOLTS}}
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{kind: kind for kind in g.SUPPORTS}}
 """What histories call them."""
 
 
@@ -502,6 +502,10 @@ class Bolts(Objects):
         """The properties of elements of bolts: docs/pcdc_reference.md lists them; those of one bolt."""
         self._do("bolt c-model", properties, where, self.kind, name)
 
+    def delete(self, *, where: Where = None) -> None:
+        """Take elements out at once, with their part of the grout."""
+        self._do("bolt delete", {}, where, self.kind)
+
 
 @commands
 class BoltNodes(Objects):
@@ -526,6 +530,63 @@ class BoltNodes(Objects):
         """Force on each node of one bolt [N]."""
         given = {"force_x": fx, "force_y": fy}
         self._carry_out("boundary", given, where, "bolt-node-force-boundary-condition")
+
+    def remove_boundary(self, *, where: Where = None) -> None:
+        """Take back what was prescribed."""
+        self._carry_out("boundary remove", {}, where)
+
+
+@commands
+class Liners(Objects):
+    """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
+
+    _word, kind, pcdc = "liners", g.LINER_ELEMENT, "liner-element"
+
+    def create(self, *, group: str | None = None, set: str | None = None, where: Where = None) -> None:
+        """Put a liner on the free faces of a range, as things are now. group: that its elements and nodes are put
+        into."""
+        if group is None and set is not None:
+            raise TypeError("set goes with group")
+        self._do("liner create", {"group": _group(group, set)}, where, g.FACE)
+
+    def model(self, name: str, *, where: Where = None, **properties: float) -> None:
+        """The properties of elements of liners: docs/pcdc_reference.md lists them."""
+        self._do("liner c-model", properties, where, self.kind, name)
+
+    def delete(self, *, where: Where = None) -> None:
+        """Take elements out at once."""
+        self._do("liner delete", {}, where, self.kind)
+
+
+@commands
+class LinerNodes(Objects):
+    """Nodes of liners: `sim.liner_nodes["rotation"]`, see `Objects`."""
+
+    _word, kind, pcdc = "liner_nodes", g.LINER_NODE, "liner-node"
+
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        spin: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Velocity [m/s] and rate of rotation [rad/s] from now on; components left out stay free."""
+        given = {"velocity_x": vx, "velocity_y": vy, "spin": spin}
+        self._carry_out("boundary", given, where, "liner-node-constrain")
+
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        moment: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Force [N/m] and moment [N m/m] on each node."""
+        given = {"force_x": fx, "force_y": fy, "moment": moment}
+        self._carry_out("boundary", given, where, "liner-node-force-boundary-condition")
 
     def remove_boundary(self, *, where: Where = None) -> None:
         """Take back what was prescribed."""
@@ -615,9 +676,10 @@ class Histories(Words):
         variable: str | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element" or of the "model": of one (id, or
-        nearest to a point), or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many
-        steps. variable: with the value "law-state", which state variable of laws of the user."""
+        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element") or
+        of the "model": of one (id, or nearest to a point), or of those of a range or of all by how: "sum", "mean",
+        "minimum", "maximum"; every so many steps. variable: with the value "law-state", which state variable of
+        laws of the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
@@ -698,6 +760,8 @@ class BlockCommands:
     nodes: Nodes
     bolts: Bolts
     bolt_nodes: BoltNodes
+    liners: Liners
+    liner_nodes: LinerNodes
     tables: Tables
     fields: Fields
     histories: Histories
@@ -709,6 +773,7 @@ class BlockCommands:
         self.geometry, self.mesh = Geometry(do), Mesh(do)
         self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
         self.bolts, self.bolt_nodes = Bolts(do), BoltNodes(do)
+        self.liners, self.liner_nodes = Liners(do), LinerNodes(do)
         self.tables, self.fields = Tables(do), Fields(do)
         self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)
 

@@ -10,14 +10,20 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hpcdem.physics.bolts.model import Bolts
     from hpcdem.physics.fdem.free_field import FreeField
+    from hpcdem.physics.fdem.structures import Structure
 
 
-def _bolts() -> type[Bolts]:
+def _bolts() -> type[Structure]:
     from hpcdem.physics.bolts.model import Bolts
 
     return Bolts
+
+
+def _liners() -> type[Structure]:
+    from hpcdem.physics.liners.model import Liners
+
+    return Liners
 
 
 def _free_field() -> type[FreeField]:
@@ -26,5 +32,7 @@ def _free_field() -> type[FreeField]:
     return FreeField
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[FreeField]]] = {"bolts": _bolts, "free_field": _free_field}
+PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField]]] = {
+    "bolts": _bolts, "liners": _liners, "free_field": _free_field,
+}  # fmt: skip
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

@@ -9,9 +9,11 @@ import pytest
 
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics, reference
+from hpcdem.physics.fdem.kernels import elements, plastic_quads, plasticity
 from hpcdem.physics.fdem.kernels.elements import PARTS
 from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, SHEAR_PAST, TENSION_NOW
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import ROCK, joined, jointed, model, near, rectangle, shaken
 
 MOHR_COULOMB = "mech_mohr_coulomb"
@@ -170,6 +172,52 @@ def test_flow_of_quads_as_the_plain_loop(large):
             assert force[r].reshape(4, 2) == pytest.approx(want, abs=1e-6 * np.abs(want).max())
             assert found[e] == pytest.approx(mean, abs=1e-6 * np.abs(mean).max())
     assert several > 60
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_the_loop_over_quads_that_yield_is_flow_and_then_forces(large):
+    """Bit for bit: quads that flow within the loop over their forces, and the flow of all of them before the loop over
+    elastic quads; in one part and in seven; where some flow, many or all do, and strength follows a table."""
+    sim = Blocks()
+    sim.take_mesh(shaken(rectangle(13, 12, 2.0, 2.0, kind="quad"), 0.2))
+    sim.table("soft", [(0.0, 3e6), (1e-3, 1e5)])
+    changes.element_model(sim, None, MOHR_COULOMB, {**SOIL, "damp_factor": 0.1})
+    changes.element_model(sim, np.arange(50), MOHR_COULOMB, {**SOIL, "cohesion": Over("soft", PLASTIC_STRAIN)})
+    changes.element_model(sim, np.arange(100, 120), "mech_iso_elastic", ROCK)
+    sim.option(collision=False, large_strain=large)
+    sim.close_model()
+    local, rng, several = sim.local, np.random.default_rng(3), set()
+    place = sim.mesh.points[sim.mesh.cells[sim.number]].reshape(-1, 8)
+    for size, width in ((1e-6, 2.0), (1e-2, 0.5), (1e-2, 2.0)):
+        shift = np.where(sim.mesh.points[:, :1] <= width, size, 1e-6)
+        at = sim.mesh.points + shift * rng.normal(size=sim.mesh.points.shape)
+        sim.x[:, :8] = at[sim.mesh.cells[sim.number]].reshape(-1, 8)
+        changes.repeat(sim, sim.x)
+        sim.v[:, :8] = 0.1 * np.sin(9.0 * place)
+        changes.repeat(sim, sim.v)
+        found = []
+        for parts in (0, 1, 7):  # 0: flow, then forces
+            memory, _, s0, table, history = (part.copy() for part in local.plastic_state())
+            soft = local.strength._replace(history=history)
+            args = list(local._quad_args)
+            args[0], args[6] = max(parts, 1), s0
+            out = [np.zeros((len(sim.number), elements.FORCE)) for _ in range(2)]
+            args += [*out, True, 1.0, -9.81, 0.5, 1e-6, 3, np.zeros((7, elements.TALLY), np.int64)]
+            own = sim.n_left, local.quad_initial, local.quad_law
+            if parts:
+                plastic_quads.yielding(*args, *own, soft, memory, table)
+            else:
+                plastic_quads.flows(
+                    1, len(local.quad_rows), local.quad_rows, sim.n_left, sim.x, local.q, *own[1:], soft, not large, 3,
+                    memory, s0, table,
+                )  # fmt: skip
+                elements.quads(*args)
+            found.append([*out, memory, s0, table, history])
+        assert all((a == b).all() for one in found[1:] for a, b in zip(found[0], one))
+        flows = (found[0][2].reshape(-1, 4, plasticity.MEMORY)[:, :, plasticity.SHEAR] > 0.0).any(axis=1).mean()
+        several.add(0 if flows == 0.0 else (1 if flows < 0.4 else 2))
+        assert (history > 0.0).any() or flows < 0.4
+    assert several == {0, 1, 2}
 
 
 def test_a_turn_changes_nothing(kind):

@@ -21,17 +21,19 @@ if TYPE_CHECKING:
         frames,
         geometry,
         histories,
+        liners,
         meshes,
         queries,
         settings,
         steps,
         summary,
+        supports,
     )
     from hpcdem.commands.fdem.project import Project
 
 __all__ = [
     "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "frames", "geometry", "histories",
-    "meshes", "queries", "settings", "steps", "summary",
+    "liners", "meshes", "queries", "settings", "steps", "summary", "supports",
 ]  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from hpcdem.lang.pcdc.table import (
     COHESIVE,
     CONTACT,
     ISO_ELASTIC,
+    LINER,
     MOHR_COULOMB,
     USER,
     Command,
@@ -24,7 +25,7 @@ from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, LINER)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -109,7 +110,10 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
     if model is properties.MECH_MOHR_COULOMB and {"friction", "dilation"} <= given.keys():
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
-    if model is BOLT.of and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys():
+    if (
+        model in (BOLT.of, LINER.of)
+        and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
+    ):
         model.complete(given)
     if model is properties.COHESIVE:
         for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):

@@ -533,6 +533,7 @@ class Local:
         one = sim.threads == 1
         self._triangles: Any = elements.triangles if one else elements.triangles_threaded
         self._quads: Any = elements.quads if one else elements.quads_threaded
+        self._yielding_quads: Any = plastic_quads.yielding if one else plastic_quads.yielding_threaded
         self._move: Any = moving.move if one else moving.move_threaded
         self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
         small = not o.large_strain
@@ -571,7 +572,7 @@ class Local:
         sim, o = self.sim, self.sim.options
         alpha, step = 0.0 if o.dynamic else ALPHA, sim.clock.step
         if self.yields:
-            self.flow(self.plastic_state(), step)
+            self._flow_triangles(self.plastic_state(), step)
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
         if self.laws:
@@ -581,10 +582,17 @@ class Local:
             o.stiffness_damping, alpha, step, self.tally,
         )  # fmt: skip
         if len(self.quad_rows):
-            self._quads(
+            args = (
                 *self._quad_args, force, of_joints, keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping, step,
                 self.tally,
             )  # fmt: skip
+            if self.yields:
+                self._yielding_quads(
+                    *args, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],
+                    self.yield_table,
+                )  # fmt: skip
+            else:
+                self._quads(*args)
 
     def plastic_state(self) -> tuple[np.ndarray, ...]:
         """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
@@ -594,21 +602,26 @@ class Local:
     def flow(self, state: tuple[np.ndarray, ...], step: int) -> None:
         """Elements outside their yield surface at the present positions flow: the arrays of `plastic_state`, or copies
         of them, become those after it. step: in which they do."""
-        memory, s0, quad_s0, table, history = state
-        sim, one = self.sim, self.sim.threads == 1
-        small = not sim.options.large_strain
-        soft = self.strength._replace(history=history)
-        kernel = plasticity.flows if one else plasticity.flows_threaded
+        self._flow_triangles(state, step)
+        memory, _, s0, table, history = state
+        sim = self.sim
+        if len(self.quad_rows):
+            kernel = plastic_quads.flows if sim.threads == 1 else plastic_quads.flows_threaded
+            kernel(
+                sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
+                self.quad_law, self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0,
+                table,
+            )  # fmt: skip
+
+    def _flow_triangles(self, state: tuple[np.ndarray, ...], step: int) -> None:
+        """The triangles among them. (In a step quads flow in the loop over their forces.)"""
+        memory, s0, _, table, history = state
+        sim = self.sim
+        kernel = plasticity.flows if sim.threads == 1 else plasticity.flows_threaded
         kernel(
             sim.threads, self.count, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c, self.initial, self.law,
-            soft, small, step, memory, s0, table,
+            self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0, table,
         )  # fmt: skip
-        if len(self.quad_rows):
-            of_quads = plastic_quads.flows if one else plastic_quads.flows_threaded
-            of_quads(
-                sim.threads, len(self.quad_rows), self.quad_rows, sim.n_left, sim.x, self.q, self.quad_initial,
-                self.quad_law, soft, small, step, memory, quad_s0, table,
-            )  # fmt: skip
 
     def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
         """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0

@@ -7,6 +7,7 @@
 | flowing-20k | the same so weak that two thirds of it flow in a step |
 | yielded-20k | the same with joints behind their peak |
 | quads-20k | quads as one body, contact armed, in vibration |
+| plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: none of it does, all of it flows |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
@@ -26,7 +27,10 @@ from bench.runs import say
 from bench.tables import Lines, Spread
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 
-RATES = {"intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 5e6, "pairs": 3e6, "shattered": 1e6}
+RATES = {
+    "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
+    "flowing-quads": 3e6, "pairs": 3e6, "shattered": 1e6,
+}  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
 
@@ -41,7 +45,7 @@ class Workload:
     @property
     def elements(self) -> int:
         """Triangles, or quads."""
-        return self.side**2 * (1 if self.kind == "quads" else 2)
+        return self.side**2 * (1 if "quads" in self.kind else 2)
 
 
 WORKLOADS = {
@@ -53,6 +57,8 @@ WORKLOADS = {
         Workload("flowing-20k", "flowing", 100),
         Workload("yielded-20k", "yielded", 100),
         Workload("quads-20k", "quads", 141),
+        Workload("plastic-quads-20k", "plastic-quads", 141),
+        Workload("flowing-quads-20k", "flowing-quads", 141),
         Workload("pairs-20k", "pairs", 141),
         Workload("shattered-20k", "shattered", 100),
     )
@@ -191,6 +197,10 @@ def intact(sim: Any, side: int) -> None:
 def plastic(sim: Any, side: int, strength: float = 1e9) -> None:
     """The same of a rock that yields beyond this cohesion and tensile strength [Pa]."""
     intact(sim, side)
+    _yields(sim, strength)
+
+
+def _yields(sim: Any, strength: float) -> None:
     law = {**ROCK, "dilation": 10.0, "cohesion": strength, "tensile": strength}
     changes.element_model(sim, None, "mech_mohr_coulomb", law)
     sim.close_model()
@@ -215,6 +225,20 @@ def quads(sim: Any, side: int) -> None:
     sim.close_model()
     x = sim.x[:, :12]
     sim.v[:, :12] = 0.02 * np.sin(300.0 * x + 1.0)
+
+
+def plastic_quads(sim: Any, side: int) -> None:
+    """The same of a rock that does not yield, but could."""
+    quads(sim, side)
+    _yields(sim, 1e9)
+
+
+def flowing_quads(sim: Any, side: int) -> None:
+    """So weak, and squeezed so fast, that all of it flows."""
+    quads(sim, side)
+    _yields(sim, 1e3)
+    x, y = sim.x[:, 0:12:2], sim.x[:, 1:12:2]
+    sim.v[:, 0:12:2], sim.v[:, 1:12:2] = -10.0 * x, 3.0 * y + 2.0 * x
 
 
 def pairs(sim: Any, side: int) -> None:
@@ -254,6 +278,6 @@ def _swell(sim: Any, factor: float) -> None:
 
 
 MAKERS = {
-    "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads, "pairs": pairs,
-    "shattered": shattered,
+    "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
+    "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "pairs": pairs, "shattered": shattered,
 }  # fmt: skip

@@ -397,6 +397,9 @@ B1, B2, B3, B4 = (lane(QUAD_ROW + 32 + 2 * k) for k in range(4))
 Q_S0 = lane(QUAD_ROW + 40)
 """First lane of the stresses without strain: 11, 22, 12, 33 of each triangle."""
 QUAD_LANES = QUAD_ROW + 56
+Q_YIELD, Q_OUTSIDE = lane(QUAD_LANES), lane(QUAD_LANES + 16)
+"""Of quads that can yield (plastic_quads.py): the yield surface of each triangle; by how much overlays are outside."""
+YIELDING_LANES = QUAD_LANES + 18
 QUAD_BLOCK = 48
 """Quads worked on together; they have fewer joints than `CAPACITY`."""
 
@@ -451,8 +454,9 @@ def _part_forces(ux, uy, wx, wy, cs, sn, s11, s22, s12):
     return fx1, fy1, 0.25 * (xy * wx - xx * wy), 0.25 * (yy * wx - xy * wy)
 
 
-def _overlay_loop(overlay):
-    """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l.
+def overlay_loop(overlay, looks=False):
+    """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l. looks: it also
+    says by how much the stress of the overlay, without the viscous part, is outside.
 
     Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
     """
@@ -463,6 +467,8 @@ def _overlay_loop(overlay):
     c1, c2 = (Q_C + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     area1, area2 = (lane(QUAD_ROW + Q_AREA + part) for part in (2 * overlay, 2 * overlay + 1))
     z1, z2 = (Q_S0 + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
+    l1, l2 = (Q_YIELD + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
+    out = Q_OUTSIDE + lane(overlay)
     first = overlay == 0
 
     @njit(cache=True, nogil=True, error_model="numpy")
@@ -486,6 +492,15 @@ def _overlay_loop(overlay):
             shift = 0.5 * (mean - (b11 + b22))
             t11, t22 = z11 + (pressure + two_mu * (b11 + shift)), z22 + (pressure + two_mu * (b22 + shift))
             t12 = z12 + two_mu * b12
+            if looks:
+                s33, t33 = lanes[z1 + _B + _NEXT + e] + pressure, lanes[z2 + _B + _NEXT + e] + pressure
+                far = laws.outside(
+                    s11, s22, s12, s33, lanes[l1 + e], lanes[l1 + _B + e], lanes[l1 + _B + _NEXT + e]
+                )  # fmt: skip
+                farther = laws.outside(
+                    t11, t22, t12, t33, lanes[l2 + e], lanes[l2 + _B + e], lanes[l2 + _B + _NEXT + e]
+                )  # fmt: skip
+                lanes[out + e] = farther if farther > far else far
             x1, y1, x2, y2 = lanes[vi + e], lanes[vi + _NEXT + e], lanes[vj + e], lanes[vj + _NEXT + e]
             x3, y3, x4, y4 = lanes[vk + e], lanes[vk + _NEXT + e], lanes[vl + e], lanes[vl + _NEXT + e]
             a11, a22, a12 = _rate(x1, y1, x2, y2, x3, y3, a, b, c, d, cs1, sn1)
@@ -511,7 +526,7 @@ def _overlay_loop(overlay):
     return loop
 
 
-_overlay_loop_0, _overlay_loop_1 = _overlay_loop(0), _overlay_loop(1)
+overlay_loop_0, overlay_loop_1 = overlay_loop(0), overlay_loop(1)
 _quad_edge_loop_0, _quad_edge_loop_1 = _edge_loop(X1, X2, A0, Q_LEFT0), _edge_loop(X2, X3, A1, Q_LEFT1)
 _quad_edge_loop_2, _quad_edge_loop_3 = _edge_loop(X3, X4, A2, Q_LEFT2), _edge_loop(X4, X1, A3, Q_LEFT3)
 
@@ -583,8 +598,21 @@ def _quad_kinetic(c, vel):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gather_quads(n, item, row, x, v, c, s0, stressed, lanes):
+def gather_stresses(n, item, s0, lanes):
+    """Stresses without strain of quads into lanes; item (n,): places in s0."""
+    for e in range(U(0), U(n), _FOUR):
+        i0, i1, i2, i3 = U(item[e]), U(item[e + _1]), U(item[e + _2]), U(item[e + _3])
+        at = (i0 * _SIXTEEN, i1 * _SIXTEEN, i2 * _SIXTEEN, i3 * _SIXTEEN)
+        for k in range(U(0), _SIXTEEN, _FOUR):
+            to = Q_S0 + k * U(CAPACITY) + e
+            four_columns(lanes, to, s0, (at[0] + k, at[1] + k, at[2] + k, at[3] + k))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def gather_quads(n, item, row, x, v, c, s0, stressed, lanes):
     """Rows of quads into lanes, in groups of four; item, row (n,): places in the tables c and s0, and in x and v."""
+    if stressed:
+        gather_stresses(n, item, s0, lanes)
     for e in range(U(0), U(n), _FOUR):
         r0, r1, r2, r3 = U(row[e]), U(row[e + _1]), U(row[e + _2]), U(row[e + _3])
         at = (r0 * _TWELVE, r1 * _TWELVE, r2 * _TWELVE, r3 * _TWELVE)
@@ -594,11 +622,6 @@ def _gather_quads(n, item, row, x, v, c, s0, stressed, lanes):
         four_columns(lanes, X3 + e, x, at)
         four_columns(lanes, VX3 + e, v, at)
         i0, i1, i2, i3 = U(item[e]), U(item[e + _1]), U(item[e + _2]), U(item[e + _3])
-        if stressed:
-            at = (i0 * _SIXTEEN, i1 * _SIXTEEN, i2 * _SIXTEEN, i3 * _SIXTEEN)
-            for k in range(U(0), _SIXTEEN, _FOUR):
-                to = Q_S0 + k * U(CAPACITY) + e
-                four_columns(lanes, to, s0, (at[0] + k, at[1] + k, at[2] + k, at[3] + k))
         at = (i0 * _QUAD, i1 * _QUAD, i2 * _QUAD, i3 * _QUAD)
         for k in range(U(0), U(28), _FOUR):
             to = Q_C + k * U(CAPACITY) + e
@@ -684,6 +707,59 @@ def _put_quads(n, row, at, force, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def finish_quads(
+    first, n, item, row, tied, rows, x, v, c, base, partner, law, kind, state, history, table, beyond, slot_of, pushed,
+    force, of_joints, keep_joints, gx, gy, drag, step, lanes, room, tally,
+):  # fmt: skip
+    """Joints, gravity and contacts of a block of quads whose forces of stress are in the lanes, and the sum of all; x,
+    table, beyond, force, of_joints: flat; tied: the block before had joints. Returns whether this one has."""
+    whole = (n + 3) // 4 * 4
+    if tied:
+        lanes[A0 : A0 + U(16 * CAPACITY)] = 0.0
+    some = latest = np.uint8(NONE)
+    for slot in range(base + 4 * first, base + 4 * (first + n)):
+        some, latest = some | state[slot], max(latest, state[slot])
+    tied = some != NONE
+    if tied:
+        _gather_quad_edge(whole, item, base, 0, x, partner, law, table, lanes)
+        _quad_edge_loop_0(whole, lanes)
+        _gather_quad_edge(whole, item, base, 1, x, partner, law, table, lanes)
+        _quad_edge_loop_1(whole, lanes)
+        _gather_quad_edge(whole, item, base, 2, x, partner, law, table, lanes)
+        _quad_edge_loop_2(whole, lanes)
+        _gather_quad_edge(whole, item, base, 3, x, partner, law, table, lanes)
+        _quad_edge_loop_3(whole, lanes)
+        if latest > INTACT or _any_quad_past_peak(n, lanes) < 0:
+            _slow_quad_joints(
+                n, first, rows, x, v, c, partner, law, kind, base, state, history, table, beyond, step, lanes, room,
+                tally,
+            )  # fmt: skip
+    _sum_quads(whole, gx, gy, drag, lanes)
+    for e in range(n):
+        slot = slot_of[first + e]
+        if slot >= 0:
+            for m in range(FORCE):
+                lanes[FX1 + U(m * CAPACITY + e)] += pushed[slot, m]
+    # The last quad may be in its group several times: all of them must be alike.
+    for e in range(n, whole):
+        for m in range(FORCE):
+            lanes[FX1 + U(m * CAPACITY + e)] = lanes[FX1 + U(m * CAPACITY + n - 1)]
+            lanes[B1 + U(m * CAPACITY + e)] = lanes[B1 + U(m * CAPACITY + n - 1)]
+    _put_quads(whole, row, FX1, force, lanes)
+    if keep_joints:
+        _put_quads(whole, row, B1, of_joints, lanes)
+    return tied
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def name_quads(first, n, rows, item, row):
+    """Places of the quads first : first + n in their tables and in x, the last one again up to a multiple of four."""
+    for e in range((n + 3) // 4 * 4):
+        item[e] = first + min(e, n - 1)
+        row[e] = rows[item[e]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _quads(
     t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
     slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
@@ -699,46 +775,15 @@ def _quads(
     for first in range(begin, end, QUAD_BLOCK):
         n = min(QUAD_BLOCK, end - first)
         whole = (n + 3) // 4 * 4
-        for e in range(whole):
-            item[e] = first + min(e, n - 1)
-            row[e] = rows[item[e]]
-        _gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
-        _overlay_loop_0(whole, small, beta, lanes)
-        _overlay_loop_1(whole, small, beta, lanes)
-        if tied:
-            lanes[A0 : A0 + U(16 * CAPACITY)] = 0.0
-        some = latest = np.uint8(NONE)
-        for slot in range(base + 4 * first, base + 4 * (first + n)):
-            some, latest = some | state[slot], max(latest, state[slot])
-        tied = some != NONE
-        if tied:
-            _gather_quad_edge(whole, item, base, 0, flat_x, partner, law, flat_table, lanes)
-            _quad_edge_loop_0(whole, lanes)
-            _gather_quad_edge(whole, item, base, 1, flat_x, partner, law, flat_table, lanes)
-            _quad_edge_loop_1(whole, lanes)
-            _gather_quad_edge(whole, item, base, 2, flat_x, partner, law, flat_table, lanes)
-            _quad_edge_loop_2(whole, lanes)
-            _gather_quad_edge(whole, item, base, 3, flat_x, partner, law, flat_table, lanes)
-            _quad_edge_loop_3(whole, lanes)
-            if latest > INTACT or _any_quad_past_peak(n, lanes) < 0:
-                _slow_quad_joints(
-                    n, first, rows, flat_x, v, c, partner, law, kind, base, state, history, flat_table, flat_beyond,
-                    step, lanes, room, tally[t],
-                )  # fmt: skip
-        _sum_quads(whole, gx, gy, drag, lanes)
-        for e in range(n):
-            slot = slot_of[first + e]
-            if slot >= 0:
-                for m in range(FORCE):
-                    lanes[FX1 + U(m * CAPACITY + e)] += pushed[slot, m]
-        # The last quad may be in its group several times: all of them must be alike.
-        for e in range(n, whole):
-            for m in range(FORCE):
-                lanes[FX1 + U(m * CAPACITY + e)] = lanes[FX1 + U(m * CAPACITY + n - 1)]
-                lanes[B1 + U(m * CAPACITY + e)] = lanes[B1 + U(m * CAPACITY + n - 1)]
-        _put_quads(whole, row, FX1, flat_force, lanes)
-        if keep_joints:
-            _put_quads(whole, row, B1, flat_of_joints, lanes)
+        name_quads(first, n, rows, item, row)
+        gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
+        overlay_loop_0(whole, small, beta, lanes)
+        overlay_loop_1(whole, small, beta, lanes)
+        tied = finish_quads(
+            first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
+            flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
+            tally[t],
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

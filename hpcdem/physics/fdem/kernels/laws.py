@@ -161,3 +161,15 @@ def damped(f, v, alpha):
     """Force with local damping: F - alpha |F| sgn(v)."""
     drag = alpha * abs(f)
     return f - (drag if v > 0.0 else (-drag if v < 0.0 else 0.0))
+
+
+@njit(cache=True, error_model="numpy")
+def outside(s11, s22, s12, s33, n_phi, strength, tensile):
+    """By how much [Pa] a stress is outside the yield surface of plasticity.py, below zero: inside; the larger of shear
+    and tension."""
+    mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
+    radius = math.sqrt(half * half + s12 * s12)
+    high, low = mean + radius, mean - radius
+    high, low = (s33 if s33 > high else high), (s33 if s33 < low else low)
+    shear, tension = n_phi * high - low - strength, high - tensile
+    return shear if shear > tension else tension

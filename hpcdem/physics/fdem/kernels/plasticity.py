@@ -55,73 +55,75 @@ MEMORY = 9
 
 (
     X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, LAM, MU2, S11, S22, S12, S33, L_PHI, L_PSI, L_STRENGTH, L_TENSILE, OUTSIDE,
-    P11, P22, P12, P33, T11, T22, T12, T33, P_LAM, P_MU2, P_PER_AREA, P_SHEAR, P_VOLUME, P_WORK,
-) = (lane(k) for k in range(35))  # fmt: skip
-LANES = 35
+    T11, T22, T12, T33, P_PHI, P_PSI, P_STRENGTH, P_TENSILE, P_LAM, P_MU2, P_PER_AREA,
+    P11, P22, P12, P33, HOW, P_SHEAR, P_VOLUME, P_WORK,
+) = (lane(k) for k in range(40))  # fmt: skip
+"""Of all triangles of a block; then of those that are outside: trial stress, law, moduli, 1 / area; what flows."""
+LANES = 40
 _1, _2, _3, _FOUR, _TWELVE = U(1), U(2), U(3), U(4), U(12)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def principal_return(s1, s2, s3, n, m, k, t, a, b):
-    """Where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW.
+    """Where the principal stresses s1 <= s2 <= s3 [Pa] return to, in this order, and SHEAR_NOW | TENSION_NOW, a float.
 
     n, m: N_phi, N_psi; k = 2 c sqrt(N_phi); t: tensile strength, at most k / (n - 1); a = K + 4 G / 3, b = K - 2 G / 3
-    [Pa].
+    [Pa]. Without jumps, so that loops over lanes become vector loops: every end is computed, and one is chosen.
     """
     shear, tension = n * s3 - s1 - k, s3 - t
-    if not (shear > 0.0 or tension > 0.0):
-        return s1, s2, s3, 0
     p = a - b * m - b * n + a * n * m
     along, aside, back = a - b * m, b * (1.0 - m), a * m - b
-    if shear > 0.0:
-        one = shear / p
-        r1, r2, r3 = s1 + one * along, s2 + one * aside, s3 - one * back
-        if r1 > r2:
-            other, q = n * s3 - s2 - k, p - (a - b)
-            r3 = s3 - (shear + other) / (p + q) * back
-            r1 = r2 = n * r3 - k
-        elif r2 > r3:
-            other, q = n * s2 - s1 - k, p - n * m * (a - b)
-            r1 = s1 + (shear + other) / (p + q) * along
-            r2 = r3 = (r1 + k) / n
-        if r3 <= t:
-            return r1, r2, r3, SHEAR_NOW
+    one = shear / p
+    r1, r2, r3 = s1 + one * along, s2 + one * aside, s3 - one * back
+    # the edges s1 = s2 and s2 = s3 of the plane f_s
+    e3 = s3 - (shear + (n * s3 - s2 - k)) / (p + (p - (a - b))) * back
+    e1 = n * e3 - k
+    g1 = s1 + (shear + (n * s2 - s1 - k)) / (p + (p - n * m * (a - b))) * along
+    g3 = (g1 + k) / n
+    low_edge, high_edge = r1 > r2, r2 > r3
+    r1 = e1 if low_edge else (g1 if high_edge else r1)
+    r2 = e1 if low_edge else (g3 if high_edge else r2)
+    r3 = e3 if low_edge else (g3 if high_edge else r3)
+    # the plane s3 = T, its edge and its corner
     low = n * t - k
-    if tension > 0.0:
-        r1, r2 = s1 - b * (tension / a), s2 - b * (tension / a)
-        if r2 > t:
-            r1, r2 = s1 - b * ((tension + (s2 - t)) / (a + b)), t
-        if r1 > t:
-            r1 = t
-        if r1 >= low:
-            return r1, r2, t, TENSION_NOW
+    t1, t2 = s1 - b * (tension / a), s2 - b * (tension / a)
+    edge = t2 > t
+    t1 = s1 - b * ((tension + (s2 - t)) / (a + b)) if edge else t1
+    t2 = t if edge else t2
+    t1 = t if t1 > t else t1
+    # both planes, and the ends of their line
     det = a * a - b * b
     one, two = (a * shear - (n * a - b) * tension) / det, (p * tension - back * shear) / det
-    return low, min(max(s2 + one * aside - two * b, low), t), t, SHEAR_NOW | TENSION_NOW
+    b2 = min(max(s2 + one * aside - two * b, low), t)
+    in_shear, in_tension = (shear > 0.0) & (r3 <= t), (tension > 0.0) & (t1 >= low)
+    r1 = r1 if in_shear else (t1 if in_tension else low)
+    r2 = r2 if in_shear else (t2 if in_tension else b2)
+    r3 = r3 if in_shear else t
+    how = 1.0 if in_shear else (2.0 if in_tension else 3.0)
+    outside = (shear > 0.0) | (tension > 0.0)
+    return r1 if outside else s1, r2 if outside else s2, r3 if outside else s3, how if outside else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def plastic_strain(s11, s22, s12, s33, n, m, k, t, lame, two_mu):
-    """Plastic strain (11, 22, 12, 33) that brings a trial stress [Pa] back, and SHEAR_NOW | TENSION_NOW; zero, and 0,
-    for a stress that is not outside. lame, two_mu: moduli [Pa]; others see `principal_return`."""
+    """Plastic strain (11, 22, 12, 33) that brings a trial stress [Pa] back, and SHEAR_NOW | TENSION_NOW, a float; zero,
+    and 0, for a stress that is not outside. lame, two_mu: moduli [Pa]; others see `principal_return`."""
     mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
     radius = math.sqrt(half * half + s12 * s12)
     high, low = mean + radius, mean - radius
-    a, b = lame + two_mu, lame
-    if s33 > high:
-        r_low, r_high, r33, bits = principal_return(low, high, s33, n, m, k, t, a, b)
-    elif s33 < low:
-        r33, r_low, r_high, bits = principal_return(s33, low, high, n, m, k, t, a, b)
-    else:
-        r_low, r33, r_high, bits = principal_return(low, s33, high, n, m, k, t, a, b)
-    if bits == 0:
-        return 0.0, 0.0, 0.0, 0.0, 0
+    above, below = s33 > high, s33 < low
+    s1, s3 = (s33 if below else low), (s33 if above else high)
+    s2 = high if above else (low if below else s33)
+    r1, r2, r3, how = principal_return(s1, s2, s3, n, m, k, t, lame + two_mu, lame)
+    r_low, r_high, r33 = (r2 if below else r1), (r2 if above else r3), (r3 if above else (r1 if below else r2))
     d_high, d_low, d33 = high - r_high, low - r_low, s33 - r33
     common = lame / (3.0 * lame + two_mu) * (d_high + d_low + d33)
     per = 1.0 / two_mu
     e_mean = (0.5 * (d_high + d_low) - common) * per
     along = 0.5 * (d_high - d_low) * per / radius if radius > 0.0 else 0.0  # else both are equal
-    return e_mean + along * half, e_mean - along * half, along * s12, (d33 - common) * per, bits
+    e11, e22, e12, e33 = e_mean + along * half, e_mean - along * half, along * s12, (d33 - common) * per
+    flows = how > 0.0
+    return e11 if flows else 0.0, e22 if flows else 0.0, e12 if flows else 0.0, e33 if flows else 0.0, how
 
 
 @njit(cache=True, error_model="numpy")
@@ -172,13 +174,10 @@ def _try(n, small, lanes):
         p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
         s11, s22 = lanes[S11 + e] + (p + m * e11), lanes[S22 + e] + (p + m * e22)
         s12, s33 = lanes[S12 + e] + m * e12, lanes[S33 + e] + p
-        mean, half = 0.5 * (s11 + s22), 0.5 * (s11 - s22)
-        radius = math.sqrt(half * half + s12 * s12)
-        high, low = mean + radius, mean - radius
-        high, low = (s33 if s33 > high else high), (s33 if s33 < low else low)
-        shear, tension = lanes[L_PHI + e] * high - low - lanes[L_STRENGTH + e], high - lanes[L_TENSILE + e]
         lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e] = s11, s22, s12, s33
-        lanes[OUTSIDE + e] = shear if shear > tension else tension
+        lanes[OUTSIDE + e] = laws.outside(
+            s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e]
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -192,31 +191,34 @@ def _all_inside(n, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _return(n, lanes, shares, solids, who, bits):
-    """Plastic strains of those that are outside, one after the other from the first place; shares: of how many that
-    fill the same area they are one; solids: after how many the lanes of moduli begin again; who, bits (BLOCK,) i8:
-    which they are and how they yield. Returns their number."""
+def _choose(n, lanes, who):
+    """Those that are outside, side by side; who (BLOCK,) i8: which they are. Returns their number."""
     m = 0
     for k in range(n):
         e, at = U(k), U(m)
         if lanes[OUTSIDE + e] > 0.0:
-            s11, s22, s12, s33 = lanes[S11 + e], lanes[S22 + e], lanes[S12 + e], lanes[S33 + e]
-            lame, two_mu = lanes[LAM + U(k % solids)], lanes[MU2 + U(k % solids)]
-            e11, e22, e12, e33, how = plastic_strain(
-                s11, s22, s12, s33, lanes[L_PHI + e], lanes[L_PSI + e], lanes[L_STRENGTH + e], lanes[L_TENSILE + e],
-                lame, two_mu,
-            )  # fmt: skip
-            lanes[P11 + at], lanes[P22 + at], lanes[P12 + at], lanes[P33 + at] = e11, e22, e12, e33
-            lanes[T11 + at], lanes[T22 + at], lanes[T12 + at], lanes[T33 + at] = s11, s22, s12, s33
-            lanes[P_LAM + at], lanes[P_MU2 + at] = lame, two_mu
-            lanes[P_PER_AREA + at] = shares * 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
-            who[m], bits[m] = k, how
+            for c in range(U(8)):  # stress and law
+                lanes[T11 + c * U(CAPACITY) + at] = lanes[S11 + c * U(CAPACITY) + e]
+            lanes[P_LAM + at], lanes[P_MU2 + at] = lanes[LAM + e], lanes[MU2 + e]
+            lanes[P_PER_AREA + at] = 2.0 * (lanes[CA + e] * lanes[CD + e] - lanes[CB + e] * lanes[CC + e])
+            who[m] = k
             m += 1
     return m
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _measure(m, lanes):
+def return_all(n, lanes):
+    """Plastic strains of n trial stresses, and how they flow."""
+    for e in range(U(n)):
+        e11, e22, e12, e33, how = plastic_strain(
+            lanes[T11 + e], lanes[T22 + e], lanes[T12 + e], lanes[T33 + e], lanes[P_PHI + e], lanes[P_PSI + e],
+            lanes[P_STRENGTH + e], lanes[P_TENSILE + e], lanes[P_LAM + e], lanes[P_MU2 + e],
+        )  # fmt: skip
+        lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e], lanes[HOW + e] = e11, e22, e12, e33, how
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def measure(m, lanes):
     """Shear, volume and work of the m plastic strains."""
     for e in range(U(m)):
         e11, e22, e12, e33 = lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e]
@@ -231,25 +233,25 @@ def _measure(m, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, soft, step, memory, s0):
+def _remember(m, first, first_row, rows, who, lanes, c, base, law, table, soft, step, memory, s0):
     """Add what has flowed to memory and s0."""
     for k in range(m):
         e, i = U(k), first + who[k]
-        j = rows[i] - first_row
+        j, bits = rows[i] - first_row, np.int64(lanes[HOW + U(k)])
         memory[j, E11] += lanes[P11 + e]
         memory[j, E22] += lanes[P22 + e]
         memory[j, E12] += lanes[P12 + e]
         memory[j, E33] += lanes[P33 + e]
         memory[j, SHEAR] += lanes[P_SHEAR + e]
         memory[j, VOLUME] += lanes[P_VOLUME + e]
-        if bits[k] & SHEAR_NOW:
+        if bits & SHEAR_NOW:
             memory[j, IN_SHEAR] = step + 1.0
-        if bits[k] & TENSION_NOW:
+        if bits & TENSION_NOW:
             memory[j, IN_TENSION] = step + 1.0
         memory[j, WORK] += lanes[P_WORK + e]
         if law[i] >= soft.first:
             strength.flowed(
-                law[i], j, 0, bits[k], lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
+                law[i], j, 0, bits, lanes[P11 + e], lanes[P22 + e], lanes[P12 + e], lanes[P33 + e],
                 lanes[P_SHEAR + e], lanes[P_VOLUME + e], soft, table,
             )  # fmt: skip
         relieve(i, j, c, base, memory, s0)
@@ -258,7 +260,7 @@ def _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small, step, memory, s0, table):
     lanes = np.zeros(LANES * CAPACITY)
-    who, bits = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.int64)
+    who = np.zeros(BLOCK, np.int64)
     flat_x, flat_c, flat_s0 = x.reshape(x.size), c.reshape(c.size), s0.reshape(s0.size)
     flat_table = table.reshape(table.size)
     blocks = -(-count // BLOCK)
@@ -269,10 +271,11 @@ def _flow(t, threads, count, rows, first_row, wide, x, c, base, law, soft, small
         _try(n, small, lanes)
         if _all_inside(n, lanes) < 0:
             continue
-        m = _return(n, lanes, 1.0, BLOCK, who, bits)
+        m = _choose(n, lanes, who)
         if m > 0:
-            _measure(m, lanes)
-            _remember(m, first, first_row, rows, who, bits, lanes, c, base, law, table, soft, step, memory, s0)
+            return_all(m, lanes)
+            measure(m, lanes)
+            _remember(m, first, first_row, rows, who, lanes, c, base, law, table, soft, step, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
