@@ -26,7 +26,7 @@ _WORDS = {
     g.NODE: "node",
     g.FACE: "element-face",
     g.JOINT: "face-joint",
-    **{kind: kind for kind in g.BOLTS},
+    **{kind: kind for kind in g.SUPPORTS},
     g.FLOW_NODE: "node",
     g.CHANNEL: "face-joint",
 }

@@ -33,7 +33,7 @@ Number = float | str | FunctionName
 """Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
 Value = float | Over | Drawn | np.ndarray
 """Of a property: a number; what `tables.over` or `fields.drawn` gives; one for each of the objects chosen (n,)."""
-OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{k: k for k in (*g.BOLTS, *g.FLOW)}}
+OBJECTS = {"node": g.NODE, "element": g.ELEMENT, "joint": g.JOINT, **{k: k for k in (*g.SUPPORTS, *g.FLOW)}}
 """What histories call them."""
 
 
@@ -515,6 +515,10 @@ class Bolts(Objects):
         """The properties of elements of bolts: docs/pcdc_reference.md lists them; those of one bolt."""
         self._do("bolt c-model", properties, where, self.kind, name)
 
+    def delete(self, *, where: Where = None) -> None:
+        """Take elements out at once, with their part of the grout."""
+        self._do("bolt delete", {}, where, self.kind)
+
 
 @commands
 class BoltNodes(Objects):
@@ -570,6 +574,63 @@ class Channels(Objects):
     def group(self, group: str, set: str | None = None, *, where: Where = None) -> None:
         """They have the groups of joints: `sim.joints.group`."""
         raise CommandError("channels have the groups of joints: sim.joints.group")
+
+
+@commands
+class Liners(Objects):
+    """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
+
+    _word, kind, pcdc = "liners", g.LINER_ELEMENT, "liner-element"
+
+    def create(self, *, group: str | None = None, set: str | None = None, where: Where = None) -> None:
+        """Put a liner on the free faces of a range, as things are now. group: that its elements and nodes are put
+        into."""
+        if group is None and set is not None:
+            raise TypeError("set goes with group")
+        self._do("liner create", {"group": _group(group, set)}, where, g.FACE)
+
+    def model(self, name: str, *, where: Where = None, **properties: float) -> None:
+        """The properties of elements of liners: docs/pcdc_reference.md lists them."""
+        self._do("liner c-model", properties, where, self.kind, name)
+
+    def delete(self, *, where: Where = None) -> None:
+        """Take elements out at once."""
+        self._do("liner delete", {}, where, self.kind)
+
+
+@commands
+class LinerNodes(Objects):
+    """Nodes of liners: `sim.liner_nodes["rotation"]`, see `Objects`."""
+
+    _word, kind, pcdc = "liner_nodes", g.LINER_NODE, "liner-node"
+
+    def velocity(
+        self,
+        *,
+        vx: Number | None = None,
+        vy: Number | None = None,
+        spin: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Velocity [m/s] and rate of rotation [rad/s] from now on; components left out stay free."""
+        given = {"velocity_x": vx, "velocity_y": vy, "spin": spin}
+        self._carry_out("boundary", given, where, "liner-node-constrain")
+
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        moment: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Force [N/m] and moment [N m/m] on each node."""
+        given = {"force_x": fx, "force_y": fy, "moment": moment}
+        self._carry_out("boundary", given, where, "liner-node-force-boundary-condition")
+
+    def remove_boundary(self, *, where: Where = None) -> None:
+        """Take back what was prescribed."""
+        self._carry_out("boundary remove", {}, where)
 
 
 @commands
@@ -655,10 +716,10 @@ class Histories(Words):
         variable: str | None = None,
         where: Where = None,
     ) -> None:
-        """Follow a value of a "node", "element", "joint", "bolt-node", "bolt-element", "flow-node", "flow-channel" or
-        of the "model": of one (id, or nearest to a point), or of those of a range or of all by how: "sum", "mean",
-        "minimum", "maximum"; every so many steps. variable: with the value "law-state", which state variable of laws of
-        the user."""
+        """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
+        "flow-node", a "flow-channel" or of the "model": of one (id, or nearest to a point), or of those of a range or
+        of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable: with the value "law-state",
+        which state variable of laws of the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
@@ -741,6 +802,8 @@ class BlockCommands:
     bolt_nodes: BoltNodes
     flow_nodes: FlowNodes
     channels: Channels
+    liners: Liners
+    liner_nodes: LinerNodes
     tables: Tables
     fields: Fields
     histories: Histories
@@ -753,6 +816,7 @@ class BlockCommands:
         self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
         self.bolts, self.bolt_nodes = Bolts(do), BoltNodes(do)
         self.flow_nodes, self.channels = FlowNodes(do), Channels(do)
+        self.liners, self.liner_nodes = Liners(do), LinerNodes(do)
         self.tables, self.fields = Tables(do), Fields(do)
         self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)
 

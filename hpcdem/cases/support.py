@@ -1,4 +1,4 @@
-"""A tunnel in rock that yields, supported by bolts."""
+"""A tunnel in rock that yields, supported by bolts and a shell of shotcrete."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ class Supported:
     """convergence [m]: mean displacement of the wall towards the centre, at_support: when the bolts were put in; crown
     [m]: displacement of the crown into the tunnel; plastic_radius [m]: of a circle with the area of the tunnel and of
     the rock that has yielded; axial_force [N]: largest of a bolt, tension positive; yielded, broken: elements of bolts;
-    slipped: nodes of bolts whose grout has slipped; ratio: unbalanced forces over all at the end."""
+    slipped: nodes of bolts whose grout has slipped; thrust [N/m]: largest axial force of the liner, tension positive;
+    moment [N m/m]: largest of the liner; hinges: elements of the liner that have yielded; ratio: unbalanced forces over
+    all at the end."""
 
     convergence: float
     at_support: float
@@ -26,14 +28,18 @@ class Supported:
     yielded: int
     broken: int
     slipped: int
+    thrust: float
+    moment: float
+    hinges: int
     ratio: float
 
 
 class Support(Case):
-    """A circular tunnel in Mohr-Coulomb rock under stress. Bolts are put in when a part of the stress is released."""
+    """A circular tunnel in Mohr-Coulomb rock under stress. Bolts and a liner are put in when a part of the stress is
+    released."""
 
     name: ClassVar[str] = "support"
-    title: ClassVar[str] = "A tunnel in rock that yields, supported by bolts"
+    title: ClassVar[str] = "A tunnel in rock that yields, supported by bolts and shotcrete"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Supported
 
@@ -52,7 +58,7 @@ class Support(Case):
     friction: float = quantity(30.0, "degrees", "friction angle", gt=0, lt=90)
     dilation: float = quantity(5.0, "degrees", "dilation angle", ge=0, lt=90)
     tensile_strength: float = quantity(0.2e6, "Pa", "tensile strength", ge=0)
-    release: float = quantity(0.6, "1", "part of the stress at the wall that is released before the bolts are put in",
+    release: float = quantity(0.6, "1", "part of the stress at the wall that is released before the support is put in",
                               ge=0, le=1)  # fmt: skip
     stages: int = quantity(8000, "1", "steps in which the stress at the wall is released", ge=100)
     bolts: int = quantity(16, "1", "number of bolts, 0: none", ge=0, le=1000)
@@ -66,6 +72,12 @@ class Support(Case):
     bond_stiffness: float = quantity(1e9, "N/m/m", "stiffness of the grout along a bolt", gt=0)
     bond_cohesion: float = quantity(2e6, "Pa", "cohesion between grout and bolt, and grout and rock", gt=0)
     grout: float = quantity(0.0125, "m", "thickness of the grout", ge=0)
+    liner: float = quantity(0.0, "m", "thickness of the shell of shotcrete, 0: none", ge=0)
+    liner_young: float = quantity(15e9, "Pa", "Young's modulus of the shotcrete", gt=0)
+    liner_poisson: float = quantity(0.2, "1", "Poisson's ratio of the shotcrete", ge=0, lt=0.5)
+    liner_strength: float = quantity(25e6, "Pa", "compressive strength of the shotcrete", gt=0)
+    liner_tension: float = quantity(2e6, "Pa", "tensile strength of the shotcrete", ge=0)
+    liner_bond: float = quantity(20e9, "Pa/m", "stiffness of its bond to the rock, across and along", gt=0)
 
     @model_validator(mode="after")
     def _fits(self) -> Support:
@@ -79,6 +91,8 @@ class Support(Case):
             raise ValueError(f"bolt_length is {self.bolt_length:g}: bolts would come near the sides of the model")
         if self.stress_xx == 0.0 and self.stress_yy == 0.0:
             raise ValueError("stress_xx and stress_yy are both 0, expected a stress")
+        if self.liner > 0.2 * self.radius:
+            raise ValueError(f"liner is {self.liner:g}, expected at most a fifth of radius, {0.2 * self.radius:g} m")
         if self.pretension > self.bolt_yield:
             raise ValueError(f"pretension is {self.pretension:g}, expected at most bolt_yield, {self.bolt_yield:g} N")
         return self
@@ -104,7 +118,7 @@ def into():
     px, py = px - ux, py - uy
     return float(np.nanmean(-(ux * px + uy * py) / radius)), -float(uy[np.hypot(px, py - radius).argmin()])
 
-# In balance before; then what the core did to the rock dies down, and on the way bolts are put in.
+# In balance before; then what the core did to the rock dies down, and on the way the support is put in.
 pcdc model option dynamic off
 pcdc model option collision off
 pcdc model solve ratio 1e-7 cycles 1000
@@ -129,6 +143,11 @@ for part in sorted({k / 20 for k in range(21)} | {release}):
         pcdc bolt c-model mech-e-p property density 7850 young [bolt_young] diameter [bolt_diameter] \\
             t-y-f [bolt_yield] s-s-r-b [bond_stiffness] g-t [grout] c-r-g [bond_cohesion] c-g-b [bond_cohesion] \\
             spacing [bolt_spacing] pre-f [pretension]
+    if liner:
+        pcdc liner create group 'shell' range geometry 'wall'
+        pcdc liner c-model beam property density 2400 young [liner_young] poisson-r [liner_poisson] \\
+            thickness [liner] tensile-strength [liner_tension] compressive-strength [liner_strength] \\
+            normal-stiffness [liner_bond] shear-stiffness [liner_bond]
 pcdc model solve ratio 1e-6
 """
 MEASURED = """
@@ -143,13 +162,22 @@ if bolts:
     axial_force = float(force[np.abs(force).argmax()])
     yielded, broken = int((state & 15 > 0).sum()), int((state & 16 > 0).sum())
     slipped = int((pcdc.values('bolt-node', 'bond-state').astype(int) > 0).sum())
-print('into the tunnel: mean %.4g mm (%.4g before the bolts), crown %.4g mm; plastic to %.4g m'
+thrust, moment, hinges = 0.0, 0.0, 0
+if liner:
+    along = pcdc.values('liner-element', 'axial-force')
+    ends = [pcdc.values('liner-element', name) for name in ('moment-first', 'moment-last')]
+    thrust, moment = float(along[np.abs(along).argmax()]), float(np.abs(ends).max())
+    hinges = int((pcdc.values('liner-element', 'liner-state').astype(int) & 8 > 0).sum())
+print('into the tunnel: mean %.4g mm (%.4g before the support), crown %.4g mm; plastic to %.4g m'
       % (1e3*convergence, 1e3*at_support, 1e3*crown, plastic_radius))
 print('bolts: largest force %.4g kN, %d elements yielded, %d broken, grout slipped at %d nodes'
       % (axial_force/1e3, yielded, broken, slipped))
+if liner:
+    print('liner: largest axial force %.4g MN/m, moment %.4g kN m/m, %d elements have yielded'
+          % (thrust/1e6, moment/1e3, hinges))
 curve.append((1e3 * convergence, 0.0))
 pcdc chart create 'support' x-label 'convergence (mm)' y-label 'stress at the wall over that before'
 pcdc chart add 'support' values [curve] label 'release'
-pcdc chart add 'support' values [[(1e3 * at_support, 1 - release)]] label 'bolts put in' style points
+pcdc chart add 'support' values [[(1e3 * at_support, 1 - release)]] label 'support put in' style points
 pcdc chart export 'support' 'support.png' plastic
 """

@@ -26,6 +26,9 @@ from hpcdem.io.slabs import find_rows
 ELEMENT, JOINT = 0, 1
 """Values of the cell data `cell`."""
 _LINE, _TRIANGLE, _QUAD = 3, 5, 9
+SUPPORTS = ("bolts", "liners")
+"""Groups of a file with tables of their nodes and elements."""
+Supports = Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
 
 
 @dataclass
@@ -34,8 +37,8 @@ class MeshFrame:
 
     corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
     columns; joints: number, first, last (corners at their ends) and further columns. group_names: by name of an integer
-    column of the elements what its values stand for. bolts: columns of their "nodes" and "elements", equal on all
-    ranks; empty without bolts.
+    column of the elements what its values stand for. supports: by name ("bolts", "liners") columns of their "nodes"
+    and "elements", equal on all ranks.
     """
 
     step: int
@@ -45,7 +48,7 @@ class MeshFrame:
     elements: Table
     joints: Table
     group_names: Mapping[str, list[str]]
-    bolts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    supports: Supports = field(default_factory=dict)
 
 
 @dataclass
@@ -54,7 +57,7 @@ class MeshState:
 
     points (n, 2): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles; joints (nj, 2):
     rows of points at their ends; of_points, of_elements, of_joints: columns by name, vectors (n, 2); group_names and
-    bolts as in `MeshFrame`.
+    supports as in `MeshFrame`.
     """
 
     step: int
@@ -67,7 +70,7 @@ class MeshState:
     of_elements: dict[str, np.ndarray]
     of_joints: dict[str, np.ndarray]
     group_names: Mapping[str, list[str]]
-    bolts: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    supports: Supports = field(default_factory=dict)
 
 
 def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
@@ -82,7 +85,7 @@ def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
         frame.step, frame.time, frame.dt, np.stack([corners["x"], corners["y"]], axis=1), _cells(elements["corners"]),
         ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y")}),
         {k: v for k, v in elements.items() if k != "corners"},
-        {k: v for k, v in joints.items() if k not in ("first", "last")}, frame.group_names, frame.bolts,
+        {k: v for k, v in joints.items() if k not in ("first", "last")}, frame.group_names, frame.supports,
     )  # fmt: skip
 
 
@@ -126,13 +129,15 @@ def read_mesh_frame(path: str | os.PathLike) -> MeshState:
             cells = {name: values[...] for name, values in top["CellData"].items()}
             of_points = {name: values[...] for name, values in top["PointData"].items()}
             names = {name: [one.decode() for one in values[...]] for name, values in file["hpcdem"].items()}
-            bolts = {
-                kind: {name: values[...] for name, values in of.items()} for kind, of in file.get("bolts", {}).items()
+            supports = {
+                word: {kind: {name: values[...] for name, values in of.items()} for kind, of in file[word].items()}
+                for word in SUPPORTS
+                if word in file
             }
             return MeshState(
                 int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends,
                 {k: v[:, :2] if v.ndim == 2 else v for k, v in of_points.items()},
-                {k: v[elements] for k, v in cells.items()}, {k: v[joints] for k, v in cells.items()}, names, bolts,
+                {k: v[elements] for k, v in cells.items()}, {k: v[joints] for k, v in cells.items()}, names, supports,
             )  # fmt: skip
         except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
@@ -186,11 +191,12 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
         out.whole("VTKHDF/FieldData/TimeValue", np.array([frame.time]))
         out.whole("VTKHDF/FieldData/step", np.array([frame.step], np.int64))
         out.group("hpcdem", {"format": 1, "step": frame.step, "time": float(frame.time), "dt": float(frame.dt)})
-        for kind, of in frame.bolts.items():
-            out.group("bolts")
-            out.group(f"bolts/{kind}")
-            for name, values in of.items():
-                out.whole(f"bolts/{kind}/{name}", values)
+        for word, tables in frame.supports.items():
+            out.group(word)
+            for kind, of in tables.items():
+                out.group(f"{word}/{kind}")
+                for name, values in of.items():
+                    out.whole(f"{word}/{kind}/{name}", values)
         for name, names in frame.group_names.items():
             encoded = [one.encode() for one in names]
             out.whole(f"hpcdem/{name}", np.array(encoded, dtype=f"S{max([1, *map(len, encoded)])}"))

@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hpcdem.physics.bolts.model import Bolts
     from hpcdem.physics.fdem.free_field import FreeField
+    from hpcdem.physics.fdem.structures import Structure
     from hpcdem.physics.flow.model import Flow
 
 
-def _bolts() -> type[Bolts]:
+def _bolts() -> type[Structure]:
     from hpcdem.physics.bolts.model import Bolts
 
     return Bolts
@@ -27,15 +27,19 @@ def _fluid() -> type[Flow]:
     return Flow
 
 
+def _liners() -> type[Structure]:
+    from hpcdem.physics.liners.model import Liners
+
+    return Liners
+
+
 def _free_field() -> type[FreeField]:
     from hpcdem.physics.fdem.free_field import FreeField
 
     return FreeField
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[Flow] | type[FreeField]]] = {
-    "bolts": _bolts,
-    "fluid": _fluid,
-    "free_field": _free_field,
-}
+PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow]]] = {
+    "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid,
+}  # fmt: skip
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

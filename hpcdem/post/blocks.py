@@ -1,4 +1,5 @@
-"""Pictures of blocks: cracks coloured by the way they broke, axial forces of bolts, contours of the compressive stress
+"""Pictures of blocks: cracks coloured by the way they broke, axial forces of bolts, forces and moments of liners,
+contours of the compressive stress
 and of plastic strain.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
@@ -19,7 +20,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
-from hpcdem.post import bolts
+from hpcdem.post import bolts, liners
 
 CRACKS, STRESS, PLASTIC = "cracks", "stress", "plastic"
 PANELS = (CRACKS, STRESS, PLASTIC)
@@ -69,15 +70,17 @@ def view(state: MeshState) -> View:
 
 
 def view_of_flow(state: MeshState) -> View:
-    """The part of the plane where there is plastic strain or a bolt, and half of its width around it; the whole model
-    where that is hardly more."""
+    """The part of the plane where there is plastic strain, a bolt or a liner, and half of its width around it; the
+    whole model where that is hardly more."""
     from hpcdem.post.bolts import areas
 
     whole = view(state)
     cells = state.cells[plastic_shear(state) > 0.01 * plastic_range(state)[1]]
     points = [state.points[cells[cells >= 0]]]
-    if state.bolts:
+    if "bolts" in state.supports:
         points.append(areas(state)[0].reshape(-1, 2))
+    if "liners" in state.supports:
+        points.append(liners.areas(state, "axial_force", "axial_force")[0].reshape(-1, 2))
     there = np.concatenate(points)
     if not len(there):
         return whole
@@ -196,7 +199,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
             span = looks.ranges.get(panel) or shown.range(state)
             filled = contours(axes, state, shown, span)
             if number == 0:  # no panel of cracks, which would show them
-                bolts.draw(axes, state)
+                supports(axes, state)
             colours = figure.add_axes(
                 ((x + width + 0.25 * k) / page[0], y / page[1], 0.28 * k / page[0], height / page[1])
             )
@@ -266,7 +269,12 @@ def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
     for rows, shade, part, word in _kinds(joint_state, mode):
         lines(axes, at[rows], shade, part * width)
         handles.insert(0, Line2D([], [], color=shade, linewidth=max(part * width, 0.9), label=word))
-    return handles + bolts.draw(axes, state)
+    return handles + supports(axes, state)
+
+
+def supports(axes: Any, state: MeshState) -> list[Any]:
+    """Draw bolts and liners; returns what a legend is made of."""
+    return bolts.draw(axes, state) + liners.draw(axes, state)
 
 
 def _kinds(state: np.ndarray, mode: np.ndarray) -> list[tuple[np.ndarray, str, float, str]]:

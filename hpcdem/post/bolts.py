@@ -18,7 +18,7 @@ BROKEN = 16
 def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
     """Corners (m, 4, 2) [m] of the area beside each element of a bolt, from its bar out by its force, and the forces
     (m,) [N]."""
-    nodes, elements = state.bolts["nodes"], state.bolts["elements"]
+    nodes, elements = state.supports["bolts"]["nodes"], state.supports["bolts"]["elements"]
     at = np.column_stack([nodes["position_x"], nodes["position_y"]])
     first, force = elements["first_node"], elements["axial_force"]
     a, b = at[first], at[first + 1]
@@ -35,7 +35,7 @@ def areas(state: MeshState) -> tuple[np.ndarray, np.ndarray]:
 
 def draw(axes: Any, state: MeshState) -> list[Any]:
     """Draw the bolts of a frame; returns what a legend is made of, nothing without bolts."""
-    if not state.bolts:
+    if "bolts" not in state.supports:
         return []
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.lines import Line2D
@@ -50,7 +50,7 @@ def draw(axes: Any, state: MeshState) -> list[Any]:
             )
             handles.append(Patch(color=shade, label=f"{word} up to {np.abs(force[rows]).max() / 1e3:.3g} kN"))
     axes.add_collection(LineCollection(corners[:, :2], colors=BAR, linewidths=0.9, zorder=5), autolim=False)
-    broken = state.bolts["elements"]["bolt_state"].astype(np.int64) & BROKEN > 0
+    broken = state.supports["bolts"]["elements"]["bolt_state"].astype(np.int64) & BROKEN > 0
     if broken.any():
         middle = corners[broken, :2].mean(axis=1)
         axes.plot(middle[:, 0], middle[:, 1], "x", color=COMPRESSION, markersize=4.0, zorder=6)

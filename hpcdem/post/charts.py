@@ -62,7 +62,7 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
     """A figure with a model on the left, and the axes for a diagram on the right."""
     from matplotlib.figure import Figure
 
-    from hpcdem.post import blocks, bolts
+    from hpcdem.post import blocks
 
     seen = blocks.view_of_flow(model) if plastic else blocks.view(model)
     height = SIZE[1] - (0.95 if plastic else 0.75)  # of the panels: above and below there are words
@@ -78,7 +78,7 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
         shown = blocks.CONTOURS[blocks.PLASTIC]
         blocks.frame(left, seen, blocks.USUAL, first=True, last=True)
         filled = blocks.contours(left, model, shown, shown.range(model))
-        modes = bolts.draw(left, model)
+        modes = blocks.supports(left, model)
         left.apply_aspect()
         box = left.get_position()
         bar = figure.add_axes((box.x0 + 0.55 * box.width, box.y1 + 0.1 / page[1], 0.45 * box.width, 0.07 / page[1]))
@@ -96,9 +96,11 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
     for axes, label in ((left, "(a)"), (right, "(b)")):
         axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
     if modes:  # over the diagram there is room for all of them in one line
+        tight = len(modes) > 2
         figure.legend(
             handles=modes, loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=right.transAxes, ncols=4,
-            frameon=False, fontsize=0.9 * FONT, borderaxespad=0.15, handlelength=1.2, columnspacing=1.0,
+            frameon=False, fontsize=(0.75 if tight else 0.9) * FONT, borderaxespad=0.15,
+            handlelength=1.2, columnspacing=0.8 if tight else 1.0,
             handletextpad=0.4,
         )  # fmt: skip
     right.set_prop_cycle(color=COLOURS)

@@ -71,9 +71,9 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     state = read_mesh_frame(tmp_path / "data" / "f_0000000030.vtkhdf")
     for kind, name in (("bolt-node", "nodes"), ("bolt-element", "elements")):
         for quantity in QUANTITIES[kind]:
-            assert np.array_equal(state.bolts[name][quantity], bolts.values(kind, quantity)), quantity
-    assert np.array_equal(state.bolts["elements"]["first_node"], bolts.first)
-    assert np.array_equal(state.bolts["nodes"]["bolt"], bolts.nodes["bar"])
+            assert np.array_equal(state.supports["bolts"][name][quantity], bolts.values(kind, quantity)), quantity
+    assert np.array_equal(state.supports["bolts"]["elements"]["first_node"], bolts.first)
+    assert np.array_equal(state.supports["bolts"]["nodes"]["bolt"], bolts.nodes["bar"])
     # The area beside an element: as wide as its force over the largest, to the left of the bar in tension.
     corners, force = of_bolts.areas(state)
     along, out = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
@@ -85,7 +85,7 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     assert labels[0] == f"tension up to {force.max() / 1e3:.3g} kN"
     pictures.plot(state, tmp_path / "a.png")
     drawn = (tmp_path / "a.png").read_bytes()
-    state.bolts = {}
+    state.supports = {}
     pictures.plot(state, tmp_path / "a.png")
     assert (tmp_path / "a.png").read_bytes() != drawn  # the bolts alone make the difference
 

@@ -10,6 +10,7 @@ from hpcdem.physics.bolts import kernels
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.structures import REMOVED
 from tests.blocks.support import model, rectangle
 from tests.bolts.support import STEEL, state
 
@@ -220,3 +221,29 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:
     sim.step()
     sim.take_mesh(rectangle(2, 2, 1.0, 1.0))
     assert Bolts.there(sim) is None
+
+
+def test_deleted_elements_carry_nothing_and_the_rest_goes_on() -> None:
+    """The middle of a tensioned bolt is taken out: each half is held by its own grout; numbers stay."""
+    sim = block(young=50e9)
+    sim.gravity(0.0, -9.81)
+    bolts = bolt(sim, (0.5, 1.0), (0.5, 0.2), plate=True, pretension_force=20e3, segments=16, tensile_yield_force=1e9)
+    convergence.solve(sim, ratio=1e-7)
+    grout, bond = bolts.nodes["grout"].copy(), bolts.nodes["bond"].copy()
+    bolts.delete(np.array([7, 8]))
+    assert (bolts.elements["state"] & REMOVED > 0).tolist() == 7 * [False] + 2 * [True] + 7 * [False]
+    assert bolts.alive("bolt-node").tolist() == 8 * [True] + [False] + 8 * [True]  # node 8 had no other element
+    assert bolts.nodes["grout"].sum() == pytest.approx(grout.sum() - 2 * 0.05)
+    assert bolts.nodes["bond"][[7, 9]] == pytest.approx(0.5 * bond[[7, 9]]) and bolts.nodes["bond"][8] == 0.0
+    assert not bolts.hosted[8] and bolts.hosted[[7, 9]].all()
+    assert convergence.solve(sim, ratio=1e-6, cycles=50_000).reason == "ratio"
+    force = bolts.values("bolt-element", "axial_force")
+    assert not force[[7, 8]].any() and abs(force[6]) < 0.2 * force[0] and abs(force[9]) < 0.2 * force[0]
+    # What is left over of each half is in balance with its grout; the plate takes the rest of the first.
+    assert bolts.nodes["bond"][9:].sum() == pytest.approx(0.0, abs=1e-3 * np.abs(bolts.nodes["bond"]).max())
+    bolts.delete(np.flatnonzero(bolts.alive("bolt-element")))
+    convergence.advance(sim, 100)
+    assert not bolts._on_rock.any() and np.isfinite(bolts.nodes["x"]).all()
+    with pytest.raises(CommandError, match="bolt-element 16 has no model"):  # deleted ones need none, new ones do
+        bolts.create([(0.2, 0.9), (0.2, 0.5)])
+        sim.step()

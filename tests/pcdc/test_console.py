@@ -77,7 +77,10 @@ def test_exit_ends(bench):
         ("pcdc element-face c-model contact-m-c property p-n 1 p", "penalty-normal penalty-shear"),
         ("pcdc mesh create from-layer 'a' refine-layer 'b' ", "size distance"),
         ("pcdc node group 'a' range g", "group geometry"),
-        ("pcdc history create 'h' ", "node element joint bolt-node bolt-element flow-node flow-channel model"),
+        (
+            "pcdc history create 'h' ",
+            "node element joint bolt-node bolt-element liner-node liner-element flow-node flow-channel model",
+        ),
         ("pcdc element group ", ""),
         ("pcdc nothing ", ""),
         ("pcdc model restore 'a", ""),

@@ -114,7 +114,7 @@ def test_histories_record_what_the_commands_can():
         "element": g.ELEMENT,
         "joint": g.JOINT,
         "model": "model",
-        **{kind: kind for kind in (*g.BOLTS, *g.FLOW)},
+        **{kind: kind for kind in (*g.SUPPORTS, *g.FLOW)},
     }
     for kind, values in t.RECORDED.items():
         assert {python(name): unit for name, unit in values.items()} == UNITS[kinds[kind]]

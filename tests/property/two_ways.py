@@ -27,6 +27,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.liners.model import Liners
 from hpcdem.runtime.progress import Log
 from hpcdem.runtime.stop_requests import StopRequests
 from hpcdem.session import Session
@@ -317,6 +318,8 @@ class Writer:
             self._joint_model()
         if self.bolted:
             self._bolts()
+        if self.rng("liners").random() < 0.3:
+            self._liners()
         if draw.random() < 0.5:
             self._surfaces()
         vy = u.speed(draw.choice((-2.0, -4.0)))
@@ -419,6 +422,23 @@ class Writer:
         if self.has("properties"):  # the same again, and one of them twice
             self.add(f"pcdc bolt c-model mech-e-p property {_words(values | {'young': 2.0 * values['young']})}{where}")
         self.add(f"pcdc bolt c-model mech-e-p property {_words(values)}{where}")
+
+    def _liners(self) -> None:
+        """On the top of the lower body, weak enough to yield, to slip and to part."""
+        u, rng = self.units, self.rng("beams")
+        values = {
+            "density": u.density(2400.0), "young": u.stress(rng.choice((1e8, 1e9))), "thickness": u.length(0.02),
+            "poisson-ratio": 0.25, "tensile-strength": u.stress(rng.choice((1e4, 1e6))),
+            "compressive-strength": u.stress(1e6), "normal-stiffness": u.stress(1e9) / u.length(1.0),
+            "shear-stiffness": u.stress(rng.choice((0.0, 1e9))) / u.length(1.0), "bond-friction": 20.0,
+            "bond-tensile-strength": u.stress(1e3), "bond-cohesion": u.stress(1e3),
+        }  # fmt: skip
+        y = u.length(self.high)
+        self.add(f"pcdc liner create range boundary y {y!r} {y!r}")
+        where = " range id 0 1000000" if self.has("ranges") else ""
+        if self.has("properties"):
+            self.add(f"pcdc liner c-model beam property {_words(values | {'young': 2.0 * values['young']})}{where}")
+        self.add(f"pcdc liner c-model beam property {_words(values)}{where}")
 
     def _surfaces(self) -> None:
         u = self.units
@@ -610,6 +630,10 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
         if bolts is not None:
             found["axial force"] = bolts.values("bolt-element", "axial_force") / u.force(1.0)
             found["slip"] = bolts.values("bolt-node", "slip") / u.l
+        liners = Liners.there(blocks)
+        if liners is not None:
+            found["thrust"] = liners.values("liner-element", "axial_force") / u.toughness(1.0)
+            found["rotation"] = liners.values("liner-node", "rotation")
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
         found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():

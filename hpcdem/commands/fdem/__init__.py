@@ -22,17 +22,19 @@ if TYPE_CHECKING:
         frames,
         geometry,
         histories,
+        liners,
         meshes,
         queries,
         settings,
         steps,
         summary,
+        supports,
     )
     from hpcdem.commands.fdem.project import Project
 
 __all__ = [
     "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "flow", "frames", "geometry",
-    "histories", "meshes", "queries", "settings", "steps", "summary",
+    "histories", "liners", "meshes", "queries", "settings", "steps", "summary", "supports",
 ]  # fmt: skip
 
 

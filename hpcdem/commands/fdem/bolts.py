@@ -1,10 +1,10 @@
-"""Rock bolts: where they are, their properties, what is prescribed at their nodes."""
+"""Rock bolts: where they are, what is prescribed at their nodes. The rest is that of all supports (supports.py)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem import supports
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels
@@ -40,12 +40,6 @@ def create(
         project.groups[BOLT_ELEMENT].assign(elements, group, set_name)
 
 
-def model(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
-    """Properties of elements of bolts (physics.bolts.properties)."""
-    elements = everything(project, BOLT_ELEMENT, where)
-    Bolts.of(project.ready()).assign(elements, properties)
-
-
 def velocity(
     project: Project,
     vx: Number | None = None,
@@ -63,18 +57,11 @@ def velocity(
             changes[f"does_{axis}"], changes[f"at_{axis}"] = kernels.VELOCITY, speed
         if push is not None:
             changes[f"does_{axis}"], changes[f"at_{axis}"] = kernels.ACCELERATION, push
-    nodes = everything(project, BOLT_NODE, where)
-    Bolts.of(project.ready()).condition(nodes, **changes)
+    supports.condition(project, BOLT_NODE, changes, where)
 
 
 def force(project: Project, fx: Number | None = None, fy: Number | None = None, where: Range | None = None) -> None:
     """Force [N] on each of these nodes of one bolt."""
     given = {"force_x": fx, "force_y": fy}
-    nodes = everything(project, BOLT_NODE, where)
-    Bolts.of(project.ready()).condition(nodes, **{name: value for name, value in given.items() if value is not None})
-
-
-def remove_conditions(project: Project, where: Range | None = None) -> None:
-    """Nodes of bolts are free again."""
-    nodes = everything(project, BOLT_NODE, where)
-    Bolts.of(project.ready()).remove_conditions(nodes)
+    changes = {name: value for name, value in given.items() if value is not None}
+    supports.condition(project, BOLT_NODE, changes, where)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import groups as g
 from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
 from hpcdem.physics.flow.model import Flow
@@ -49,7 +49,7 @@ def places(project: Project, kind: str) -> np.ndarray:
 
 def _why(objects: _Objects, where: g.Range) -> str:
     """What it chose was taken out, or which of several terms is fulfilled by nothing at all."""
-    if not objects.null_too and not objects.project.alive.all():
+    if not objects.null_too and objects.kind not in g.SUPPORTS and not objects.project.alive.all():
         gone = int(_Objects(objects.project, objects.kind, True).all_of(where).sum())
         if gone:
             return f": all that it names ({gone}) was taken out (element c-model null)"
@@ -61,7 +61,7 @@ def _why(objects: _Objects, where: g.Range) -> str:
 
 _ONLY_JOINTS = (g.Between, g.OnCrack)
 _NOT_ELEMENTS = (g.OnBoundary, g.OfElements)
-_NOT_BOLTS = (*_NOT_ELEMENTS, g.OnLayer)
+_NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer)
 
 
 class _Objects:
@@ -74,12 +74,10 @@ class _Objects:
         self.mesh = mesh = project.whole_mesh()
         self.groups = project.groups
         self.now = False
-        if kind in g.BOLTS:
-            bolts = Bolts.there(project.blocks)
-            if bolts is None:
-                raise CommandError("there are no bolts yet: bolt create comes first")
-            self.bolts = bolts
-            self.numbers = np.arange(len(bolts) if kind == g.BOLT_NODE else len(bolts.first))
+        if kind in g.SUPPORTS:
+            self.support = supports.of(project.blocks, kind)
+            there = self.support.alive(kind)
+            self.numbers = np.flatnonzero(there | null_too)
             return
         some = None
         if kind in g.FLOW:
@@ -119,12 +117,12 @@ class _Objects:
 
     def places(self) -> np.ndarray:
         """(n, k, 2) [m] where x, y and geometry look for each: the centre of an element, a node, both ends of a face or
-        joint (of the element that it is numbered by) or of an element of a bolt."""
+        joint (of the element that it is numbered by) or of an element of a bolt or liner."""
         mesh = self.mesh
-        if self.kind in g.BOLTS:
-            at = self.bolts.nodes["x" if self.now else "origin"]
-            first = self.bolts.first
-            return at[:, None] if self.kind == g.BOLT_NODE else np.stack([at[first], at[first + 1]], axis=1)
+        if self.kind in g.SUPPORTS:
+            at = self.support.nodes["x" if self.now else "origin"]
+            found = at[self.support.ends()] if self.kind == self.support.parts[0] else at[:, None]
+            return found[self.numbers]
         if not self.now:
             if self.kind == g.ELEMENT:
                 return centroids(mesh.points, mesh.cells[self.numbers])[:, None]
@@ -143,7 +141,7 @@ class _Objects:
         """(n,) bool: which of them a term holds for."""
         if isinstance(term, _ONLY_JOINTS) and self.kind != g.JOINT:
             raise CommandError(f"{term} makes no sense for {self.kind}s")
-        if isinstance(term, _NOT_BOLTS) and self.kind in g.BOLTS:
+        if isinstance(term, _NOT_SUPPORTS) and self.kind in g.SUPPORTS:
             raise CommandError(f"{term} makes no sense for {self.kind}s")
         if isinstance(term, _NOT_ELEMENTS) and self.kind == g.ELEMENT:
             raise CommandError(f"{term} makes no sense for elements")
@@ -192,7 +190,10 @@ class _Objects:
         if first == last and not mask.any():
             known = _Objects(self.project, self.kind, True).numbers
             if first in known:
-                raise CommandError(f"{self.kind} {first} was taken out (element c-model null)")
+                how = (
+                    f"{supports.class_of(self.kind).word} delete" if self.kind in g.SUPPORTS else "element c-model null"
+                )
+                raise CommandError(f"{self.kind} {first} was taken out ({how})")
             raise CommandError(f"there is no {self.kind} {first}; numbers go from 0 to {int(known[-1])}")
         return mask
 

@@ -18,7 +18,7 @@ from hpcdem.io.behind import Deliveries, under_way
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
-from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
@@ -200,8 +200,9 @@ def frame(project: Project) -> MeshFrame:
     count = np.where(mesh.cells[element, 3] >= 0, 4, 3)
     joints["first"], joints["last"] = joints["number"], 4 * element + (edge + 1) % count
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
-    clock, bolts = blocks.clock, Bolts.there(blocks)
+    clock = blocks.clock
+    there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
     return MeshFrame(
         int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
-        {} if bolts is None else bolts.columns(),
+        {found.name: found.columns() for found in there},
     )  # fmt: skip

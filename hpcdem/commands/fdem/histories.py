@@ -14,7 +14,7 @@ from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
-from hpcdem.physics.fdem.groups import BOLTS, ELEMENT, FLOW, NODE, Ids, Range
+from hpcdem.physics.fdem.groups import ELEMENT, FLOW, NODE, SUPPORTS, Ids, Range
 
 FLUSH = 500
 """Records that wait at most before they go to the file."""
@@ -62,7 +62,7 @@ def create(
 
 
 def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
-    if kind in BOLTS or kind in FLOW:
+    if kind in SUPPORTS or kind in FLOW:
         numbers, middles = everything(project, kind, None), places(project, kind)
         return nearest_point(middles, at, numbers)
     mesh, xy = project.whole_mesh(), project.positions()

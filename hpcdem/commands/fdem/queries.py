@@ -9,9 +9,9 @@ import numpy as np
 from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
-from hpcdem.physics.fdem.groups import BOLTS, FLOW, Range
+from hpcdem.physics.fdem.groups import FLOW, SUPPORTS, Range
 from hpcdem.physics.flow.model import Flow
 
 
@@ -22,8 +22,8 @@ def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarr
 
 def values(project: Project, kind: str, name: str, where: Range | None = None) -> np.ndarray:
     """A quantity of these objects, in the order of their numbers (`numbers`); NaN where there is none. Collective."""
-    if kind in BOLTS:
-        return _of_bolts(project, kind, name, where)
+    if kind in SUPPORTS:
+        return _of_supports(project, kind, name, where)
     if kind in FLOW:
         return _of_flow(project, kind, name, where)
     return diagnostics.values(project.ready(use=False), name, everything(project, kind, where))
@@ -31,16 +31,16 @@ def values(project: Project, kind: str, name: str, where: Range | None = None) -
 
 def total(project: Project, kind: str, name: str, where: Range | None = None) -> float:
     """Exact sum of a quantity; of nodes over all corners there. Collective."""
-    if kind in BOLTS:
-        return math.fsum(_of_bolts(project, kind, name, where).tolist())
+    if kind in SUPPORTS:
+        return math.fsum(_of_supports(project, kind, name, where).tolist())
     if kind in FLOW:
         return math.fsum(_of_flow(project, kind, name, where).tolist())
     return diagnostics.total(project.ready(use=False), name, everything(project, kind, where))
 
 
-def _of_bolts(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
+def _of_supports(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
     numbers = everything(project, kind, where)  # refuses where there are none
-    return Bolts.of(project.ready(use=False)).values(kind, name, numbers)
+    return supports.of(project.ready(use=False), kind).values(kind, name, numbers)
 
 
 def _of_flow(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
-from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE
+from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, SUPPORTS
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
 
@@ -41,13 +40,17 @@ UNITS = {
         "normal_stress_last": "Pa", "shear_stress_largest": "Pa", "shear_stress_first": "Pa",
         "shear_stress_middle": "Pa", "shear_stress_last": "Pa",
     },
-    **{kind: {name: unit for name, (unit, _) in of.items()} for kind, of in {**OF_BOLTS, **OF_FLOW}.items()},
+    **{
+        kind: {name: unit for name, (unit, _) in of.items()}
+        for kind, of in {**supports.QUANTITIES, **OF_FLOW}.items()
+    },
     MODEL: {
         "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
         "broken_joints": "1",
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
         "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
-        "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "energy_error": "J/m",
+        "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "liner_work": "J/m",
+        "energy_error": "J/m",
         "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
     },
 }  # fmt: skip
@@ -93,6 +96,7 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "outside_work": _energy("work_outside"),
     "disc_work": _energy("work_discs"),
     "bolt_work": _energy("work_bolts"),
+    "liner_work": _energy("work_liners"),
     "energy_error": _energy("closing"),
     "flow_time": _of_fluid("time"),
     "fluid_given": _of_fluid("given"),
@@ -167,8 +171,8 @@ class History:
         """The number now. Collective, equal on all ranks."""
         if self.kind == MODEL:
             return _OF_MODEL[self.value](blocks)
-        if self.kind in OF_BOLTS:
-            values = Bolts.of(blocks).values(self.kind, self.value, np.array(self.numbers, np.int64))
+        if self.kind in SUPPORTS:
+            values = supports.of(blocks, self.kind).values(self.kind, self.value, np.array(self.numbers, np.int64))
             return float(_OF_SEVERAL[self.how](values))
         if self.kind in OF_FLOW:
             values = Flow.of(blocks).values(self.kind, self.value, np.array(self.numbers, np.int64))

@@ -9,7 +9,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.engine import output
 from hpcdem.io.agreed import on_first
-from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
 
@@ -26,22 +26,26 @@ ENERGY_WORDS = {
     "work_outside": "work of loads and conditions",
     "work_discs": output.ACROSS,
     "work_bolts": "work of bolts on the rock",
+    "work_liners": "work of liners on the rock",
     "commands": "brought by commands",
     "closing": "closing error",
 }
 """What the table at the end calls the entries of the energy budget."""
-BOLT_WORDS = {
-    "stored": "stored in bars and grout, and as motion",
+SUPPORT_WORDS = {
+    "stored": "stored, and as motion",
     "at_start": "of it at the beginning",
     "lost_in_bars": "lost by yield and rupture",
     "lost_in_grout": "lost by slip in the grout",
     "lost_by_dashpots": "lost by viscous damping",
+    "lost_in_beams": "lost by yield",
+    "lost_in_bond": "lost by slip and parting of the bond",
     "work_on_rock": "work on the rock",
     "work_of_conditions": "work of conditions",
+    "work_of_gravity": "work of gravity",
     "commands": "brought by commands, as pretension",
     "closing": "closing error",
 }
-"""The same of the account of bolts."""
+"""The same of the accounts of bolts and liners."""
 FLUID_WORDS = {
     "given": "given by conditions and at the beginning",
     "stored": "in the channels",
@@ -71,14 +75,16 @@ def close(project: Project, figure: bool = True) -> None:
         rows = [
             (text, f"{energies[name]:.6g}")
             for name, text in ENERGY_WORDS.items()
-            if name not in ("work_discs", "work_bolts", "plastic_lost", "creep_lost") or energies[name]
+            if name not in ("work_discs", "work_bolts", "work_liners", "plastic_lost", "creep_lost") or energies[name]
         ]
         log.table("energy budget", ("energy", "J/m"), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
-        bolts = Bolts.there(blocks)
-        if bolts is not None:
-            found = bolts.energies()
-            log.table("energy of bolts", ("energy", "J/m"), [(BOLT_WORDS[k], f"{found[k]:.6g}") for k in BOLT_WORDS])
+        for support in supports.ALL:
+            there = support.there(blocks)
+            if there is not None:
+                found = there.energies()
+                rows = [(SUPPORT_WORDS[name], f"{found[name]:.6g}") for name in SUPPORT_WORDS if name in found]
+                log.table(f"energy of {support.name}", ("energy", "J/m"), rows)
     flow = Flow.there(blocks)
     if flow is not None:
         found = flow.account()

@@ -233,6 +233,18 @@ def _bolt_node_condition(call: Call) -> None:
         fdem.bolts.force(call.project, **given, where=call.where)
 
 
+# ---- liners --------------------------------------------------------------------------------------------------------
+
+
+def _liner_node_condition(call: Call) -> None:
+    given = {{"velocity_x": "vx", "velocity_y": "vy", "force_x": "fx", "force_y": "fy"}.get(name, name): value
+             for name, value in call.properties().items()}  # fmt: skip
+    if call["model"] == "liner-node-constrain":
+        fdem.liners.velocity(call.project, **given, where=call.where)
+    else:
+        fdem.liners.force(call.project, **given, where=call.where)
+
+
 # ---- records -------------------------------------------------------------------------------------------------------
 
 
@@ -327,11 +339,19 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
     "flow-node initial": lambda c: fdem.flow.initial(c.project, **c.given(), where=c.where),
     "bolt create polyline": _bolt,
-    "bolt c-model": lambda c: fdem.bolts.model(c.project, c.properties(), c.where),
+    "bolt c-model": lambda c: fdem.supports.assign(c.project, g.BOLT_ELEMENT, c.properties(), c.where),
+    "bolt delete": lambda c: fdem.supports.delete(c.project, g.BOLT_ELEMENT, c.where),
     "bolt-element group": _group(g.BOLT_ELEMENT),
     "bolt-node group": _group(g.BOLT_NODE),
     "bolt-node boundary": _bolt_node_condition,
-    "bolt-node boundary remove": lambda c: fdem.bolts.remove_conditions(c.project, c.where),
+    "bolt-node boundary remove": lambda c: fdem.supports.remove_conditions(c.project, g.BOLT_NODE, c.where),
+    "liner create": lambda c: fdem.liners.create(c.project, **c.group(), where=c.where),
+    "liner c-model": lambda c: fdem.supports.assign(c.project, g.LINER_ELEMENT, c.properties(), c.where),
+    "liner delete": lambda c: fdem.supports.delete(c.project, g.LINER_ELEMENT, c.where),
+    "liner-element group": _group(g.LINER_ELEMENT),
+    "liner-node group": _group(g.LINER_NODE),
+    "liner-node boundary": _liner_node_condition,
+    "liner-node boundary remove": lambda c: fdem.supports.remove_conditions(c.project, g.LINER_NODE, c.where),
     "table create": lambda c: fdem.assignments.table(c.project, c["name"], c["values"]),
     "field create": _field,
     "field delete": lambda c: fdem.assignments.remove_field(c.project, c["name"]),

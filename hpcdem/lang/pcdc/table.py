@@ -44,6 +44,7 @@ from hpcdem.lang.pcdc.kinds import (
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
+from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
 
 THREE_D = "this version computes in two dimensions"
 HEAT = "heat comes later; this version computes mechanics"
@@ -388,6 +389,35 @@ BOLT_FORCE = Model(
     "takes it.", FORCE.options, any_of=True,
 )  # fmt: skip
 
+# ---- liners, beyond the manual -------------------------------------------------------------------------------------
+
+LINER = Model(
+    "beam", "",
+    "Beams in plane strain, elastic and perfectly plastic, of a metre of thickness of the plane. Either a shell of a "
+    "thickness, or steel sets by area and inertia over their spacing, with poisson-ratio 0. The axial force is held "
+    "between the strengths times the area, the moment below 4 plastic-moment (Nt - N) (N + Nc) / (Nt + Nc)^2: what a "
+    "rectangle bears that is plastic all over. The bond to the rock is elastic, slips at bond-cohesion + pressure "
+    "tan(bond-friction), and parts for good above bond-tensile-strength. Given again, what elements carry stays.",
+    declared(
+        LINER_PROPERTIES, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "th{ickness}", "area", "inertia",
+        "t{ensile}-s{trength}", "c{ompressive}-s{trength}", "pl{astic}-m{oment}", "n{ormal}-s{tiffness}",
+        "s{hear}-s{tiffness}", "b{ond}-t{ensile}-s{trength}", "b{ond}-c{ohesion}", "b{ond}-f{riction}", uniform=True,
+    ),
+    of=LINER_PROPERTIES,
+)  # fmt: skip
+LINER_VELOCITY = Model(
+    "l{iner}-n{ode}-c{onstrain}", "", "Velocity of nodes of liners. Components that are not given stay free.",
+    (Option("v{elocity}-x", (TABLED,), "velocity along x", "m/s"),
+     Option("v{elocity}-y", (TABLED,), "velocity along y", "m/s"),
+     Option("spin", (TABLED,), "rate of rotation, counter-clockwise", "rad/s")), any_of=True,
+)  # fmt: skip
+LINER_FORCE = Model(
+    "l{iner}-n{ode}-f{orce}-b{oundary}-c{ondition}", "", "Force and moment on each node of a liner, of a metre of "
+    "thickness.",
+    (Option("f{orce}-x", (TABLED,), "force along x", "N/m"), Option("f{orce}-y", (TABLED,), "force along y", "N/m"),
+     Option("m{oment}", (TABLED,), "moment, counter-clockwise", "N m/m")), any_of=True,
+)  # fmt: skip
+
 # ---- RANGE ---------------------------------------------------------------------------------------------------------
 
 _FACES = ("element-face", "face-joint", "node")
@@ -439,12 +469,23 @@ RECORDED = {
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s"},
     "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s"},
+    "liner-node": {
+        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
+        "velocity-y": "m/s", "rotation": "rad", "spin": "rad/s", "reaction-x": "N/m", "reaction-y": "N/m",
+        "reaction-moment": "N m/m", "distance": "m",
+    },
+    "liner-element": {
+        "axial-force": "N/m", "shear-force": "N/m", "moment-first": "N m/m", "moment-last": "N m/m",
+        "axial-strain": "1", "plastic-strain": "1", "plastic-rotation": "rad", "liner-state": "1",
+        "bond-pressure": "Pa", "bond-shear": "Pa", "gap": "m", "slip": "m", "bond-state": "1", "host": "1",
+    },
     "model": {
         "time": "s", "creep-time": "s", "cycle": "1", "ratio": "1", "intact-joints": "1", "yielded-joints": "1",
         "broken-joints": "1",
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
         "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
-        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "energy-error": "J/m",
+        "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "liner-work": "J/m",
+        "energy-error": "J/m",
         "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
     },
 }  # fmt: skip
@@ -810,6 +851,32 @@ _OBJECTS = (
             models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node"),
     Command("bolt-n{ode} bou{ndary} rem{ove}", "Takes it back.",
             ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node"),
+    Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
+            "them, those of the others stay; without RANGE all of them.",
+            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element"),
+    Command("liner cr{eate}",
+            "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
+            "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "
+            "joined, also around a closed opening. Liners have weight, and no contact of their own: what pushes "
+            "them is the rock of their faces.",
+            ("pcdc liner create group 'shotcrete' range geometry 'tunnel'", "pcdc liner create range boundary y 2 3"),
+            options=(Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
+                            more=(SET,)),), ranged="element-face"),
+    Command("liner c-m{odel}", "The properties of elements of liners, which act from then on.",
+            ("pcdc liner c-model beam property density 2400 young 20e9 poisson-ratio 0.2 thickness 0.2 "
+             "tensile-strength 2e6 compressive-strength 25e6 normal-stiffness 1e10 shear-stiffness 1e10 "
+             "bond-tensile-strength 0.5e6 bond-cohesion 1e6 bond-friction 35 range group 'shotcrete'",),
+            models=(LINER,), ranged="liner-element"),
+    Command("liner del{ete}", "Takes elements of liners out at once. Their numbers go with them, those of the others "
+            "stay; without RANGE all of them.", ("pcdc liner delete range group 'shotcrete'",), ranged="liner-element"),
+    _group_command("liner-element", "liner-e{lement}"),
+    _group_command("liner-node", "liner-n{ode}"),
+    Command("liner-n{ode} bou{ndary}", "What is prescribed at nodes of liners.",
+            ("pcdc liner-node boundary l-n-c velocity-x 0 velocity-y 0 spin 0 range group 'footing'",
+             "pcdc liner-node boundary l-n-f-b-c force-y -50e3 moment 1e3 range id 3"),
+            models=(LINER_VELOCITY, LINER_FORCE), ranged="liner-node"),
+    Command("liner-n{ode} bou{ndary} rem{ove}", "Takes it back.",
+            ("pcdc liner-node boundary remove range group 'footing'",), ranged="liner-node"),
 )  # fmt: skip
 
 _RECORDS = (

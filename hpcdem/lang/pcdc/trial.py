@@ -15,6 +15,7 @@ from hpcdem.lang.pcdc.table import (
     CONTACT,
     FLOW_CONDITION,
     ISO_ELASTIC,
+    LINER,
     MOHR_COULOMB,
     POROUS,
     USER,
@@ -26,7 +27,7 @@ from hpcdem.physics.fdem.tables import Drawn, Over, Table
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, POROUS)
+    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, LINER, POROUS)
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -114,7 +115,7 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if (
-        model in (BOLT.of, POROUS.of)
+        model in (BOLT.of, LINER.of, POROUS.of)
         and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
     ):
         model.complete(given)

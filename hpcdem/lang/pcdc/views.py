@@ -15,7 +15,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.vector import Vector
 from hpcdem.physics.fdem import groups as g
 
-KINDS = {"element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE, **{k: k for k in (*g.BOLTS, *g.FLOW)}}
+KINDS = {
+    "element": g.ELEMENT, "node": g.NODE, "joint": g.JOINT, "face": g.FACE,
+    **{kind: kind for kind in (*g.SUPPORTS, *g.FLOW)},
+}  # fmt: skip
 _VECTORS = {"position": "position", "displacement": "displacement", "velocity": "velocity", "reaction": "reaction"}
 
 
@@ -80,9 +83,9 @@ class Model:
         return View(self, "joint", number)
 
     def numbers(self, kind: str, **where: Any) -> np.ndarray:
-        """Numbers of the elements, nodes, joints, faces, bolt-elements, bolt-nodes, flow-nodes or flow-channels that
-        are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y= in the mesh; with present=True
-        by where they are now."""
+        """Numbers of the elements, nodes, joints, faces, elements and nodes of bolts and liners, flow-nodes or
+        flow-channels that are there: of a group (group=, set=), of a layer (geometry=), or x=(from, to), y= in the
+        mesh; with present=True by where they are now."""
         return self._look(lambda: fdem.queries.numbers(self._project, _kind(kind), _range(where)))
 
     def values(self, kind: str, name: str, **where: Any) -> np.ndarray:

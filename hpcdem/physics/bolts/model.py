@@ -1,14 +1,10 @@
-"""Rock bolts as a load on blocks: what is known of them, and their step.
-
-All ranks have all bolts: per step they hand each other where the rock is at the nodes, one reduction of integers, and
-then compute the same. So the bits depend on neither ranks nor threads.
-"""
+"""Rock bolts as a load on blocks: what is known of them, and their step (physics/fdem/structures.py)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -19,15 +15,10 @@ from hpcdem.physics.bolts.properties import BOLT
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import BOLT_ELEMENT, BOLT_NODE
 from hpcdem.physics.fdem.local import ALPHA
-from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.fdem.structures import MARGIN, REMOVED, Columns, Number, Structure, empty
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.simulation import Blocks
-
-Number = float | str
-"""A number, or the name of a table over model time."""
-MARGIN = 1.25
-"""Reserve of the fictitious masses of the static mode, as for elements."""
+    pass
 
 
 @dataclass(frozen=True)
@@ -62,12 +53,12 @@ ELEMENT_QUANTITIES: dict[str, tuple[str, str]] = {
     "axial_force": ("N", "axial force of one bolt, tension positive"),
     "axial_strain": ("1", "lengthening since it was installed, over its length"),
     "plastic_strain": ("1", "plastic part of it"),
-    "bolt_state": ("1", "yields in tension 1, in compression 2; did so before 4, 8; broken 16"),
+    "bolt_state": ("1", "yields in tension 1, in compression 2; did so before 4, 8; broken 16; deleted 32"),
 }
 QUANTITIES = {BOLT_NODE: NODE_QUANTITIES, BOLT_ELEMENT: ELEMENT_QUANTITIES}
 """What can be asked of nodes and elements of bolts: unit and meaning."""
 
-_NODES: dict[str, tuple[type, int]] = {
+_NODES: Columns = {
     "bar": (np.int64, 0), "host": (np.int64, 0), "plate": (np.int64, 0), "condition": (np.int64, 0),
     "bond_state": (np.int64, 0), "arc": (np.float64, 0), "bond": (np.float64, 0), "slip": (np.float64, 0),
     "x": (np.float64, 2), "v": (np.float64, 2), "origin": (np.float64, 2), "point": (np.float64, 2),
@@ -76,54 +67,31 @@ _NODES: dict[str, tuple[type, int]] = {
 """Columns of the nodes, by type and width. bar: which bolt; condition: row; arc: distance along the bolt [m]; bond:
 force of the grout [N/m]; point: where the rock is [m]; tangent: unit vector along the bolt; grout: length in
 grout of the halves of the elements before and after the node [m]; weight: of the corners of the host."""
-_ELEMENTS: dict[str, tuple[type, int]] = {
+_ELEMENTS: Columns = {
     "row": (np.int64, 0), "state": (np.int64, 0), "length": (np.float64, 0), "force": (np.float64, 0),
     "plastic": (np.float64, 0),
 }  # fmt: skip
 """Columns of the elements. row: of the properties, 0: none yet; length: as installed [m]; force: axial [N/m]; plastic:
 lengthening [m]."""
-_PROPERTIES = tuple(one.name for one in BOLT.properties)
 
 
-class Bolts(SurfaceLoad):
-    """All bolts of a model of blocks. nodes, elements: columns by name, equal on all ranks; the elements of a bolt lie
-    between nodes that follow each other. Methods are collective unless they say otherwise; CommandError, alike on all
-    ranks, for what makes no sense."""
+class Bolts(Structure):
+    """All bolts of a model of blocks, see `Structure`; the elements of a bolt lie between nodes that follow each
+    other."""
 
     name: ClassVar[str] = "bolts"
-    of_mesh: ClassVar[bool] = True
+    word: ClassVar[str] = "bolt"
+    parts: ClassVar[tuple[str, str]] = (BOLT_ELEMENT, BOLT_NODE)
+    quantities = QUANTITIES
+    of_nodes: ClassVar[Columns] = _NODES
+    of_elements: ClassVar[Columns] = _ELEMENTS
+    model = BOLT
+    condition_type: ClassVar[type] = Condition
+    flows: ClassVar[int] = kernels.WORK
 
-    def __init__(self, blocks: Blocks) -> None:
-        self.blocks = blocks
-        self.nodes = {name: _empty(0, *kind) for name, kind in _NODES.items()}
-        self.elements = {name: _empty(0, *kind) for name, kind in _ELEMENTS.items()}
-        self.rows: list[tuple[float, ...]] = []
-        self.conditions: list[Condition] = [Condition()]
-        self.work = np.zeros(kernels.WORK)
-        self.commands = 0.0
-        self._stored_at_start = 0.0
-        self._account: Any = None
-        self._dynamic = blocks.options.dynamic
-        self._prepared_for: tuple[float, bool, float] | None = None
-        self._told = 0.0
-        self._arrange()
-
-    def __len__(self) -> int:
-        return len(self.nodes["bar"])
-
-    @staticmethod
-    def there(blocks: Blocks) -> Bolts | None:
-        """Those of a model, None if it has none. Not collective."""
-        return next((load for load in blocks.surface_loads if isinstance(load, Bolts)), None)
-
-    @staticmethod
-    def of(blocks: Blocks) -> Bolts:
-        """Those of a model, made on the first call. Not collective."""
-        found = Bolts.there(blocks)
-        if found is None:
-            found = Bolts(blocks)
-            blocks.surface_loads.add(found)
-        return found
+    def ends(self) -> np.ndarray:
+        """(m, 2) nodes of each element. Not collective."""
+        return np.column_stack([self.first, self.first + 1])
 
     # ---- what is said --------------------------------------------------------------------------------------------
 
@@ -168,7 +136,7 @@ class Bolts(SurfaceLoad):
         def within(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return np.maximum(np.minimum(b, end) - np.maximum(a, begin), 0.0)
 
-        new = {name: _empty(n, *kind) for name, kind in _NODES.items()}
+        new = empty(_NODES, n)
         new["bar"][:] = self.nodes["bar"].max(initial=-1) + 1
         new["host"][:], new["weight"][:], new["arc"][:], new["plate"][0] = host, weight, arc, plate
         new["x"][:], new["origin"][:], new["point"][:] = x, x, x
@@ -178,7 +146,7 @@ class Bolts(SurfaceLoad):
         new["point"][held] = seen[held, :2]
         speed = diagnostics.corner_values(blocks, "velocity").reshape(-1, 4, 2)
         new["v"][held] = _at(weight[held], cells[host[held]], speed[host[held]])
-        bars = {name: _empty(n - 1, *kind) for name, kind in _ELEMENTS.items()}
+        bars = empty(_ELEMENTS, n - 1)
         bars["length"][:] = span
         numbers = np.arange(len(self), len(self) + n), len(self.elements["row"]) + np.arange(n - 1)
         blocks.before_change()
@@ -196,15 +164,11 @@ class Bolts(SurfaceLoad):
         the difference of the pretension."""
         values = BOLT.complete(given)
         self._check_spacing(elements, values["spacing"])
-        row = tuple(values.values())
-        blocks = self.blocks
+        blocks, bars = self.blocks, self.elements
         blocks.before_change()
         stored = self._stored() if self._account is not None else 0.0
         before = self._column("pretension_force")[elements]
-        if row not in self.rows:
-            self.rows.append(row)
-        bars = self.elements
-        bars["row"][elements] = self.rows.index(row) + 1
+        self._take_properties(elements, values)
         whole = elements[bars["state"][elements] & kernels.RUPTURED == 0]
         more = (values["pretension_force"] - before) / values["spacing"]
         bars["force"][whole] += more[bars["state"][elements] & kernels.RUPTURED == 0]
@@ -226,47 +190,10 @@ class Bolts(SurfaceLoad):
                 f"which stays; got {spacing:g}"
             )
 
-    def condition(self, nodes: np.ndarray, **changes: Any) -> None:
-        """Prescribe components of nodes (k,), see `Condition`; the others stay as they are."""
-        for value in changes.values():
-            if isinstance(value, str) and value not in self.blocks.tables:
-                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
-            if not isinstance(value, str) and not math.isfinite(value):
-                raise CommandError(f"a condition of a bolt must be finite, got {value:g}")
-        self.blocks.before_change()
-        column = self.nodes["condition"]
-        for row in np.unique(column[nodes]).tolist():
-            wanted = replace(self.conditions[row], **changes)
-            if wanted not in self.conditions:
-                self.conditions.append(wanted)
-            column[nodes[column[nodes] == row]] = -1 - self.conditions.index(wanted)
-        column[column < 0] = -1 - column[column < 0]
-        self.blocks.changed(stiffness=False)
-
-    def remove_conditions(self, nodes: np.ndarray) -> None:
-        """Take back what was prescribed at nodes (k,)."""
-        self.blocks.before_change()
-        self.nodes["condition"][nodes] = 0
-        self.blocks.changed(stiffness=False)
-
-    def uses_table(self, name: str) -> bool:
-        """Whether a node follows this table. Not collective."""
-        used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
-        return any(name in asdict(one).values() for one in used)
-
-    def stop(self) -> None:
-        """Velocities along the bolts become zero. Not collective."""
-        self.nodes["v"][:] = 0.0
-
     # ---- what is asked -------------------------------------------------------------------------------------------
 
-    def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
-        """A quantity of `QUANTITIES` of nodes or elements (None: all), on all ranks. Not collective."""
-        if name not in QUANTITIES[kind]:
-            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(QUANTITIES[kind])}")
-        found = self._node_value(name) if kind == BOLT_NODE else self._element_value(name)
-        return np.asarray(found if numbers is None else found[numbers], np.float64)
+    def _value(self, kind: str, name: str) -> np.ndarray:
+        return self._node_value(name) if kind == BOLT_NODE else self._element_value(name)
 
     def _node_value(self, name: str) -> np.ndarray:
         nodes = self.nodes
@@ -300,10 +227,10 @@ class Bolts(SurfaceLoad):
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
         """What frames hold: "nodes" with the number of their bolt, "elements" with their first node. Not collective."""
-        found = {kind: {name: self.values(kind, name) for name in of} for kind, of in QUANTITIES.items()}
+        found = super().columns()
         return {
-            "nodes": {"bolt": self.nodes["bar"].copy(), **found[BOLT_NODE]},
-            "elements": {"first_node": self.first.copy(), **found[BOLT_ELEMENT]},
+            "nodes": {"bolt": self.nodes["bar"].copy(), **found["nodes"]},
+            "elements": {"first_node": self.first.copy(), **found["elements"]},
         }
 
     def energies(self) -> dict[str, float]:
@@ -355,11 +282,6 @@ class Bolts(SurfaceLoad):
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
 
-    def _column(self, name: str, otherwise: float = 0.0) -> np.ndarray:
-        """A property of all elements (m,), `otherwise` where there is no model yet."""
-        k = _PROPERTIES.index(name)
-        return np.array([otherwise, *(row[k] for row in self.rows)])[self.elements["row"]]
-
     def _arrange(self) -> None:
         """All that follows from columns, properties and hosts."""
         nodes, bars = self.nodes, self.elements
@@ -367,7 +289,11 @@ class Bolts(SurfaceLoad):
         self.first = kernels.first_nodes(nodes["bar"])
         first = self.first
         self.hosted = nodes["host"] >= 0
-        self._carrier, self._share = layout.carriers(nodes["bar"], nodes["arc"], nodes["host"])
+        there = bars["state"] & REMOVED == 0
+        parted = np.ones(n, bool)
+        parted[first[there] + 1] = False
+        dead = ~self.alive(BOLT_NODE)
+        self._carrier, self._share = layout.carriers(np.cumsum(parted), nodes["arc"], nodes["host"])
         self._along, self._tangent = np.zeros((m, 2)), nodes["tangent"]
         self._total, self._on_rock = np.zeros((n, 2)), np.zeros((n, 2))
         self._step, self._rock = np.zeros((n, 2)), np.zeros((n, 2))
@@ -397,12 +323,12 @@ class Bolts(SurfaceLoad):
         nodal = np.zeros((n, 7))
         self._node_spacing, self._stiffness = np.ones(n), np.zeros(n)
         for side, at in ((1, first), (0, first + 1)):  # the element after the node, and that before it
-            nodal[at, kernels.MASS] += mass
-            nodal[at, kernels.DRAG] += drag
+            nodal[at, kernels.MASS] += np.where(there | dead[at], mass, 0.0)
+            nodal[at, kernels.DRAG] += np.where(there | dead[at], drag, 0.0)
             for column, per_length in of_grout:
                 nodal[at, column] += per_length * nodes["grout"][at, side] / spacing
             self._node_spacing[at] = spacing
-            self._stiffness[at] += table[:, kernels.STIFFNESS]
+            self._stiffness[at] += np.where(there | dead[at], table[:, kernels.STIFFNESS], 0.0)
         self._node_table, self._true_mass = nodal, nodal[:, kernels.MASS].copy()
         self._rubs = bool((nodal[self.hosted][:, [kernels.ROCK_FRICTION, kernels.BOLT_FRICTION]] > 0.0).any())
         self._prepared_for = None
@@ -427,31 +353,10 @@ class Bolts(SurfaceLoad):
         self._node_table[:, kernels.MASS] = mass
         if known and self._account is not None:
             self.commands += float(self._kinetic().sum() - before)
-        if not self._true_mass.any():
-            return
-        added = float((mass - self._true_mass).sum() / self._true_mass.sum())
-        if self.blocks.log is not None and abs(added - self._told) > 0.1 * self._told:
-            raised = int((mass > self._true_mass).sum())
-            self.blocks.log.info(
-                f"bolts: the time step {dt:.4g} s would be too large for {raised} of {len(mass)} nodes; mass scaling "
-                f"adds {added:.3g} times the mass of the bolts, along them"
-            )
-            self._told = added
+        self._tell_of_mass(mass, self._true_mass, ", along them")
 
     def _conditions_at(self, time: float, middle: float) -> np.ndarray:
-        """The table of conditions (n, 6), forces at `time`, motion in the middle of a step."""
-        tables = self.blocks.tables
-
-        def now(value: Number, when: float) -> float:
-            return tables[value](when) if isinstance(value, str) else value
-
-        used, row = np.unique(self.nodes["condition"], return_inverse=True)
-        now_of = [self.conditions[one] for one in used.tolist()]
-        rows = np.array([
-            (one.does_x, now(one.at_x, middle), one.does_y, now(one.at_y, middle), now(one.force_x, time),
-             now(one.force_y, time)) for one in now_of
-        ]).reshape(-1, 6)  # fmt: skip
-        table = rows[row.reshape(-1)]
+        table = super()._conditions_at(time, middle)
         table[:, kernels.FORCE_X :] /= self._node_spacing[:, None]
         return table
 
@@ -486,24 +391,6 @@ class Bolts(SurfaceLoad):
         row = np.where(self.hosted, blocks.where[self.nodes["host"]], -1)
         at = np.flatnonzero((row >= blocks.owned.start) & (row < blocks.owned.stop))
         return at, row[at]
-
-    def check_start(self) -> None:
-        """CommandError if an element of a bolt has no model yet. Not collective."""
-        bare = np.flatnonzero(self.elements["row"] == 0)
-        if len(bare):
-            raise CommandError(f"bolt-element {bare[0]} has no model ({len(bare)} in all): bolt c-model comes first")
-
-    def storage_rebuilt(self) -> None:
-        """Elements have other rows or owners."""
-        blocks = self.blocks
-        if blocks.options.dynamic != self._dynamic:  # velocities of the static mode are ways per step
-            self._dynamic = blocks.options.dynamic
-            self.nodes["v"][:] = 0.0
-        self._mine, self._rows = self._held_here()
-        self._find_forces()
-        if self._account is not blocks.budget:
-            self._account = blocks.budget
-            self.work[:], self.commands, self._stored_at_start = 0.0, 0.0, self._stored()
 
     def add_to(self, applied: np.ndarray) -> None:
         """Forces on the rock at the present positions, in the order of nodes [N/m]."""
@@ -566,10 +453,6 @@ class Bolts(SurfaceLoad):
         f = (self._total * self._tangent).sum(axis=1) + nodes["bond"]
         return np.abs(f[free]), np.concatenate([2.0 * np.abs(self.elements["force"]), np.abs(nodes["bond"])])
 
-    def work_done(self) -> float:
-        """On the rock, since the account of energy began [J/m]. Not collective."""
-        return float(self.work[kernels.ON_ROCK])
-
     def elements_removed(self, elements: np.ndarray) -> None:
         """Nodes in these elements of the rock are free of it from now on, plates fall off."""
         lost = np.isin(self.nodes["host"], elements)
@@ -585,59 +468,23 @@ class Bolts(SurfaceLoad):
         if self.blocks.log is not None:
             self.blocks.log.info(f"{int(lost.sum())} nodes of bolts are no longer in rock: it was taken out")
 
-    def mesh_replaced(self) -> None:
-        """There is another mesh: `of_mesh` says that these are gone with the one before."""
-
-    # ---- state on disk -----------------------------------------------------------------------------------------------
-
-    def saved_state(self) -> dict[str, Any]:
-        """All but the columns, as JSON values."""
-        return {
-            "rows": [list(row) for row in self.rows], "conditions": [asdict(one) for one in self.conditions],
-            "work": self.work.tolist(), "commands": self.commands, "start": self._stored_at_start,
-            "dynamic": self._dynamic,
-        }  # fmt: skip
-
-    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
-        """The columns of nodes and elements, by the name of their table."""
-        return {"bolt_nodes": _flat(self.nodes), "bolt_elements": _flat(self.elements)}
-
-    @staticmethod
-    def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
-        """Inverse of both: the blocks, whose budget is back already, have these bolts."""
-        made = Bolts.of(blocks)
-        made.nodes = _wide(tables["bolt_nodes"], _NODES)
-        made.elements = _wide(tables["bolt_elements"], _ELEMENTS)
-        made.rows = [tuple(row) for row in state["rows"]]
-        made.conditions = [Condition(**one) for one in state["conditions"]]
-        made.work = np.array(state["work"])
-        made.commands, made._stored_at_start = state["commands"], state["start"]
-        made._dynamic, made._account = state["dynamic"], blocks.budget
-        made._arrange()
+    def _let_go(self, elements: np.ndarray) -> None:
+        """Half of the grout of a node goes with each of its elements, and with it its part of the force."""
+        nodes, bars, first = self.nodes, self.elements, self.first[elements]
+        before = nodes["grout"].sum(axis=1)
+        nodes["grout"][first, 1] = nodes["grout"][first + 1, 0] = 0.0
+        left = nodes["grout"].sum(axis=1)
+        nodes["bond"] *= np.divide(left, before, out=np.ones(len(left)), where=before > 0.0)
+        bars["state"][elements] |= kernels.RUPTURED
+        bars["force"][elements] = 0.0
+        gone = bars["state"] & REMOVED > 0
+        gone[elements] = True
+        lost = np.ones(len(self), bool)
+        lost[self.ends()[~gone].reshape(-1)] = False
+        for name, nothing in (("host", -1), ("plate", 0), ("weight", 0), ("condition", 0), ("v", 0), ("reaction", 0)):
+            nodes[name][lost] = nothing
 
 
 def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Values (k, 4, 2) of the corners of elements (k, 4) at points in them."""
     return (weight[:, :, None] * np.where(cells[:, :, None] >= 0, values, 0.0)).sum(axis=1)
-
-
-def _empty(n: int, of: type, width: int) -> np.ndarray:
-    return np.zeros((n, width) if width else n, of)
-
-
-def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    out: dict[str, np.ndarray] = {}
-    for name, values in columns.items():
-        if values.ndim == 1:
-            out[name] = values
-        else:
-            out.update({f"{name}_{c}": values[:, c].copy() for c in range(values.shape[1])})
-    return out
-
-
-def _wide(columns: Mapping[str, np.ndarray], kinds: Mapping[str, tuple[type, int]]) -> dict[str, np.ndarray]:
-    out: dict[str, np.ndarray] = {}
-    for name, (of, width) in kinds.items():
-        found = np.column_stack([columns[f"{name}_{c}"] for c in range(width)]) if width else columns[name]
-        out[name] = np.ascontiguousarray(found.astype(of))
-    return out

@@ -97,7 +97,7 @@ class Budget:
         work = {name: self.accounts[name] + done[name] + half[name] for name in WORK}
         change = sum(stored.values()) - sum(start.values())
         by_commands = sum(self.commands.values())
-        of_discs, of_bolts = self._of_discs(sim), sim.surface_loads.work_done()
+        of_discs, of_loads = self._of_discs(sim), sim.surface_loads.work_done()
         joints_lost = -work["joints"] - (stored["joints"] - start["joints"] - self.commands["joints"])
         found = {
             "kinetic": stored["kinetic"],
@@ -109,9 +109,10 @@ class Budget:
             "plastic_lost": -work["plastic"],
             "creep_lost": -work["creep"],
             "work_gravity": work["gravity"],
-            "work_outside": work["outside"] - of_discs - of_bolts,
+            "work_outside": work["outside"] - of_discs - sum(of_loads.values()),
             "work_discs": of_discs,
-            "work_bolts": of_bolts,
+            "work_bolts": of_loads.get("bolts", 0.0),
+            "work_liners": of_loads.get("liners", 0.0),
             "commands": by_commands,
         }
         given = work["gravity"] + work["outside"] + by_commands

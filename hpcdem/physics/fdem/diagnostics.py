@@ -507,8 +507,9 @@ def energies(sim: Blocks) -> dict[str, float]:
 
     Stored now: kinetic, strain, joints (what they give back). Since the start: joints_lost (fracture and friction
     in joints), contact (stored or lost there), viscous_lost, plastic_lost, creep_lost, work_gravity, work_outside
-    (loads and conditions), work_discs (particles that touch), work_bolts, commands (change of what is stored by
-    commands). closing: change of what is stored + lost - work - commands; relative: that over the largest of all.
+    (loads and conditions), work_discs (particles that touch), work_bolts, work_liners, commands (change of what is
+    stored by commands). closing: change of what is stored + lost - work - commands; relative: that over the largest
+    of all.
     """
     if sim.budget is None:
         raise CommandError("no energy budget is kept: ask for it before the steps that shall be in it")

@@ -1,4 +1,4 @@
-"""Groups of elements, nodes, faces, joints and parts of bolts, and ranges that choose among them.
+"""Groups of elements, nodes, faces, joints and parts of bolts and liners, and ranges that choose among them.
 
 A group belongs to a set; an object is in one group of each set at most. Objects are numbered for the whole model
 (`connectivity`): a group is an ascending array of numbers, and knows neither ranks nor how many objects there are.
@@ -15,11 +15,12 @@ from hpcdem.core.errors import CommandError
 
 ELEMENT, NODE, FACE, JOINT = "element", "node", "element-face", "face-joint"
 BOLT_ELEMENT, BOLT_NODE = "bolt-element", "bolt-node"
-BOLTS = (BOLT_ELEMENT, BOLT_NODE)
+LINER_ELEMENT, LINER_NODE = "liner-element", "liner-node"
+SUPPORTS = (BOLT_ELEMENT, BOLT_NODE, LINER_ELEMENT, LINER_NODE)
 FLOW_NODE, CHANNEL = "flow-node", "flow-channel"
 FLOW = {FLOW_NODE: NODE, CHANNEL: JOINT}
 """They have the numbers, groups and places of nodes and joints."""
-KINDS = (ELEMENT, NODE, FACE, JOINT, *BOLTS)
+KINDS = (ELEMENT, NODE, FACE, JOINT, *SUPPORTS)
 DEFAULT = "default"
 """The set of groups that name none."""
 

@@ -1,5 +1,5 @@
-"""Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, the ground beyond
-free-field sides, later fluid and heat."""
+"""Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, liners, the ground
+beyond free-field sides, later fluid and heat."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 
-ORDER = ("discs", "fluid", "heat", "bolts", "free_field")
+ORDER = ("discs", "fluid", "heat", "bolts", "liners", "free_field")
 """In which they are added up, whoever came first: sums keep their bits."""
 SHARED_OUT = ("flow_nodes",)
 """Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""
@@ -178,9 +178,9 @@ class SurfaceLoads:
         found = [load.balance() for load in self._loads]
         return [one for one, _ in found], [other for _, other in found]
 
-    def work_done(self) -> float:
-        """On the blocks, by those that keep an account by themselves [J/m]. Not collective."""
-        return sum(load.work_done() for load in self._loads)
+    def work_done(self) -> dict[str, float]:
+        """On the blocks, by name, of those that keep an account by themselves [J/m]. Not collective."""
+        return {load.name: load.work_done() for load in self._loads}
 
     def elements_removed(self, elements: np.ndarray) -> None:
         """These elements are taken out; the model is open. Collective."""

@@ -33,6 +33,28 @@ def test_bolts_hold(launch, tmp_path):
     assert strong.yielded == 0 and strong.axial_force > 250e3
 
 
+def test_a_shell_holds(launch, tmp_path):
+    """Each of its options alone changes what the tunnel does, in the way that it should."""
+    given = {**COARSE, "bolts": 0}
+    none = results(launch, tmp_path / "none", Support(**given))
+    assert none.thrust == none.moment == none.hinges == 0
+    usual = results(launch, tmp_path / "usual", Support(liner=0.3, **given))
+    assert usual.at_support == none.at_support < usual.convergence < 0.9 * none.convergence
+    assert usual.plastic_radius < none.plastic_radius and usual.thrust < -1e6 and usual.moment > 0.0
+    # Thin rings: what the rock presses them by is what they give in, u = p R^2 / (E A), within the plastic limit.
+    thin = results(launch, tmp_path / "thin", Support(liner=0.1, **given))
+    assert thin.convergence > usual.convergence and abs(thin.thrust) <= 25e6 * 0.1 * (1.0 + 1e-9) and thin.hinges > 0
+    for change in ({"liner_young": 5e9}, {"liner_poisson": 0.4}, {"liner_strength": 8e6}, {"liner_bond": 1e9}):
+        other = results(launch, tmp_path / next(iter(change)), Support(liner=0.3, **given, **change))
+        assert other != usual
+        if "liner_young" in change or "liner_strength" in change:
+            assert other.convergence > usual.convergence
+    bent = {**given, "liner": 0.6, "stress_xx": -3e6}  # much moment for its thrust
+    for tension, yields in ((2e6, False), (0.0, True)):
+        done = results(launch, tmp_path / f"{tension:g}", Support(liner_tension=tension, **bent))
+        assert (done.hinges > 0) == yields and done.moment > 0.5e6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("elements", ["quad", "tri"])
 def test_plastic_radius(launch, tmp_path, elements):

@@ -1,0 +1,61 @@
+"""Liners: where they are, what is prescribed at their nodes. The rest is that of all supports (supports.py)."""
+
+from __future__ import annotations
+
+from hpcdem.commands.fdem import supports
+from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import DEFAULT, FACE, LINER_ELEMENT, LINER_NODE, Range
+from hpcdem.physics.fdem.structures import VELOCITY
+from hpcdem.physics.liners.model import Liners
+
+Number = float | str
+"""A number, or the name of a table of time."""
+
+
+def create(project: Project, group: str | None = None, set_name: str = DEFAULT, where: Range | None = None) -> None:
+    """Put a liner on the free faces of a range, as things are now, see `Liners.create`; group: that its elements and
+    nodes are put into."""
+    faces = everything(project, FACE, where)
+    blocks = project.ready()
+    known = Liners.there(blocks)
+    liners = Liners.of(blocks)
+    try:
+        nodes, elements = liners.create(faces)
+    except CommandError:
+        if known is None:
+            blocks.surface_loads.remove(liners)
+        raise
+    if group is not None:
+        project.groups[LINER_NODE].assign(nodes, group, set_name)
+        project.groups[LINER_ELEMENT].assign(elements, group, set_name)
+
+
+def velocity(
+    project: Project,
+    vx: Number | None = None,
+    vy: Number | None = None,
+    spin: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Velocity [m/s] and rate of rotation [rad/s] of nodes of liners; a text is the name of a table of time."""
+    given = {"x": vx, "y": vy, "turn": spin}
+    changes: dict[str, Number] = {}
+    for part, value in given.items():
+        if value is not None:
+            changes[f"does_{part}"], changes[f"at_{part}"] = VELOCITY, value
+    supports.condition(project, LINER_NODE, changes, where)
+
+
+def force(
+    project: Project,
+    fx: Number | None = None,
+    fy: Number | None = None,
+    moment: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Force [N/m] and moment [N m/m] on each of these nodes."""
+    given = {"force_x": fx, "force_y": fy, "moment": moment}
+    changes = {name: value for name, value in given.items() if value is not None}
+    supports.condition(project, LINER_NODE, changes, where)

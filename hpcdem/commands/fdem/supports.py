@@ -1,0 +1,35 @@
+"""What is said to bolts and liners in the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpcdem.commands.fdem.choices import everything
+from hpcdem.commands.fdem.project import Project
+from hpcdem.physics.fdem.groups import Range
+from hpcdem.physics.supports import of
+
+
+def assign(project: Project, kind: str, properties: Mapping[str, float], where: Range | None) -> None:
+    """Properties of elements of this kind."""
+    elements = everything(project, kind, where)
+    of(project.ready(), kind).assign(elements, properties)
+
+
+def delete(project: Project, kind: str, where: Range | None) -> None:
+    """Take elements of this kind out; the numbers of the others stay."""
+    elements = everything(project, kind, where)
+    of(project.ready(), kind).delete(elements)
+
+
+def condition(project: Project, kind: str, changes: Mapping[str, Any], where: Range | None) -> None:
+    """Prescribe components of nodes of this kind, see the class of their conditions."""
+    nodes = everything(project, kind, where)
+    of(project.ready(), kind).condition(nodes, **changes)
+
+
+def remove_conditions(project: Project, kind: str, where: Range | None = None) -> None:
+    """Nodes of this kind are free again."""
+    nodes = everything(project, kind, where)
+    of(project.ready(), kind).remove_conditions(nodes)

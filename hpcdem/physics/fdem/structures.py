@@ -1,0 +1,318 @@
+"""What supports of rock have in common, which nodes and elements of their own make up: bolts, liners.
+
+All ranks have all of them: per step they hand each other where the rock is at the nodes, one reduction of integers, and
+then compute the same. So the bits depend on neither ranks nor threads.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.properties import Model
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+Number = float | str
+"""A number, or the name of a table over model time."""
+MARGIN = 1.25
+"""Reserve of the fictitious masses of the static mode, as for elements."""
+FREE, VELOCITY, ACCELERATION = 0, 1, 2
+"""What a component of a node does."""
+REMOVED = 32
+"""Bit of the state of an element: it was deleted. Its number stays."""
+Columns = Mapping[str, tuple[type, int]]
+"""Type and width of columns by name, width 0: (n,)."""
+
+
+class Structure(SurfaceLoad):
+    """All of a kind in a model of blocks. nodes, elements: columns by name, equal on all ranks. Methods are collective
+    unless they say otherwise; CommandError, alike on all ranks, for what makes no sense."""
+
+    of_mesh: ClassVar[bool] = True
+    word: ClassVar[str]
+    """What one of them is called."""
+    parts: ClassVar[tuple[str, str]]
+    """The kinds of object (groups.py) that its elements and its nodes are."""
+    quantities: ClassVar[Mapping[str, Mapping[str, tuple[str, str]]]]
+    """What can be asked of them, by kind of object: unit and meaning."""
+    of_nodes: ClassVar[Columns]
+    of_elements: ClassVar[Columns]
+    model: ClassVar[Model]
+    condition_type: ClassVar[type]
+    """Dataclass of what is prescribed at a node: does_*, at_* in the middle of a step; the rest at its time."""
+    flows: ClassVar[int]
+    """Entries of its work."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        self.nodes, self.elements = empty(self.of_nodes, 0), empty(self.of_elements, 0)
+        self.rows: list[tuple[float, ...]] = []
+        self.conditions: list[Any] = [self.condition_type()]
+        self.work = np.zeros(self.flows)
+        self.commands = 0.0
+        self._stored_at_start = 0.0
+        self._account: Any = None
+        self._dynamic = blocks.options.dynamic
+        self._prepared_for: tuple[float, bool, float] | None = None
+        self._told = 0.0
+        self._arrange()
+
+    def __len__(self) -> int:
+        return len(self.nodes["x"])
+
+    @classmethod
+    def there(cls, blocks: Blocks) -> Self | None:
+        """Those of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, cls)), None)
+
+    @classmethod
+    def of(cls, blocks: Blocks) -> Self:
+        """Those of a model, made on the first call. Not collective."""
+        found = cls.there(blocks)
+        if found is None:
+            found = cls(blocks)
+            blocks.surface_loads.add(found)
+        return found
+
+    # ---- what each kind does its way -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def _arrange(self) -> None:
+        """All that follows from columns, properties and hosts."""
+
+    @abstractmethod
+    def _find_forces(self) -> None:
+        """Forces on nodes and rock, of the present positions and moment."""
+
+    @abstractmethod
+    def _stored(self) -> float:
+        """Energy [J/m]. Not collective."""
+
+    @abstractmethod
+    def energies(self) -> dict[str, float]:
+        """The account of energy [J/m]. Not collective."""
+
+    @abstractmethod
+    def _value(self, kind: str, name: str) -> np.ndarray:
+        """A quantity of all nodes or elements."""
+
+    @abstractmethod
+    def _held_here(self) -> tuple[np.ndarray, np.ndarray]:
+        """Which of its points are held by an element that this rank owns, and the storage rows of these."""
+
+    @abstractmethod
+    def ends(self) -> np.ndarray:
+        """(m, 2) nodes of each element. Not collective."""
+
+    @abstractmethod
+    def _let_go(self, elements: np.ndarray) -> None:
+        """Elements (k,) are about to be deleted: they carry nothing and are bound to nothing any more."""
+
+    @abstractmethod
+    def assign(self, elements: np.ndarray, given: Mapping[str, float]) -> None:
+        """Give elements (k,) properties; what they carry stays."""
+
+    # ---- what is said ----------------------------------------------------------------------------------------------
+
+    def alive(self, kind: str) -> np.ndarray:
+        """(n,) bool: elements that were not deleted, or nodes of such. Not collective."""
+        there = self.elements["state"] & REMOVED == 0
+        if kind == self.parts[0]:
+            return there
+        out = np.zeros(len(self), bool)
+        out[self.ends()[there].reshape(-1)] = True
+        return out
+
+    def delete(self, elements: np.ndarray) -> None:
+        """Take elements (k,) out, at once. The numbers of the others stay."""
+        blocks = self.blocks
+        blocks.before_change()
+        stored = self._stored() if self._account is not None else 0.0
+        self._let_go(elements)
+        self.elements["state"][elements] |= REMOVED
+        self._arrange()
+        if self._account is not None:
+            self.commands += self._stored() - stored
+        blocks.changed()
+
+    def condition(self, nodes: np.ndarray, **changes: Any) -> None:
+        """Prescribe components of nodes (k,), see the class of conditions; the others stay as they are."""
+        for value in changes.values():
+            if isinstance(value, str) and value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+            if not isinstance(value, str) and not math.isfinite(value):
+                raise CommandError(f"a condition of a {self.word} must be finite, got {value:g}")
+        self.blocks.before_change()
+        column = self.nodes["condition"]
+        for row in np.unique(column[nodes]).tolist():
+            wanted = replace(self.conditions[row], **changes)
+            if wanted not in self.conditions:
+                self.conditions.append(wanted)
+            column[nodes[column[nodes] == row]] = -1 - self.conditions.index(wanted)
+        column[column < 0] = -1 - column[column < 0]
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray) -> None:
+        """Take back what was prescribed at nodes (k,)."""
+        self.blocks.before_change()
+        self.nodes["condition"][nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def uses_table(self, name: str) -> bool:
+        """Whether a node follows this table. Not collective."""
+        used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
+        return any(name in asdict(one).values() for one in used)
+
+    def stop(self) -> None:
+        """Velocities become zero. Not collective."""
+        self.nodes["v"][:] = 0.0
+
+    def check_start(self) -> None:
+        """CommandError if an element has no model yet. Not collective."""
+        bare = np.flatnonzero((self.elements["row"] == 0) & self.alive(self.parts[0]))
+        if len(bare):
+            raise CommandError(
+                f"{self.parts[0]} {bare[0]} has no model ({len(bare)} in all): {self.word} c-model comes first"
+            )
+
+    def _take_properties(self, elements: np.ndarray, values: Mapping[str, float]) -> None:
+        """Elements have the row of these complete properties."""
+        row = tuple(values.values())
+        if row not in self.rows:
+            self.rows.append(row)
+        self.elements["row"][elements] = self.rows.index(row) + 1
+
+    def _column(self, name: str, otherwise: float = 0.0) -> np.ndarray:
+        """A property of all elements (m,), `otherwise` where there is no model yet."""
+        k = [one.name for one in self.model.properties].index(name)
+        return np.array([otherwise, *(row[k] for row in self.rows)])[self.elements["row"]]
+
+    def _conditions_at(self, time: float, middle: float) -> np.ndarray:
+        """What is prescribed (n, entries of a condition), forces at `time`, motion in the middle of a step."""
+        tables = self.blocks.tables
+        names = [one.name for one in fields(self.condition_type)]
+
+        def now(condition: Any, name: str) -> float:
+            value = getattr(condition, name)
+            when = middle if name.startswith("at_") else time
+            return tables[value](when) if isinstance(value, str) else value
+
+        used, row = np.unique(self.nodes["condition"], return_inverse=True)
+        rows = np.array([[now(self.conditions[k], name) for name in names] for k in used.tolist()], np.float64)
+        return rows.reshape(-1, len(names))[row.reshape(-1)]
+
+    # ---- what is asked -----------------------------------------------------------------------------------------------
+
+    def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
+        """A quantity of nodes or elements (None: all), on all ranks. Not collective."""
+        known = self.quantities[kind]
+        if name not in known:
+            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(known)}")
+        found = self._value(kind, name)
+        return np.asarray(found if numbers is None else found[numbers], np.float64)
+
+    def columns(self) -> dict[str, dict[str, np.ndarray]]:
+        """What frames hold: all quantities of "elements" and "nodes". Not collective."""
+        return {
+            table: {name: self.values(kind, name) for name in self.quantities[kind]}
+            for table, kind in zip(("elements", "nodes"), self.parts, strict=True)
+        }
+
+    def work_done(self) -> float:
+        """On the rock, since the account of energy began [J/m]. Not collective."""
+        return float(self.work[0])
+
+    # ---- called by the blocks ----------------------------------------------------------------------------------------
+
+    def storage_rebuilt(self) -> None:
+        """Elements have other rows or owners."""
+        blocks = self.blocks
+        if blocks.options.dynamic != self._dynamic:  # velocities of the static mode are ways per step
+            self._dynamic = blocks.options.dynamic
+            self.stop()
+        self._mine, self._rows = self._held_here()
+        self._find_forces()
+        if self._account is not blocks.budget:
+            self._account = blocks.budget
+            self.work[:], self.commands, self._stored_at_start = 0.0, 0.0, self._stored()
+
+    def mesh_replaced(self) -> None:
+        """There is another mesh: `of_mesh` says that these are gone with the one before."""
+
+    def _tell_of_mass(self, mass: np.ndarray, true: np.ndarray, more: str) -> None:
+        """Say once in a while how much mass the time step adds to the nodes."""
+        log, dt = self.blocks.log, self.blocks.clock.dt
+        if log is None or not true.any():
+            return
+        added = float((mass - true).sum() / true.sum())
+        if abs(added - self._told) > 0.1 * self._told:
+            log.info(
+                f"{self.name}: the time step {dt:.4g} s would be too large for {int((mass > true).sum())} of "
+                f"{len(mass)} nodes; mass scaling adds {added:.3g} times the mass of the {self.name}{more}"
+            )
+            self._told = added
+
+    # ---- state on disk -----------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        """All but the columns, as JSON values."""
+        return {
+            "rows": [list(row) for row in self.rows], "conditions": [asdict(one) for one in self.conditions],
+            "work": self.work.tolist(), "commands": self.commands, "start": self._stored_at_start,
+            "dynamic": self._dynamic,
+        }  # fmt: skip
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """The columns of nodes and elements, by the name of their table."""
+        return {f"{self.word}_nodes": _flat(self.nodes), f"{self.word}_elements": _flat(self.elements)}
+
+    @classmethod
+    def restored(cls, blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> None:
+        """Inverse of both: the blocks, whose budget is back already, have these."""
+        made = cls.of(blocks)
+        made.nodes = _wide(tables[f"{cls.word}_nodes"], cls.of_nodes)
+        made.elements = _wide(tables[f"{cls.word}_elements"], cls.of_elements)
+        made.rows = [tuple(row) for row in state["rows"]]
+        made.conditions = [cls.condition_type(**one) for one in state["conditions"]]
+        made.work = np.array(state["work"])
+        made.commands, made._stored_at_start = state["commands"], state["start"]
+        made._dynamic, made._account = state["dynamic"], blocks.budget
+        made._arrange()
+
+
+def wide(k: int) -> tuple[int, ...]:
+    """Further shape of a column of width k."""
+    return (k,) if k else ()
+
+
+def empty(kinds: Columns, n: int) -> dict[str, np.ndarray]:
+    """Columns of n zeros."""
+    return {name: np.zeros((n, *wide(k)), of) for name, (of, k) in kinds.items()}
+
+
+def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    out: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        if values.ndim == 1:
+            out[name] = values
+        else:
+            out.update({f"{name}_{c}": values[:, c].copy() for c in range(values.shape[1])})
+    return out
+
+
+def _wide(columns: Mapping[str, np.ndarray], kinds: Columns) -> dict[str, np.ndarray]:
+    out: dict[str, np.ndarray] = {}
+    for name, (of, width) in kinds.items():
+        found = np.column_stack([columns[f"{name}_{c}"] for c in range(width)]) if width else columns[name]
+        out[name] = np.ascontiguousarray(found.astype(of))
+    return out

@@ -1,0 +1,31 @@
+"""Bolts and liners alike: which class has the objects of a kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem.structures import Structure
+from hpcdem.physics.liners.model import Liners
+
+ALL: tuple[type[Structure], ...] = (Bolts, Liners)
+QUANTITIES: Mapping[str, Mapping[str, tuple[str, str]]] = {
+    kind: of for support in ALL for kind, of in support.quantities.items()
+}
+"""What can be asked of each kind of object: unit and meaning."""
+
+
+def class_of(kind: str) -> type[Structure]:
+    """The class that has the objects of this kind (groups.SUPPORTS)."""
+    return next(one for one in ALL if kind in one.parts)
+
+
+def of(blocks: Any, kind: str) -> Structure:
+    """Those of a model that have the objects of this kind. CommandError if there are none."""
+    support = class_of(kind)
+    found = support.there(blocks)
+    if found is None:
+        raise CommandError(f"there are no {support.name} yet: {support.word} create comes first")
+    return found

@@ -1,0 +1,107 @@
+"""Runs lined blocks, on any number of ranks and threads, and writes what became of them.
+
+python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.liners.model import Liners
+from tests.blocks.support import ROCK, near, rectangle, shaken
+from tests.blocks.worker import COHESIVE, WEAK, communicator
+from tests.liners.support import SHOTCRETE, state
+
+WEAKER = {
+    **SHOTCRETE, "young": 2e9, "thickness": 0.02, "tensile_strength": 3e5, "compressive_strength": 2e6,
+    "bond_tensile_strength": 1e5, "bond_cohesion": 5e4, "bond_friction": 30.0,
+}  # fmt: skip
+
+
+def breaking(sim: Blocks) -> None:
+    """A jointed block with a liner on its top is torn apart: the liner yields, slips and parts from the rock, while all
+    flies to the right, through the strips of the ranks."""
+    mesh = shaken(rectangle(16, 6, 1.6, 0.6, kind="mixed"), 0.2)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    inner = sim.mesh.edges()
+    sim.joint_model(inner.faces[inner.inner][:, 0], COHESIVE, WEAK)
+    x = sim.mesh.points[:, 0]
+    for one in np.unique(np.round(x, 1)):
+        changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
+    liners = Liners.of(sim)
+    _, elements = liners.create(near(mesh, 1, 0.6))
+    liners.assign(elements, WEAKER)
+    diagnostics.account_energy(sim)
+
+
+def more(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 500:  # another one in the middle of the run, and a force
+        liners = Liners.of(sim)
+        _, elements = liners.create(near(sim.mesh, 1, 0.0)[2:])
+        liners.assign(elements, {**WEAKER, "thickness": 0.04})
+        liners.condition(np.array([0]), force_x=-500.0, moment=20.0)
+    if sim.clock.step == 900:  # hosts go, and elements
+        liners = Liners.of(sim)
+        changes.null(sim, liners.elements["host"][4:7].copy())
+        liners.delete(np.array([10, 18]))
+
+
+def relaxing(sim: Blocks) -> None:
+    """The same block at rest, static mode, under its weight and that of the liner around it."""
+    mesh = rectangle(16, 6, 1.6, 0.6)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8})
+    sim.option(dynamic=False, collision=False)
+    sim.gravity(0.0, -9.81)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
+    liners = Liners.of(sim)
+    _, elements = liners.create(np.concatenate([near(mesh, 1, 0.6), near(mesh, 0, 1.6)]))
+    liners.assign(elements, {**WEAKER, "bond_tensile_strength": 3e3, "bond_cohesion": 1e3, "tensile_strength": 3e4})
+
+
+def excavate(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=200.0)
+    if sim.clock.step == 1000:
+        sim.option(dynamic=True)
+
+
+KINDS = {"breaking": (breaking, more), "relaxing": (relaxing, excavate)}
+
+
+def main() -> None:
+    kind, threads, steps, out, *rest = sys.argv[1:]
+    sim = Blocks(communicator(), int(threads))
+    if rest[:1] == ["resume"]:
+        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
+    else:
+        KINDS[kind][0](sim)
+    while sim.clock.step < int(steps):
+        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
+            saved_state.save(sim, rest[1], {"kind": kind})
+        KINDS[kind][1](sim)
+        convergence.advance(sim, 1)
+    found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx", "damage")}
+    found.update(state(Liners.of(sim)))
+    found["counts"] = np.array(diagnostics.joint_counts(sim))
+    found["ratio"] = np.array(diagnostics.unbalanced_ratio(sim))
+    if sim.budget is not None:
+        found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
+        found.update({f"liners_{name}": np.array(value) for name, value in Liners.of(sim).energies().items()})
+    found["about"] = np.array([sim.rebuilds])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
+if __name__ == "__main__":
+    main()
