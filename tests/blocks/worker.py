@@ -66,7 +66,7 @@ def impact(sim: Blocks, shape: str = "cross") -> None:
     sim.joint_model(inner[:, 0], COHESIVE, WEAK)
     sim.velocity_condition(np.arange(len(block.points), len(sim.mesh.points)), vx=0.0, vy=0.0)
     changes.set_velocity(sim, np.arange(len(block.points)), vx=0.5, vy=-2.0)
-    sim.rayleigh(0.02, 400.0)
+    sim.rayleigh(0.002, 400.0)
     sim.gravity(0.0, -9.81)
     diagnostics.account_energy(sim)
 
