@@ -108,7 +108,7 @@ def made_of(function: Callable[..., Any], path: str) -> str | None:
             used += [(f"{name} {k}", value) for k, value in enumerate(thing.__defaults__ or ())]
             used += [(one, thing.__globals__[one]) for one in _names(thing.__code__) if one in thing.__globals__]
             return thing.__code__.co_filename == path and all(tell(*one) for one in used)
-        if thing is math or thing is np or thing in vars(builtins).values() or thing in vars(math).values():
+        if any(thing is one for one in (math, np, *vars(builtins).values(), *vars(math).values())):
             told.append(f"{name}: {thing!r}")
             return True
         if type(thing) is tuple:
