@@ -385,12 +385,22 @@ class Faces(_Modelled):
         yy: Number | None = None,
         normal: Number | None = None,
         quiet: bool | None = None,
+        incoming_x: Number | None = None,
+        incoming_y: Number | None = None,
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface. Numbers or names of tables of
-        time. quiet: waves leave through them in dynamic runs. Without a range: the whole surface of the model."""
-        given = {"stress_xx": xx, "stress_yy": yy, "stress_normal": normal, "quiet": quiet}
+        time. quiet: waves leave through them in dynamic runs; incoming_x, incoming_y: velocity [m/s] of a plane wave
+        that comes in through them. Without a range: the whole surface of the model."""
+        given = {
+            "stress_xx": xx, "stress_yy": yy, "stress_normal": normal, "quiet": quiet, "incoming_x": incoming_x,
+            "incoming_y": incoming_y,
+        }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
+
+    def free_field(self, *, where: Where = None) -> None:
+        """Vertical sides beyond which the ground goes on, in dynamic runs: columns beside them move with the base."""
+        self._carry_out("boundary", {}, where, "free-field")
 
     def remove_boundary(self, *, where: Where = None) -> None:
         """Take boundary conditions back."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hpcdem.physics.bolts.model import Bolts
+    from hpcdem.physics.fdem.free_field import FreeField
 
 
 def _bolts() -> type[Bolts]:
@@ -19,5 +20,11 @@ def _bolts() -> type[Bolts]:
     return Bolts
 
 
-PHYSICS: Mapping[str, Callable[[], type[Bolts]]] = {"bolts": _bolts}
+def _free_field() -> type[FreeField]:
+    from hpcdem.physics.fdem.free_field import FreeField
+
+    return FreeField
+
+
+PHYSICS: Mapping[str, Callable[[], type[Bolts] | type[FreeField]]] = {"bolts": _bolts, "free_field": _free_field}
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

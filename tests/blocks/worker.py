@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state, user_functions, user_laws
+from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
@@ -274,6 +275,37 @@ def creep_more(sim: Blocks) -> None:
         changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
 
 
+def shaking(sim: Blocks) -> None:
+    """Soft ground with joints on rock between free-field sides, an earthquake comes in from below."""
+    mesh = shaken(rectangle(26, 10, 2.6, 1.0, kind="mixed"), 0.15)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
+    centre = mesh.centroids()
+    soft = np.flatnonzero(centre[:, 1] > 0.5)
+    changes.element_model(sim, soft, "mech_iso_elastic", {**ROCK, "young": 2e9})
+    edges = mesh.edges()
+    inner = edges.faces[edges.inner][:, 0]
+    sim.joint_model(inner[np.abs(centre[inner // 4] - [1.3, 0.7]).max(axis=1) < 0.3], COHESIVE, WEAK)
+    x, y = mesh.points.T
+    ends, outer = mesh.points[edges.points[~edges.inner]], edges.faces[~edges.inner][:, 0]
+    sim.table("wave", [(1e-5 * t, 4.0 * np.sin(0.05 * t)) for t in range(126)] + [(1.0, 0.0)])
+    sim.stress_condition(outer[(ends[:, :, 1] < 1e-9).all(axis=1)], quiet=True, incoming_x="wave", incoming_y="wave")
+    for side in (0.0, 2.6):
+        FreeField.create(sim, outer[(np.abs(ends[:, :, 0] - side) < 1e-9).all(axis=1)])
+    sim.rayleigh(0.05, 500.0)
+    diagnostics.account_energy(sim)
+
+
+def shake_more(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 300:
+        sim.element_property(np.arange(40), {"young": 15e9})
+    if sim.clock.step == 500:
+        right = FreeField.there(sim).faces["face"][-10:, 0].copy()
+        FreeField.remove(sim, right)
+        FreeField.create(sim, right)
+
+
 def report_borders(sim: Blocks) -> None:
     """A long bed, its left third shattered and at rest: how many elements each rank has, and their cost."""
     sim.take_mesh(rectangle(60, 4, 6.0, 0.4))
@@ -302,6 +334,7 @@ def nothing(sim: Blocks) -> None:
 KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
          "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up),
          "backfill": (backfill, fill_up), "creeping": (creeping, creep_more),
+         "shaking": (shaking, shake_more),
          "borders": (report_borders, nothing)}  # fmt: skip
 
 

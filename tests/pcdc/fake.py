@@ -53,7 +53,7 @@ class FakeBlocks:
     def __init__(self, comm: Any = None, outdir: Path | str = "data") -> None:
         self.comm = comm or SerialComm()
         self.log, self.stop, self.outdir = Noted(), None, Path(outdir)
-        self.timers = Timers()
+        self.timers, self.surface_loads = Timers(), ()
         self.calls: list[tuple[str, tuple, dict]] = []
         self.clear()
 

@@ -145,7 +145,8 @@ def test_commands_are_told_what_the_line_says(bench):
         "pcdc node bou mech-vel-b-c a-x table 'v' a-y 3 range id 0\n"
         "pcdc node bou mech-f-b-c f-x 1 f-y table 'v' range id 0 1\n"
         "pcdc node bou mech-m-b-c type 2 (1,1) range id 2\n"
-        "pcdc element-face bou m-s-b-c s-xx 1 s-yy 2 s-n table 'v' quiet on range geometry 'top'\n"
+        "pcdc element-face bou m-s-b-c s-xx 1 s-yy 2 s-n table 'v' quiet on inc-x table 'v' inc-y 0.5 "
+        "range geometry 'top'\n"
         "pcdc element-face bou mechanical-s-b-c s-n -1\n"
         "pcdc node init velocity (3,4) range id 7\n"
         "pcdc element c-model null relax 0.5 range id 0\n"
@@ -184,10 +185,11 @@ def test_commands_are_told_what_the_line_says(bench):
     (((numbers, *move), _),) = told("move_constraint")
     assert numbers.tolist() == [2] and move == [2, (1.0, 1.0)]
     (on_top, traction), (around, pressure) = told("stress_condition")
-    assert traction == {"xx": 1.0, "yy": 2.0, "normal": "v", "quiet": True} and len(on_top[0]) == 4
-    assert (
-        pressure == {"xx": None, "yy": None, "normal": -1.0, "quiet": None} and len(around[0]) == 12
-    )  # the outline of 4 x 2
+    assert traction == {
+        "xx": 1.0, "yy": 2.0, "normal": "v", "quiet": True, "incoming_x": "v", "incoming_y": 0.5,
+    }  # fmt: skip
+    assert len(on_top[0]) == 4 and len(around[0]) == 12  # the outline of 4 x 2
+    assert {name: value for name, value in pressure.items() if value is not None} == {"normal": -1.0}
     assert [(args[0].tolist(), args[1:]) for args, _ in told("set_velocity")] == [([7], (3.0, 4.0))]
     assert [(args[0].tolist(), args[1:]) for args, _ in told("null")] == [([0], (0.5,))]
     for name in ("reset_velocity", "reset_displacement", "reset_state", "reset_joint_state", "remove_conditions"):

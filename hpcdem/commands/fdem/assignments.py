@@ -12,6 +12,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.random_field import RandomField
 from hpcdem.physics.fdem import changes, user_functions, user_laws
+from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import UserLaw
@@ -176,13 +177,22 @@ def stress(
     yy: Number | None = None,
     normal: Number | None = None,
     quiet: bool | None = None,
+    incoming_x: Number | None = None,
+    incoming_y: Number | None = None,
     where: Range | None = None,
 ) -> None:
-    """Traction of faces [Pa]; quiet: waves leave through them. Without a range: all faces on the surface of the
-    model."""
-    _known(project, xx, yy, normal)
+    """Traction of faces [Pa]; quiet: waves leave through them; incoming_x, _y: velocity [m/s] of one that comes in.
+    Without a range: all faces on the surface of the model."""
+    _known(project, xx, yy, normal, incoming_x, incoming_y)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
-    project.ready().stress_condition(faces, xx=xx, yy=yy, normal=normal, quiet=quiet)
+    project.ready().stress_condition(
+        faces, xx=xx, yy=yy, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y
+    )
+
+
+def free_field(project: Project, where: Range | None = None) -> None:
+    """Faces are free-field sides, see free_field.py. Without a range: all faces on the surface of the model."""
+    FreeField.create(project.ready(), chosen(project, FACE, (OnBoundary(),) if where is None else where))
 
 
 def remove_node_conditions(project: Project, where: Range | None = None) -> None:
@@ -191,8 +201,10 @@ def remove_node_conditions(project: Project, where: Range | None = None) -> None
 
 
 def remove_face_conditions(project: Project, where: Range | None = None) -> None:
-    """Faces are without traction again."""
-    project.ready().remove_stress_conditions(chosen(project, FACE, where))
+    """Faces are without traction again, and no free-field sides."""
+    faces = chosen(project, FACE, where)
+    FreeField.remove(project.ready(), faces)
+    project.ready().remove_stress_conditions(faces)
 
 
 def _known(project: Project, *values: Number | None) -> None:

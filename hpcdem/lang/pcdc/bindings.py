@@ -199,6 +199,9 @@ def _short(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _face_condition(call: Call) -> None:
+    if call["model"] == "free-field":
+        fdem.assignments.free_field(call.project, call.where)
+        return
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
     fdem.assignments.stress(call.project, **given, where=call.where)
 

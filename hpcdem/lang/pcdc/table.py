@@ -277,8 +277,16 @@ STRESS = Model(
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa"),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
-            "given beside it enters as a wave of half its size")),
+            "given beside it enters as a wave of half its size"),
+     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
+     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s")),
     any_of=True, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
+)  # fmt: skip
+FREE_FIELD = Model(
+    "free-f{ield}", "", "Vertical sides beyond which the ground goes on: a column with the elements of the side and "
+    "the base of the model there, velocity or quiet faces, moves beside each, and the side has its stress and dashpots "
+    "that see the difference of both motions. The nodes of the side are held by the forces that they have now, so the "
+    "conditions of the static stage can go.", (),
 )  # fmt: skip
 _LATER_NODE = (
     Model("hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11", "Fluid at nodes.",
@@ -707,8 +715,10 @@ _OBJECTS = (
             ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
             ranged="element-face", needs_option=True),
     Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
-            ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",),
-            models=(STRESS, CONST_HEAT), ranged="element-face"),
+            ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
+             "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
+             "pcdc element-face boundary free-field range boundary x 0 0"),
+            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face"),
     Command("element-f{ace} bou{ndary} rem{ove}", "Takes boundary conditions of surfaces back.",
             ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face"),
     _group_command("face-joint", "face-j{oint}"),

@@ -64,13 +64,16 @@ class NodeCondition:
 
 @dataclass(frozen=True)
 class Traction:
-    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face."""
+    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y: the
+    velocity of one that comes in through it [m/s]."""
 
     xx: Number = 0.0
     yy: Number = 0.0
     xy: Number = 0.0
     normal: Number = 0.0
     quiet: bool = False
+    incoming_x: Number = 0.0
+    incoming_y: Number = 0.0
 
 
 @dataclass(frozen=True)
@@ -644,20 +647,32 @@ class ModelDefinition:
         xy: Number | None = None,
         normal: Number | None = None,
         quiet: bool | None = None,
+        incoming_x: Number | None = None,
+        incoming_y: Number | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
         pressure).
 
         quiet: besides, dashpots of the impedances rho c_p along n and rho c_s across take up what arrives (Lysmer and
         Kuhlemeyer 1969): plane waves along n leave without reflection, a stress that is given enters as a wave of half
-        its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give."""
+        its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give.
+        incoming_x, incoming_y [m/s]: velocity of a plane wave along n that comes in through quiet faces: their dashpots
+        see the velocity less twice this."""
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
+        waves = {"incoming_x": incoming_x, "incoming_y": incoming_y}
+        changes |= {name: self._value(name, value) for name, value in waves.items() if value is not None}
         if quiet is not None:
             changes["quiet"] = bool(quiet)
         if not changes:
             raise CommandError("a stress condition needs a stress, or quiet")
         at = self.numbers_of_faces(faces)
+        for row in np.unique(self.load_row[at]).tolist():
+            wanted = replace(self.loads[row], **changes)
+            if not wanted.quiet and (wanted.incoming_x != 0.0 or wanted.incoming_y != 0.0):
+                raise CommandError(
+                    "a wave comes in through quiet faces only: quiet on goes with incoming-x and incoming-y"
+                )
         for name, value in changes.items():
             user_functions.check(f"stress {name}", value, self._places(FACE, at), self.time_now())
         self.before_change()
@@ -812,8 +827,11 @@ class ModelDefinition:
         return any(isinstance(value, str) for one in self.conditions for value in asdict(one).values())
 
     def loads_at(self, time: float) -> np.ndarray:
-        """The table of tractions (rows, 4) [Pa] at a moment."""
-        return np.array([[self._now(v, time) for v in (one.xx, one.yy, one.xy, one.normal)] for one in self.loads])
+        """The table of tractions (rows, 6) of nodes.py at a moment."""
+        return np.array([
+            [self._now(v, time) for v in (one.xx, one.yy, one.xy, one.normal, one.incoming_x, one.incoming_y)]
+            for one in self.loads
+        ])  # fmt: skip
 
     def quiet_faces(self) -> np.ndarray:
         """(4 ne,) bool: faces with dashpots."""

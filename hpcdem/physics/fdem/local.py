@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.definition import NodeCondition
     from hpcdem.physics.fdem.state import State
 
-_TRACTION = "xx", "yy", "xy", "normal"
+_TRACTION = "xx", "yy", "xy", "normal", "incoming_x", "incoming_y"
 """Columns of the table of tractions."""
 ALPHA = 0.8
 """Local damping of the static mode."""
@@ -361,7 +361,7 @@ class Local:
                 )
             quiet = quiet[:0]
         row, ends = row[quiet], np.column_stack([k[quiet], k2[quiet]])
-        self.quiet_edge = self.load_edge[quiet]
+        self.quiet_edge, self.quiet_of = self.load_edge[quiet], self.load_of[quiet]
         self.quiet_corner = 8 * row[:, None] + 2 * ends
         self.quiet_place = row[:, None] * sim.v.shape[1] + 2 * ends
         self.quiet_p, self.quiet_s = self._impedances(sim.number[row])
@@ -469,7 +469,9 @@ class Local:
         springs, dashpots = (part + np.take_along_axis(part, before, axis=1) for part in (each, drag))
         springs = np.where(real, springs, 0.0)
         sim.surface_loads.springs(sim, springs)
-        return springs, np.where(real, dashpots, 0.0)
+        dashpots = np.where(real, dashpots, 0.0)
+        sim.surface_loads.dashpots(sim, dashpots)
+        return springs, dashpots
 
     def critical_time_step(self, target: float = 0.0, mass: np.ndarray | None = None) -> float:
         """Stability limit times the safety factor [s]; infinite in static mode. target: raise `mass` (n, 4) until this
@@ -711,14 +713,12 @@ class Local:
         sim, clock = self.sim, self.sim.clock
         if self.some_applied:
             self.applied[:] = 0.0
-            loads = self.load_functions.filled(
-                sim.loads_at(clock.time), lambda one, field: (_TRACTION.index(field), clock.time, 1.0)
-            )
+            loads = self.loads_now(self.load_functions, clock.time)
             moving.tractions(self.load_edge, self.load_a, self.load_b, self.load_of, loads, sim.x, self.applied)
             if len(self.quiet_edge):
                 moving.dashpots(
-                    self.quiet_edge, self.quiet_corner, self.quiet_place, self.quiet_p, self.quiet_s, sim.x, sim.v,
-                    self.applied,
+                    self.quiet_edge, self.quiet_corner, self.quiet_place, self.quiet_p, self.quiet_s, self.quiet_of,
+                    loads, sim.x, sim.v, self.applied,
                 )  # fmt: skip
             if len(self.relaxing_corner):
                 now = np.where(self.relaxing_steps, float(clock.step), clock.time)
@@ -732,14 +732,18 @@ class Local:
         table = self._conditions
         if table is None:
             half = 0.5 * clock.dt if sim.options.dynamic else 0.0
-            table = self._conditions_now(clock.time, clock.time + half, clock.dt)
+            table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
         self._move(
             sim.threads, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_kick,
             self.node_condition, self.node_share, table, self.some_applied, self.force, self.applied, sim.v,
             0.0 if sim.options.dynamic else ALPHA, self.outside, self.felt,
         )  # fmt: skip
 
-    def _conditions_now(self, time: float, middle: float, dt: float) -> np.ndarray:
+    def loads_now(self, placed: Placed, time: float) -> np.ndarray:
+        """The table of tractions (rows, 6), with a row of its own for each face whose traction is a function."""
+        return placed.filled(self.sim.loads_at(time), lambda one, field: (_TRACTION.index(field), time, 1.0))
+
+    def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
         """The table of node conditions, with a row of its own for each node whose condition is a function."""
 
         def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
@@ -748,7 +752,7 @@ class Local:
             column, does = (moving.AT_X, one.does_x) if field == "at_x" else (moving.AT_Y, one.does_y)
             return (column, middle, 1.0) if does == moving.VELOCITY else (column, time, dt)
 
-        return self.node_functions.filled(self.sim.conditions_at(time, middle, dt), how)
+        return placed.filled(self.sim.conditions_at(time, middle, dt), how)
 
     # ---- looking ---------------------------------------------------------------------------------------------------
 

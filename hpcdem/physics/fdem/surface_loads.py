@@ -1,5 +1,5 @@
-"""Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, later fluid and
-heat."""
+"""Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, the ground beyond
+free-field sides, later fluid and heat."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 
-ORDER = ("discs", "fluid", "heat", "bolts")
+ORDER = ("discs", "fluid", "heat", "bolts", "free_field")
 """In which they are added up, whoever came first: sums keep their bits."""
 
 
@@ -39,6 +39,10 @@ class SurfaceLoad(ABC):
 
     def springs(self, blocks: Any) -> np.ndarray | None:
         """(n_own, 4) stiffness [N/m per m] that it brings to corners of owned elements, for masses and time step."""
+        return None
+
+    def dashpots(self, blocks: Any) -> np.ndarray | None:
+        """(n_own, 4) dashpots [N s/m per m] that it brings to corners of owned elements, for the time step."""
         return None
 
     def check_start(self) -> None:  # noqa: B027 - most have nothing to do here
@@ -125,6 +129,13 @@ class SurfaceLoads:
         """Add the stiffness that all of them bring to corners of owned elements, out (n_own, 4) [N/m per m]."""
         for load in self._loads:
             found = load.springs(blocks)
+            if found is not None:
+                out += found
+
+    def dashpots(self, blocks: Any, out: np.ndarray) -> None:
+        """Add the dashpots that all of them bring to corners of owned elements, out (n_own, 4) [N s/m per m]."""
+        for load in self._loads:
+            found = load.dashpots(blocks)
             if found is not None:
                 out += found
 

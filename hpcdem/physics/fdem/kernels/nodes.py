@@ -22,9 +22,9 @@ UNBOUND, FIXED, ALONG = 0, 1, 2
 # force, the constraint and its unit vector.
 DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y, CONSTRAINT, WAY_X, WAY_Y = range(9)
 CONDITION = 9
-# Columns of the table of tractions at the present moment (rows, 4) [Pa].
-XX, YY, XY, NORMAL = range(4)
-TRACTION = 4
+# Columns of the table of tractions at the present moment (rows, 6): stresses [Pa], velocity of the incoming wave [m/s].
+XX, YY, XY, NORMAL, INCOMING_X, INCOMING_Y = range(6)
+TRACTION = 6
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -32,7 +32,7 @@ def tractions(edges, corner_a, corner_b, row, table, x, applied):
     """Add half of L sigma n of each loaded face to its two corners.
 
     edges, corner_a, corner_b (m,): where the edge begins in x, and its corners in `applied` (both flat); row (m,) of
-    the table (rows, 4): xx, yy, xy, normal [Pa].
+    the table (rows, 6): xx, yy, xy, normal [Pa], ...
     """
     x, applied = x.reshape(x.size), applied.reshape(applied.size)
     for m in range(len(edges)):
@@ -47,11 +47,12 @@ def tractions(edges, corner_a, corner_b, row, table, x, applied):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def dashpots(edges, corners, places, along, across, x, v, applied):
-    """Take L / 2 (z_p v_n n + z_s v_s s) from both corners of faces through which waves leave.
+def dashpots(edges, corners, places, along, across, row, table, x, v, applied):
+    """Take L / 2 (z_p w_n n + z_s w_s s) from both corners of faces through which waves leave, w = v - 2 v_in: a wave
+    v_in that comes in would move the face by twice itself if nothing were there.
 
     edges (m,): where the edge begins in x; corners, places (m, 2): its ends in `applied` and in v (all flat); along,
-    across (m,): impedances rho c_p and rho c_s [Pa s/m].
+    across (m,): impedances rho c_p and rho c_s [Pa s/m]; row (m,) of the table of tractions.
     """
     x, v, applied = x.reshape(x.size), v.reshape(v.size), applied.reshape(applied.size)
     for m in range(len(edges)):
@@ -60,7 +61,8 @@ def dashpots(edges, corners, places, along, across, x, v, applied):
         length = math.sqrt(lx * lx + ly * ly)
         nx, ny = ly / length, -lx / length
         for end in range(2):
-            vx, vy = v[places[m, end]], v[places[m, end] + 1]
+            vx = v[places[m, end]] - 2.0 * table[row[m], INCOMING_X]
+            vy = v[places[m, end] + 1] - 2.0 * table[row[m], INCOMING_Y]
             vn = vx * nx + vy * ny
             normal, shear = 0.5 * length * along[m] * vn, 0.5 * length * across[m]
             applied[corners[m, end]] -= normal * nx + shear * (vx - vn * nx)
