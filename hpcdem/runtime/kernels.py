@@ -19,7 +19,7 @@ import socket
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,14 +69,7 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
     ready = all(folder.is_dir() for folder in folders)
     ranks = comm.allgather((socket.gethostname(), folder.name, ready, launch.mask()))
     host, key, *_ = ranks[comm.rank]
-    if all(ready for _, _, ready, _ in ranks):
-        turn = 0
-    elif next(r for r, rank in enumerate(ranks) if rank[1] == key) == comm.rank:
-        turn = 0
-    elif next(r for r, rank in enumerate(ranks) if rank[0] == host) == comm.rank:
-        turn = 1
-    else:
-        turn = 2
+    turn = 0 if all(ready for _, _, ready, _ in ranks) else turn_of([rank[:2] for rank in ranks], comm.rank)
 
     parts = {folder: warm_ups[kind] for folder, kind in folders.items()}
     cores = frozenset().union(*(rank[3] for rank in ranks if rank[0] == host))
@@ -99,6 +92,15 @@ def prepare_kernels(comm: SerialComm, log: Log, warm_ups: Mapping[str, Callable[
         for one in folders:
             tidy(one)
     return list(folders)[-1]
+
+
+def turn_of(ranks: Sequence[tuple[str, str]], rank: int) -> int:
+    """When a rank compiles, 0 to 2: first one of each machine type, then one of each host, then the rest. ranks: host
+    and machine type of each."""
+    host, key = ranks[rank]
+    if next(r for r, one in enumerate(ranks) if one[1] == key) == rank:
+        return 0
+    return 1 if next(r for r, one in enumerate(ranks) if one[0] == host) == rank else 2
 
 
 class _Progress:

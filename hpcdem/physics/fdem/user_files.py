@@ -6,15 +6,24 @@ checkpoints. What a checkpoint names is never looked for: the script names the f
 
 from __future__ import annotations
 
+import builtins
 import hashlib
+import math
 import re
+import socket
+import sys
 import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.runtime.kernels import cache_folder, turn_of
+from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
     from hpcdem.physics.model import Model
@@ -40,7 +49,10 @@ class UnknownLaw(CommandError):
 
 def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
     """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
-    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
+    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective.
+
+    One rank of each machine type goes first, then one of each host, then the rest: what the first ones compile is kept
+    for the others (`made_of`)."""
     file, _, function = what.rpartition(":")
     if not file.endswith(".py") or not function.isidentifier():
         raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
@@ -54,19 +66,63 @@ def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, st
     if problem:
         raise CommandError(problem)
     name = f"{Path(file).name}:{function}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+    from numba.core import event
+
     began, message, made = time.perf_counter(), None, []
-    try:
-        made.append(take(text, str(path), name, function))
-    except Wrong as wrong:
-        message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
+    turn = turn_of(sim.comm.allgather((socket.gethostname(), cache_folder()[0].name)), sim.comm.rank)
+    with event.install_recorder("numba:compile") as compiling:
+        for now in range(3):
+            if now == turn:
+                try:
+                    made.append(take(text, str(path), name, function))
+                except Wrong as wrong:
+                    message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
+            patient_barrier(sim.comm)
     try:
         sim.comm.agree(message)
     except HpcdemError as error:
         raise CommandError(str(error)) from None
     spent = time.perf_counter() - began
-    if spent > TOLD and sim.log is not None:
-        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled for this run: {spent:.1f} s on rank 0")
+    if compiling.buffer and spent > TOLD and sim.log is not None:
+        sim.log.info(f"{kind} {Path(file).name}:{function} is compiled: {spent:.1f} s")
     return made[0]
+
+
+def made_of(function: Callable[..., Any], path: str) -> str | None:
+    """What a function of the file `path` is made of when it is compiled, besides the text of the file: values of the
+    global names that it and the functions that it calls use. None if there is something among them of another file, or
+    of which that cannot be told: then what is compiled must not be kept."""
+    told: list[str] = []
+    seen: set[FunctionType] = set()
+
+    def tell(name: str, thing: Any) -> bool:
+        options = getattr(thing, "targetoptions", None)
+        thing = getattr(thing, "py_func", thing)
+        if isinstance(thing, FunctionType):
+            told.append(f"{name}: {thing.__qualname__} {options and sorted(options.items())}")
+            if thing in seen:
+                return True
+            seen.add(thing)
+            cells = zip(thing.__code__.co_freevars, thing.__closure__ or ())
+            used = [(f"{name}.{free}", cell.cell_contents) for free, cell in cells]
+            used += [(f"{name} {k}", value) for k, value in enumerate(thing.__defaults__ or ())]
+            used += [(one, thing.__globals__[one]) for one in _names(thing.__code__) if one in thing.__globals__]
+            return thing.__code__.co_filename == path and all(tell(*one) for one in used)
+        if any(thing is one for one in (math, np, *vars(builtins).values(), *vars(math).values())):
+            told.append(f"{name}: {thing!r}")
+            return True
+        if type(thing) is tuple:
+            return all(tell(f"{name}[{k}]", value) for k, value in enumerate(thing))
+        told.append(f"{name}: {thing!r}")
+        return type(thing) in (bool, int, float)
+
+    return "\n".join(told) if tell("", function) else None
+
+
+def _names(code: CodeType) -> list[str]:
+    """Names that are used in it and in what is defined in it."""
+    inner = [one for const in code.co_consts if isinstance(const, CodeType) for one in _names(const)]
+    return [*code.co_names, *inner]
 
 
 def executed(text: str, path: str, name: str) -> dict[str, Any]:
@@ -76,12 +132,14 @@ def executed(text: str, path: str, name: str) -> dict[str, Any]:
         code = compile(text, path, "exec")
     except (SyntaxError, ValueError) as error:
         raise Wrong(getattr(error, "lineno", 0) or 0, f"{getattr(error, 'msg', error)}") from None
-    names: dict[str, Any] = {"__name__": f"law of {name}", "__file__": path}
+    module = ModuleType(f"law of {name}")
+    module.__file__ = path
     try:
-        exec(code, names)
+        exec(code, vars(module))
     except Exception as error:  # whatever the user's own code does
         raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
-    return names
+    sys.modules[module.__name__] = module  # where numba looks for the modules of kernels that were kept
+    return vars(module)
 
 
 def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:

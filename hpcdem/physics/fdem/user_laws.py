@@ -40,7 +40,17 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import properties as known
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
-from hpcdem.physics.fdem.user_files import MARK, UnknownLaw, Wrong, agreed, compiled, executed, numba_message
+from hpcdem.physics.fdem.user_files import (
+    MARK,
+    UnknownLaw,
+    Wrong,
+    agreed,
+    compiled,
+    executed,
+    made_of,
+    numba_message,
+)
+from hpcdem.runtime import kept
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.properties import Rows
@@ -176,22 +186,28 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     from numba.core.errors import NumbaError
 
     kernel = njit(error_model="numpy", nogil=True)(declared.function)
-    found: Any = compiled(kernel, (types.float64,) * len(names), path, line)
-    wanted = [*STRESS, *(s.name for s in declared.state)]
-    given = list(getattr(found, "types", [found]))
-    if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
-        raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
-    for what, type_ in zip(wanted, given):
-        if type_ != types.float64:
-            raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
     from hpcdem.physics.fdem.kernels import user_laws as kernels
 
+    wanted = [*STRESS, *(s.name for s in declared.state)]
     columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names]
     columns += columns[:1] * (-len(columns) % 4) or ["density"] * (4 if not columns else 0)
     states = [s.name for s in declared.state]
     evaluate = kernels.at_strain(kernel, names, states, columns)
+    one, several = kernels.loops(kernel, names, states, columns)
+    values, place = made_of(kernel, path), None
+    if values is not None:
+        place = kept.folder(name, values, repr((names, states, columns)))
+        for what, made in (("evaluate", evaluate), ("loop", one), ("loop_threaded", several)):
+            kept.keep(made, place, what)
+    if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
+        found: Any = compiled(kernel, (types.float64,) * len(names), path, line)
+        given = list(getattr(found, "types", [found]))
+        if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
+            raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
+        for what, type_ in zip(wanted, given):
+            if type_ != types.float64:
+                raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
     try:
-        one, several = kernels.loops(kernel, names, states, columns)
         evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
     except NumbaError as error:
         raise Wrong(line, numba_message(error)) from None

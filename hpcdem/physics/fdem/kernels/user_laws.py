@@ -3,7 +3,7 @@
 A law takes numbers and returns numbers, so its loop runs over lanes (numerics/lanes.py) as those of the built-in laws
 do. The stress of a law is put in the place of the initial stress, and its element has no moduli in the table of
 triangles: the loop over all triangles (elements.py) adds the viscous part and makes forces of it. All kernels here are
-made for one law and compiled by each process that uses it; nothing of them is stored.
+made for one law; what is compiled is kept apart from the kernels of hpcdem (runtime/kept.py).
 """
 
 from __future__ import annotations
