@@ -20,6 +20,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
+from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import plastic_stiffness, stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
@@ -41,8 +42,8 @@ WORST = 1e-3
 """Worst balance that is put down to rounding."""
 HALVINGS = 8
 """Of an iteration's way before it is given up."""
-CUTS = 6
-"""How often an increment of the loads is halved that finds no balance."""
+CUTS, FINE = 6, 10
+"""How often an increment of the loads is halved that finds no balance; where joints soften."""
 TRIES = 3
 """Elastic ways in an increment that need not bring forces nearer to balance."""
 STILL = 1e-6
@@ -69,7 +70,7 @@ class Balanced:
 @dataclass
 class _Balance:
     """What Newton's method came to: positions (nn, 2), unbalanced over all forces, iterations, factors, joints behind
-    their peak; error: why this is no balance, "" if it is; ratios: on the way."""
+    their peak; error: why this is no balance, "" if it is; ratios: on the way; total: sum of forces [N/m]."""
 
     x: np.ndarray
     ratio: float
@@ -78,6 +79,7 @@ class _Balance:
     past: int
     error: str
     ratios: list[float]
+    total: float
 
 
 @dataclass
@@ -90,22 +92,26 @@ class _Nodes:
     owner: np.ndarray
     x: np.ndarray
     v: np.ndarray
+    least: float = 0.0
+    """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none."""
 
 
 def solve_elastic(
-    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1
+    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1, softening: bool = False
 ) -> Balanced:
     """Put the model into static equilibrium with the loads of this moment, at once.
 
-    Elements are elastic or yield after Mohr and Coulomb, and joints must stay before their peak. Without elements that
-    yield the answer does not depend on the way, and is the one to which relaxation goes. Prescribed velocities act for
-    `cycles` units of time (static mode), what elements that were taken out left behind has died down, velocities are
-    zero afterwards. Counts as `cycles` steps.
+    Elements are elastic or yield after Mohr and Coulomb. Joints must stay before their peak, or, with `softening`, may
+    pass it and break, one after the other. Without either of these the answer does not depend on the way, and is the
+    one to which relaxation goes. Prescribed velocities act for `cycles` units of time (static mode), what elements that
+    were taken out left behind has died down, velocities are zero afterwards. Counts as `cycles` steps.
 
     ratio: unbalanced over contributing forces that must be reached; what rounding allows is aimed at. solver:
     "direct" (SciPy on rank 0: the same bits on any number of ranks), "petsc", "auto": PETSc, if it is there, from
     400 000 unknowns on, else direct. steps: what is out of balance, and prescribed movement, is brought on in so many
-    equal increments, in each of which elements flow once; one that finds no balance is halved, up to `CUTS` times.
+    equal increments, in each of which elements flow once; one that finds no balance, or in which more than one joint
+    would pass its peak, is halved, up to `CUTS` times (`FINE` with softening). A smallest increment may take several
+    joints past their peak, as where there is symmetry.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
     that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
@@ -127,18 +133,19 @@ def solve_elastic(
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
         sim._renew_lists()
-    _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
+    if not softening:
+        _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
     nodes = _all_nodes(sim)
     unknowns = _unknowns(sim, nodes, cycles)
     _refuse_loose_bodies(sim, nodes, unknowns)
-    if sim.yielding().any():
-        sim.before_change()  # what flows is the doing of a command
+    if softening or sim.yielding().any():
+        sim.before_change()  # what flows and breaks is the doing of a command
         sim.close_model()
-    relaxations, remembered = sim.relaxations, _remembered(sim)
+    relaxations, remembered = sim.relaxations, _Memory.of(sim)
     try:
         with _at_rest(sim, nodes):
             x, balanced = _follow(
-                sim, nodes, unknowns, ratio, _linear_solver(sim, solver, unknowns, nodes), steps, cycles
+                sim, nodes, unknowns, ratio, _linear_solver(sim, solver, unknowns, nodes), steps, cycles, softening
             )
         sim.relaxations = []
         _settle(sim, nodes, x, unknowns.given / cycles)
@@ -148,26 +155,53 @@ def solve_elastic(
     except CommandError:
         sim.relaxations = relaxations
         sim.before_change()
-        _put_back(sim, *remembered)
+        remembered.put_back(sim)
         _settle(sim, nodes, nodes.x, nodes.v)
         raise
     sim.clock.step += cycles
     return balanced
 
 
-def _remembered(sim: Blocks) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Numbers of the owned elements and what they remember of yielding."""
-    kept = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
-    return sim.number[sim.owned].copy(), kept
+@dataclass
+class _Memory:
+    """What elements and joints remember, and which joints are broken: numbers of the owned elements, their columns, the
+    rows of their joints and contacts and whose they are; open faces, broken joints, number of cracks in the log."""
 
+    number: np.ndarray
+    cold: dict[str, np.ndarray]
+    owner: np.ndarray
+    rows: np.ndarray
+    open: np.ndarray
+    broken: np.ndarray
+    cracks: int
 
-def _put_back(sim: Blocks, number: np.ndarray, kept: dict[str, np.ndarray]) -> None:
-    """What elements remember is that of `_remembered` again, whoever owns them now; the model is open. Collective."""
-    parts = sim.comm.allgather((number, kept)) if sim.comm.size > 1 else [(number, kept)]
-    every = np.concatenate([part[0] for part in parts])
-    place = np.argsort(every)[np.searchsorted(np.sort(every), sim.number)]
-    for name in kept:
-        sim.cold[name][:] = np.concatenate([part[1][name] for part in parts])[place]
+    @staticmethod
+    def of(sim: Blocks) -> _Memory:
+        """Of a closed model. Not collective."""
+        cold = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
+        number, histories = sim.number[sim.owned].copy(), sim.local.histories(transfer=False)
+        owner = number[histories.owners()]
+        return _Memory(
+            number, cold, owner, histories.rows.copy(), sim.open.copy(), sim.broken.copy(), len(sim.event_rows)
+        )
+
+    def put_back(self, sim: Blocks) -> None:
+        """Elements and joints remember this again, whoever owns them now; the model is open. Collective."""
+        mine = self.number, self.cold, self.owner, self.rows
+        parts = sim.comm.allgather(mine) if sim.comm.size > 1 else [mine]
+        every = np.concatenate([part[0] for part in parts])
+        place = np.argsort(every)[np.searchsorted(np.sort(every), sim.number)]
+        for name in self.cold:
+            sim.cold[name][:] = np.concatenate([part[1][name] for part in parts])[place]
+        row_of = np.full(int(every.max(initial=0)) + 1, -1, np.int64)
+        row_of[sim.number] = np.arange(len(sim.number))
+        owner, rows = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
+        here = row_of[owner] >= 0
+        sim.histories = Histories.of(len(sim.number), row_of[owner[here]], rows[here])
+        if not np.array_equal(sim.open, self.open):
+            sim.open[:], sim.broken[:] = self.open, self.broken
+            del sim.event_rows[self.cracks :]
+            sim.changed(topology=True)
 
 
 # ---- who can move --------------------------------------------------------------------------------------------
@@ -353,14 +387,19 @@ def _at_rest(sim: Blocks, nodes: _Nodes) -> Iterator[None]:
     relaxations = local.relaxing_corner
     v = sim.v.copy()
     try:
-        sim.v[:] = 0.0
-        local.relaxing_corner = relaxations[:0]
+        _hold_still(sim)
         _refuse_touching(sim, _touching(sim), "touch")
         yield
     finally:
         _place_corners(sim, nodes.x)
-        sim.v[:] = v
-        local.relaxing_corner = relaxations
+        if sim.local is local:  # else storage was made anew
+            sim.v[:] = v
+            local.relaxing_corner = relaxations
+
+
+def _hold_still(sim: Blocks) -> None:
+    sim.v[:] = 0.0
+    sim.local.relaxing_corner = sim.local.relaxing_corner[:0]
 
 
 def _place_corners(sim: Blocks, x: np.ndarray) -> None:
@@ -405,33 +444,39 @@ def _linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: _Nodes) 
 
 
 def _follow(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int
-) -> tuple[np.ndarray, Balanced]:
+    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int,
+    softening: bool,
+) -> tuple[np.ndarray, Balanced]:  # fmt: skip
     """Positions of the nodes in equilibrium (nn, 2), by increments: what is out of balance at the beginning grows
     smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
     yields, step = sim.local.yields, sim.clock.step + cycles - 1
-    solver.flows = yields
+    solver.flows = yields or softening
     x, iterations, factors, increments = nodes.x, 0, 0, 0
-    unit, done = 1 << CUTS if yields else 1, 0
+    unit, done = 1 << FINE if softening else 1 << CUTS if yields else 1, 0
     whole, size = steps * unit, unit
     missing = np.zeros(x.shape)
     try:
         if yields:
             _flow(sim, x, step)
         if whole > 1:
-            missing = _unbalanced(sim, nodes, unknowns, x)[0]
+            missing, _, total = _unbalanced(sim, nodes, unknowns, x)
+            nodes.least = total if softening else 0.0
         while done < whole:
             size = min(size, whole - done)
             left = 1.0 - (done + size) / whole
-            found = _balance(sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step)
+            found = _balance(
+                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening, size == 1
+            )
             iterations, factors = iterations + found.iterations, factors + found.factors
             if found.error and size > 1:
                 size //= 2
                 continue
-            _refuse_yielded(sim, found.past, "would pass their peak")
+            if not softening:
+                _refuse_yielded(sim, found.past, "would pass their peak")
             if found.error:
-                raise CommandError(found.error + _reached(sim, done / whole))
+                raise CommandError(found.error + (_reached(done / whole) if unit > 1 else ""))
             x, done, increments = found.x, done + size, increments + 1
+            nodes.least = max(nodes.least, found.total) if softening else 0.0
             size = min(2 * size if done % (2 * size) == 0 else size, unit)
     finally:
         solver.close()
@@ -443,39 +488,62 @@ def _follow(
     return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
 
 
-def _reached(sim: Blocks, part: float) -> str:
-    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads" if sim.local.yields else ""
+def _reached(part: float) -> str:
+    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads"
 
 
 def _balance(
     sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float, step: int,
+    missing: np.ndarray, given: float, step: int, softening: bool, smallest: bool,
 ) -> _Balance:  # fmt: skip
-    """Balance of an increment, see `_newton`, where elements that can yield have flowed; as it was, if there is none.
+    """Balance of an increment, see `_newton`, where elements that can yield have flowed and joints have opened; as it
+    was, if there is none. smallest: more than one joint may pass its peak in it.
 
-    One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, and in
-    quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on."""
-    first = _newton(sim, nodes, unknowns, enough, solver, x, missing, given)
-    if not sim.local.yields or first.error:
-        return first
-    before = [part.copy() for part in sim.local.plastic_state()]
-    found, again = first, sim.wide or "softening" in sim.cold
+    One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, in
+    quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on, and where
+    a joint broke: the third of its points may have held."""
+    found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening)
+    if found.error or not (sim.local.yields or softening):
+        return found
+    if softening and not smallest and int(sim.comm.sum_into(np.array([found.past], np.int64))[0]) > 1:
+        found.error = "more than one joint would pass its peak"
+        return found
+    before, again = _Memory.of(sim), sim.local.yields and (sim.wide or "softening" in sim.cold)
     for _ in range(PASSES):
-        _flow(sim, found.x, step)
-        if not again:
+        broke = _commit(sim, nodes, unknowns, found.x, step, softening)
+        if not (again or broke):
             return found
         found.ratio = _unbalanced(sim, nodes, unknowns, found.x, missing)[1]
-        if found.ratio <= enough and _still_to_flow(sim) <= STILL:
+        if found.ratio <= enough and (not again or _still_to_flow(sim) <= STILL):
             return found
-        after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0)
+        after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0, softening)
         after.iterations, after.factors = after.iterations + found.iterations, after.factors + found.factors
         found = after
         if found.error:
             break
-    for part, values in zip(sim.local.plastic_state(), before):
-        part[:] = values
+    sim.before_change()
+    before.put_back(sim)
+    sim.close_model()
+    _hold_still(sim)
     found.error = found.error or f"the static solve does not converge: elements still flow after {PASSES} balances"
     return found
+
+
+def _commit(sim: Blocks, nodes: _Nodes, unknowns: Unknowns, x: np.ndarray, step: int, softening: bool) -> bool:
+    """Elements flow and joints open at these positions of the nodes (nn, 2), for good. True if some joint broke: then
+    it is a free face. CommandError if a body came loose, or its surfaces touch."""
+    if sim.local.yields:
+        _flow(sim, x, step)
+    if not softening:
+        return False
+    _place_corners(sim, x)
+    sim.local.open_joints()
+    broke = sim.comm.any(bool((sim.local.slot_state == BROKEN).any()))
+    if broke:
+        sim._renew_lists()
+        _refuse_loose_bodies(sim, nodes, unknowns)
+        _refuse_touching(sim, _touching(sim), "touch after joints broke")
+    return broke
 
 
 def _still_to_flow(sim: Blocks) -> float:
@@ -496,7 +564,7 @@ def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
 
 def _newton(
     sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float,
+    missing: np.ndarray, given: float, softening: bool,
 ) -> _Balance:  # fmt: skip
     """Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
     prescribed on."""
@@ -504,7 +572,7 @@ def _newton(
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
     # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
     # neighbours such a way may well bring more unbalanced forces.
-    elastic, tries = True, TRIES if yields else 0
+    elastic, tries = True, TRIES if yields or softening else 0
     iterations = factors = past = 0
     rounding = noise = 0.0
     force, ratio, total = _unbalanced(sim, nodes, unknowns, x, missing)
@@ -512,7 +580,7 @@ def _newton(
     while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
         if renew:
             _place_corners(sim, x)
-            pieces, past = tangent(sim, flows=not elastic)
+            pieces, past = tangent(sim, flows=not elastic, softening=softening)
             rounding = _rounding(sim, pieces, x)
             try:
                 solver.factor(pieces)
@@ -540,13 +608,13 @@ def _newton(
         slow = after > 0.5 * ratio and not bold
         done = left == 0.0 and slow and (after <= noise or (renew and after <= enough))
         elastic = not yields
-        renew = left > 0.0 or after > max(0.0 if yields else RENEW * ratio, noise)
+        renew = left > 0.0 or after > max(0.0 if yields or softening else RENEW * ratio, noise)
         ratio = after
         ratios.append(ratio)
         if done:
             break
     _place_corners(sim, x)
-    _, past = tangent(sim, matrices=False)
+    _, past = tangent(sim, matrices=False, softening=softening)
     if not error and (left > 0.0 or not ratio <= max(enough, min(noise, WORST))):
         noise = rounding / total if 0.0 < total < math.inf else noise
         why = (
@@ -559,7 +627,7 @@ def _newton(
             f"the static solve does not converge: unbalanced over all forces is {ratio:.3g} after {iterations} "
             f"iterations, {enough:g} is asked for; {why}"
         )
-    return _Balance(x, ratio, iterations, factors, past, error, ratios)
+    return _Balance(x, ratio, iterations, factors, past, error, ratios, total)
 
 
 def _along(
@@ -608,7 +676,7 @@ def _unbalanced(
     force, sizes = _node_forces(sim, seen) - missing, diagnostics.contributing(sim, seen)
     if sim.comm.any(not np.isfinite(sizes).all()) or not np.isfinite(force).all():
         return force, math.inf, math.inf
-    total = exact_sum(sizes, sim.comm)
+    total = max(exact_sum(sizes, sim.comm), nodes.least)
     unbalanced = float(np.abs(unknowns.reduced(force)).sum())
     return force, unbalanced / total if total != 0.0 else 0.0, total
 
@@ -630,9 +698,11 @@ def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
     return out
 
 
-def tangent(sim: Blocks, matrices: bool = True, flows: bool = True) -> tuple[list[Pieces], int]:
-    """Stiffness of the owned elements and joints at the present positions, and joints behind their peak. flows: less
-    what the flow of elements takes from it."""
+def tangent(
+    sim: Blocks, matrices: bool = True, flows: bool = True, softening: bool = False
+) -> tuple[list[Pieces], int]:
+    """Stiffness of the owned elements and joints at the present positions, and how many joints are behind their peak;
+    with softening, those that pass it now. flows: less what the flow of elements takes from it."""
     local, small = sim.local, not sim.options.large_strain
     slots = _lower_slots(sim)
     joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
@@ -641,7 +711,15 @@ def tangent(sim: Blocks, matrices: bool = True, flows: bool = True) -> tuple[lis
         slots, local.slot_face, local.slot_at, local.slot_kind, local.slot_state, sim.where, cells, sim.x,
         local.joint_table, joints, left,
     )  # fmt: skip
-    past = int((left < 0.0).sum())
+    behind = left < 0.0
+    past = int((behind & ~(softening & (local.slot_state[slots] == YIELDED))).sum())
+    if softening and behind.any():
+        soft = np.empty((int(behind.sum()), 8, 8))
+        stiffness.yielded_joints(
+            slots[behind], local.slot_face, local.slot_at, local.slot_kind, local.slot_history, sim.where, cells, sim.x,
+            local.joint_table, local.joint_beyond, soft,
+        )  # fmt: skip
+        joints[behind] = soft
     if not matrices:
         return [], past
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
