@@ -15,6 +15,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, jointed, model, rectangle
 from tests.blocks.test_equilibrium import farthest, refused, state
 
+
 def test_slopes_of_the_law():
     """Against differences of laws.yielded_point, loading and unloading, in tension, shear, both and under pressure."""
     rng, met = np.random.default_rng(2), set()

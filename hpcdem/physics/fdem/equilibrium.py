@@ -44,6 +44,8 @@ HALVINGS = 8
 """Of an iteration's way before it is given up."""
 CUTS, FINE = 6, 10
 """How often an increment of the loads is halved that finds no balance; where joints soften."""
+LEAPS, DRAG, SHRINK = 300, 1e-3, 0.95
+"""Iterations of a leap, and part of the elastic stiffness of a node that holds it back at its beginning."""
 TRIES = 3
 """Elastic ways in an increment that need not bring forces nearer to balance."""
 STILL = 1e-6
@@ -503,6 +505,8 @@ def _balance(
     quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on, and where
     a joint broke: the third of its points may have held."""
     found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening)
+    if found.error and softening and smallest:
+        found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening, leap=True)
     if found.error or not (sim.local.yields or softening):
         return found
     if softening and not smallest and int(sim.comm.sum_into(np.array([found.past], np.int64))[0]) > 1:
@@ -517,6 +521,8 @@ def _balance(
         if found.ratio <= enough and (not again or _still_to_flow(sim) <= STILL):
             return found
         after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0, softening)
+        if after.error and softening and smallest:
+            after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0, softening, leap=True)
         after.iterations, after.factors = after.iterations + found.iterations, after.factors + found.factors
         found = after
         if found.error:
@@ -564,24 +570,30 @@ def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
 
 def _newton(
     sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float, softening: bool,
+    missing: np.ndarray, given: float, softening: bool, leap: bool = False,
 ) -> _Balance:  # fmt: skip
-    """Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
+    """leap: to a balance that is not near by, after a joint that snaps (pseudo-transient continuation, Kelley & Keyes
+    1998): nodes are held back by a part of their stiffness that falls with the ratio.
+
+    Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
     prescribed on."""
     left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yields
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
     # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
     # neighbours such a way may well bring more unbalanced forces.
-    elastic, tries = True, TRIES if yields or softening else 0
+    elastic, tries = True, TRIES if (yields or softening) and not leap else 0
+    drag = DRAG if leap else 0.0
     iterations = factors = past = 0
     rounding = noise = 0.0
     force, ratio, total = _unbalanced(sim, nodes, unknowns, x, missing)
     ratios, error = [ratio], ""
-    while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
+    while iterations < (LEAPS if leap else MOST) and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
         if renew:
             _place_corners(sim, x)
             pieces, past = tangent(sim, flows=not elastic, softening=softening)
             rounding = _rounding(sim, pieces, x)
+            if leap:
+                _hold_back(pieces, drag)
             try:
                 solver.factor(pieces)
             except CommandError as singular:
@@ -596,7 +608,7 @@ def _newton(
         iterations += 1
         bold = elastic and tries > 0 and ratio > enough
         tries -= bold
-        found = _along(sim, nodes, unknowns, x, way, ratio, left > 0.0 or bold, enough, missing)
+        found = _along(sim, nodes, unknowns, x, way, ratio, left > 0.0 or bold or leap, enough, missing)
         if found is None:
             if ratio <= enough or (renew and (elastic or not tries)):
                 break  # as near as rounding allows, or never
@@ -606,6 +618,7 @@ def _newton(
         left = max(left * (1.0 - part), 0.0)
         noise = rounding / total if total > 0.0 else 0.0
         slow = after > 0.5 * ratio and not bold
+        drag *= SHRINK * min(max(after / ratio, 0.2), 1.0) if leap and ratio > 0.0 else 1.0
         done = left == 0.0 and slow and (after <= noise or (renew and after <= enough))
         elastic = not yields
         renew = left > 0.0 or after > max(0.0 if yields or softening else RENEW * ratio, noise)
@@ -628,6 +641,13 @@ def _newton(
             f"iterations, {enough:g} is asked for; {why}"
         )
     return _Balance(x, ratio, iterations, factors, past, error, ratios, total)
+
+
+def _hold_back(pieces: list[Pieces], drag: float) -> None:
+    """Add this part of their own diagonals to the matrices of elements."""
+    for one in pieces[:2]:
+        diagonal = np.einsum("mii->mi", one.stiffness)
+        diagonal += drag * np.abs(diagonal)
 
 
 def _along(
