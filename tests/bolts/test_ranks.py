@@ -39,14 +39,14 @@ def test_much_happens(alone):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks, threads", [(2, 1), (4, 1), (1, 2)])
+@pytest.mark.parametrize("ranks, threads", [pytest.param(2, 1, marks=pytest.mark.slow), (4, 1), (1, 2)])
 def test_ranks_and_threads_do_not_change_a_bit(alone, launch, ranks, threads):
     kind, folder = alone
     equal(launch, WORKER, kind, STEPS, folder, ranks, threads)
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_it_goes_on_from_a_checkpoint_on_any_ranks(alone, launch, ranks):
     kind, folder = alone
     equal(launch, WORKER, kind, STEPS, folder, ranks, 1, "resume", "middle.sav")

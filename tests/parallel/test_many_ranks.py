@@ -461,6 +461,7 @@ def raft(comm: Any, size: int, save: Path | None = None, restore: Path | None = 
     return (rows, state(sim)), counts, sum(searches)
 
 
+@pytest.mark.slow  # a minute; coupled runs on several ranks are in test_coupled.py
 def test_contacts_of_discs_and_faces_on_64_ranks(tmp_path: Path) -> None:
     """The same bits as on one rank, also after a restart; messages of a rank do not grow with their number."""
     path = tmp_path / "both.sav"

@@ -33,6 +33,7 @@ def test_bolts_hold(launch, tmp_path):
     assert strong.yielded == 0 and strong.axial_force > 250e3
 
 
+@pytest.mark.slow  # liners by themselves: tests/liners
 def test_a_shell_holds(launch, tmp_path):
     """Each of its options alone changes what the tunnel does, in the way that it should."""
     given = {**COARSE, "bolts": 0}
