@@ -87,6 +87,7 @@ class Flow(SurfaceLoad):
         self.since = np.full(mesh.cells.size, math.inf)
         self.condition = np.zeros(len(mesh.points), np.int32)
         self.rows: list[tuple[float, ...]] = []
+        self._fluid: dict[str, float] = {}
         self.conditions: list[Condition] = [Condition()]
         self.number = np.empty(0, np.int64)
         self.nodes = np.empty((0, kernels.NODE))
@@ -135,7 +136,7 @@ class Flow(SurfaceLoad):
             )  # fmt: skip
             raise CommandError(f"there is one fluid in all channels, but {name} is {one:g} and {other:g}")
         blocks.before_change()
-        self.rows, self.row, self._found_for = rows, row, []
+        self.rows, self.row, self._found_for, self._fluid = rows, row, [], {}
         self._network, self._reshaped = None, True
         blocks.changed()
 
@@ -205,8 +206,9 @@ class Flow(SurfaceLoad):
 
     def fluid(self, name: str) -> float:
         """A property of the fluid. Not collective."""
-        row = int(self.row[self.row > 0][0])
-        return self.rows[row - 1][_PROPERTIES.index(name)]
+        if not self._fluid:
+            self._fluid = dict(zip(_PROPERTIES, self.rows[self.row[np.argmax(self.row > 0)] - 1]))
+        return self._fluid[name]
 
     @property
     def viscosity(self) -> float:
@@ -629,11 +631,10 @@ class Flow(SurfaceLoad):
         """The table of conditions (rows, 2) at a flow time: heights as potential energies."""
         o, tables = self.blocks.options, self.blocks.tables
         table = np.zeros((len(self.conditions), 2))
-        used = np.bincount(self.condition, minlength=len(table)) > 0
+        height = self.fluid("fluid_density") * math.hypot(o.gx, o.gy)
         for row, one in enumerate(self.conditions):
-            if used[row]:
+            if not isinstance(one.value, str) or one.value in tables:  # else nobody follows it any more
                 value = tables[one.value](time) if isinstance(one.value, str) else one.value
-                height = self.fluid("fluid_density") * math.hypot(o.gx, o.gy)
                 table[row] = one.does, value * height if one.does == kernels.SURFACE else value
         return table
 

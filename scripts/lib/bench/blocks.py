@@ -8,6 +8,7 @@
 | yielded-20k | the same with joints behind their peak |
 | quads-20k | quads as one body, contact armed, in vibration |
 | plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: none of it does, all of it flows |
+| wet-20k | intact-20k with a channel in every joint, half of them full, and one sub-step of flow per step |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
@@ -26,10 +27,11 @@ from bench.launch import Layout
 from bench.runs import say
 from bench.tables import Lines, Spread
 from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.flow.model import Flow
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "pairs": 3e6, "shattered": 1e6,
+    "flowing-quads": 3e6, "wet": 6e6, "pairs": 3e6, "shattered": 1e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
@@ -59,6 +61,7 @@ WORKLOADS = {
         Workload("quads-20k", "quads", 141),
         Workload("plastic-quads-20k", "plastic-quads", 141),
         Workload("flowing-quads-20k", "flowing-quads", 141),
+        Workload("wet-20k", "wet", 100),
         Workload("pairs-20k", "pairs", 141),
         Workload("shattered-20k", "shattered", 100),
     )
@@ -241,6 +244,20 @@ def flowing_quads(sim: Any, side: int) -> None:
     sim.v[:, 0:12:2], sim.v[:, 1:12:2] = -10.0 * x, 3.0 * y + 2.0 * x
 
 
+def wet(sim: Any, side: int) -> None:
+    """The same with fluid in all joints, full on one side and half full on the other."""
+    intact(sim, side)
+    flow = Flow.of(sim)
+    flow.assign(None, {
+        "fluid_density": 1000.0, "fluid_bulk": 2.2e9, "viscosity": 1e-6, "aperature_initial": 1e-5,
+        "aperature_minumum": 1e-6,
+    })  # fmt: skip
+    flow.fill(None, saturation=0.5)
+    flow.fill(np.flatnonzero(sim.mesh.points[:, 0] < 0.5 * sim.mesh.points[:, 0].max()), pressure=1e4)
+    sim.flow_clock(steps=1)
+    sim.close_model()
+
+
 def pairs(sim: Any, side: int) -> None:
     """Each square is two triangles that lie on each other along its diagonal, pressed and sheared."""
     mesh = square(side, gap=0.01)
@@ -279,5 +296,5 @@ def _swell(sim: Any, factor: float) -> None:
 
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
-    "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "pairs": pairs, "shattered": shattered,
+    "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "pairs": pairs, "shattered": shattered,
 }  # fmt: skip
