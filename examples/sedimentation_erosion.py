@@ -1,7 +1,7 @@
 # Sedimentation and erosion: thrusts grow while their crests are cut off and the foreland is filled
 # -----------------------------------------------------------------------------
 # shows     a first thrust, which carries the grey bed 2 km over itself and is cut down to beds of the lower half, with
-#           deposits that end against its front; 4 km further on a younger pop-up lifts both deposits by 0.6 km
+#           deposits that end against its front; 5 km further on a younger pop-up lifts both deposits by 0.5 km
 # model     18 km long, 2 km thick; three pushes, 5.5 km in all; after each the crests are cut, after the first two the
 #           foreland is filled; about 4500 spheres of radius 45 and 60 m at the end
 # run       ./scripts/run examples/sedimentation_erosion.py       (under a minute on two cores)
@@ -10,7 +10,7 @@
 # -----------------------------------------------------------------------------
 START
 SET disk off                            # spheres: mass 4/3 pi r^3 x density
-SET seed 46
+SET seed 5
 SET gentry 2.75                         # attempts per particle asked for
 
 BOX left -100.0 right 18100.0 bottom -100.0 height 4800.0
