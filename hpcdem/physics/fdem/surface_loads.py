@@ -1,5 +1,5 @@
 """Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, liners, the ground
-beyond free-field sides, later fluid and heat."""
+beyond free-field sides, fluid; later heat."""
 
 from __future__ import annotations
 
