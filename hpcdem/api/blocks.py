@@ -925,8 +925,8 @@ class BlockCommands:
         steady: bool = False,
     ) -> None:
         """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
-        in so many steps of what is new in the loads; with hydraulic fluid flows by implicit steps of at most dt [s], for
-        this time or until it is steady, through blocks in equilibrium.
+        in so many steps of what is new in the loads; with hydraulic fluid flows by implicit steps of at most dt [s],
+        for this time or until it is steady, through blocks in equilibrium.
         In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""

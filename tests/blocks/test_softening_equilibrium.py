@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.kernels import laws, stiffness
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import JOINT, jointed, model, rectangle
-from tests.blocks.test_equilibrium import farthest, refused, state
+from tests.blocks.test_equilibrium import farthest, refused
 
 
 def test_slopes_of_the_law():
@@ -139,33 +137,6 @@ def parted(sim: Blocks, way: float, **how) -> float:
     return diagnostics.total(sim, "reaction_y", top)
 
 
-def test_a_beam_that_splits():
-    """Double cantilever beam in displacement control. As the crack runs the force is that of Irwin, P = sqrt(2 G /
-    (dC / da)) with the compliance C of beams that are open to a and do not soften, in the mean to 3 % (the crack goes
-    from joint to joint); and what the ends did is stored, or G times the new crack, to 3 %. As by relaxation."""
-    at = np.arange(0.18, 0.36, 0.02)
-    compliance = [1e-6 / parted(beam(a), 1e-6) for a in at]
-    sim, work, force, ratios = beam(), 0.0, 0.0, []
-    for _ in range(40):
-        now = parted(sim, 2.5e-5, softening=True)
-        work, force = work + 0.5 * (force + now) * 2.5e-5, now
-        soft = diagnostics.values(sim, "damage")[diagnostics.values(sim, "state") == 2]
-        broken = diagnostics.joint_counts(sim)[2]
-        tip = CRACK + 0.01 * (broken + sum(1.0 - laws.softening(d) for d in soft))
-        if broken:
-            slope = np.interp(tip, at, np.gradient(compliance, at))
-            ratios.append(force / math.sqrt(2.0 * ENERGY / slope))
-    assert broken > 5 and np.mean(ratios) == pytest.approx(1.0, abs=0.03)
-    taken = work - diagnostics.total(sim, "strain_energy")
-    assert taken == pytest.approx(ENERGY * (tip - CRACK), rel=0.03)
-    x, y = sim.mesh.points.T
-    ends = np.flatnonzero((x < 1e-9) & (np.abs(y - HALF) > HALF - 1e-9))
-    before = diagnostics.values(sim, "stress_xx")
-    sim.velocity_condition(ends, vy=0.0)
-    assert convergence.solve(sim, ratio=1e-8, cycles=20000).reason == "ratio"
-    assert diagnostics.values(sim, "stress_xx") == pytest.approx(before, abs=1e-4 * np.abs(before).max())
-
-
 def test_an_increment_in_which_several_joints_pass_their_peak_is_cut():
     """Far apart in one go: it takes many increments, and comes to what small movements come to."""
     sim, slow = beam(), beam()
@@ -176,17 +147,6 @@ def test_an_increment_in_which_several_joints_pass_their_peak_is_cut():
     assert farthest(sim, slow, ("displacement_y",)) < 0.02
 
 
-def test_faces_that_close_after_a_joint_broke_are_refused():
-    """Two squares that are parted and brought back: with collision their faces touch, and the model is as it was."""
-    sim = pair("opening")
-    drawn(sim, "opening", 1e-4)
-    assert diagnostics.joint_counts(sim) == (0, 0, 1)
-    sim.option(collision=True)
-    end = np.flatnonzero(sim.mesh.points[:, 0] > 0.2 - 1e-9)
-    sim.velocity_condition(end, vx=-1.5e-4, vy=0.0)
-    refused(sim, "touch", softening=True)
-
-
 def test_a_part_that_comes_loose_is_refused_and_the_joint_is_whole():
     """A square that hangs on a joint and weighs more than it holds: it is named, and nothing is broken."""
     sim = jointed(model(rectangle(2, 1, 0.2, 0.1, kind="quad")), **SHEAR)
@@ -195,24 +155,8 @@ def test_a_part_that_comes_loose_is_refused_and_the_joint_is_whole():
     edges = sim.mesh.edges()
     right = (sim.mesh.points[edges.points][:, :, 0] > 0.2 - 1e-9).all(axis=1)
     sim.stress_condition(edges.faces[right, 0], xx=2.5e6)
-    with pytest.raises(CommandError, match="does not converge|can move|singular") as told:
+    with pytest.raises(CommandError, match=r"does not converge|can move|singular") as told:
         equilibrium.solve_elastic(sim, softening=True)
     assert told.match("balance was found with|can move")
     refused(sim, "does not converge|can move|singular", softening=True)
     assert diagnostics.joint_counts(sim) == (1, 0, 0) and not sim.broken.any() and not sim.event_rows
-
-
-def test_stages_and_a_file_between(tmp_path):
-    """The same bits after a checkpoint in the middle of softening."""
-    sim = beam()
-    for _ in range(3):
-        parted(sim, 1e-4, softening=True)
-    saved_state.save(sim, tmp_path / "middle.sav")
-    again = Blocks()
-    saved_state.restore(again, tmp_path / "middle.sav")
-    for one in (sim, again):
-        parted(one, 4e-4, softening=True)
-    assert diagnostics.joint_counts(sim)[2] > 0
-    for a, b in zip(state(sim), state(again)):
-        assert np.array_equal(a, b)
-    assert [row[0] for row in sim.event_rows] == [row[0] for row in again.event_rows]

@@ -323,10 +323,7 @@ def test_a_file_in_mid_injection(tmp_path) -> None:
     assert Flow.of(again).implicit_dt == Flow.of(whole).implicit_dt
 
 
-def bolted(sim: Blocks) -> None:
-    """A bolt across the crack."""
-    made = Bolts.of(sim).create([(0.5, -0.5), (0.5, 0.5)], 2)
-    Bolts.of(sim).model(made, {})
+SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}
 
 
 # ---- refusals -------------------------------------------------------------------------------------------------------
@@ -337,8 +334,8 @@ def bolted(sim: Blocks) -> None:
     [(lambda sim: sim.option(dynamic=True), "dynamic off"),
      (lambda sim: sim.parts(hydraulic=False), "hydraulic on"),
      (lambda sim: sim.velocity_condition(np.array([0]), vx=1e-3), "velocities"),
-     (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", {**ROCK, "cohesion": 1e6, "tensile": 1e5}), "yield"),
-     (lambda sim: bolted(sim), "bolts")],
+     (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", SOIL), "yield"),
+     (lambda sim: Bolts.of(sim), "bolts")],
 )  # fmt: skip
 def test_what_implicit_steps_cannot_do_is_refused(spoil, words) -> None:
     sim, _ = plate(4)

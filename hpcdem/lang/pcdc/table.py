@@ -590,15 +590,15 @@ _MODEL = (
                      Option("on-f{ailure}", (choice("stop", "continue"),), "stop: with exit code 3; continue: with a "
                             "warning, the script looks at pcdc.solved", default="stop"),
                      Option("ela{stic}", (), "at once, without steps"),
-                     Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it is "
-                            "steady; in static runs blocks are in equilibrium at the end of each step, and joints may "
-                            "pass their peak and break; with mechanical off, flow alone"),
+                     Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
+                            "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
+                            "may pass their peak and break; with mechanical off, flow alone"),
                      Option("dt", (POSITIVE,), "with hydraulic: longest time step; steps are shorter where joints "
                             "break or no balance is found", "s", "a hundredth of the time"),
                      Option("stea{dy}", (), "with hydraulic: until as much flows out as in; no time passes"),
-                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic or hydraulic: SciPy on one rank, the same "
-                            "bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, from 400 000 "
-                            "unknowns on", default="auto"),
+                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic or hydraulic: SciPy on one "
+                            "rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
+                            "from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1"))),

@@ -243,20 +243,20 @@ class Coupled:
             raise CommandError("steady flow is that in blocks that stand still: model option mechanical off first")
         if bool(np.isfinite(flow.since).any()):
             raise CommandError("leak-off goes on for ever: there is no steady flow with it")
-        time, dt = flow.time, self.longest
+        time, dt, growth = flow.time, self.longest, 10.0
         for _ in range(MOST_STEADY):
             found = self._tried(dt)
             flow.time = time
             if found.error:
                 self.count.cut += 1
-                dt *= 0.1
+                dt, growth = 0.3 * dt, 1.5
                 if dt < CUTS * self.longest:
                     raise CommandError(f"steady flow: {found.error}")
                 continue
             self.count.steps += 1
             if found.storing <= STEADY:
                 return
-            dt *= 10.0
+            dt, growth = growth * dt, min(1.5 * growth, 10.0)
         raise CommandError(
             "steady flow was not found: some node needs a pressure or a level, or rates must add up to zero"
         )
@@ -295,7 +295,6 @@ class Coupled:
 
     def _newton(self, step: Step, x: np.ndarray, u: np.ndarray) -> _Found:
         lack, force, fluid = self._lacking(step, x, u)
-        hist = [lack]
         iterations, error, past = 0, "", 0
         while lack > AIM and iterations < MOST:
             pieces = self._pieces(step, fluid, u, x)
@@ -311,7 +310,7 @@ class Coupled:
             blocks = len(x)
             for _ in range(HALVINGS):
                 trial = self._lacking(step, x + part * way[:blocks], u + part * way[blocks:, 0])
-                if trial[0] < lack or (iterations == 1 and trial[0] < math.inf):
+                if trial[0] < lack or (iterations == 1 and lack > ENOUGH and trial[0] < math.inf):
                     break
                 best = min(best, (trial[0], part))
                 part *= 0.5
@@ -325,7 +324,6 @@ class Coupled:
             x, u = x + part * way[:blocks], u + part * way[blocks:, 0]
             stalled = lack <= ENOUGH and trial[0] > 0.5 * lack
             lack, force, fluid = trial
-            hist.append((round(part, 3), lack))
             if stalled:
                 break
         self.count.iterations += iterations
@@ -334,9 +332,6 @@ class Coupled:
                 f"flow and equilibrium do not converge: what is lacking, over what contributes, is {lack:.3g} after "
                 f"{iterations} iterations, {ENOUGH:g} is asked for"
             )
-        import os
-        if os.environ.get("DBG") and (error or iterations > 8):
-            print("DBG", step.dt, error[:30], [h if isinstance(h, float) else (h[0], float(f"{h[1]:.2g}")) for h in hist])
         if self.moves:
             equilibrium.place_corners(self.sim, x)
             past = int(self.sim.comm.sum_into(np.array([equilibrium.of_joints(self.sim, True)[1]], np.int64))[0])
