@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 
 LAW = """\
 from hpcdem import StateVariable, element_law
@@ -69,12 +69,12 @@ if pcdc.rank == 0:
 """
 
 
-def ended(launch: Launcher, folder: Path, ranks: int, script: str, *options: str) -> str:
+def ended(resident: Resident, folder: Path, ranks: int, script: str, *options: str) -> str:
     """What the script prints last."""
     folder.mkdir(exist_ok=True)
     (folder / "stiff.py").write_text(LAW)
     (folder / "all.sc").write_text(script)
-    done = launch(ranks, "--no-figure", *options, "all.sc", cwd=folder)
+    done = resident(ranks, "--no-figure", *options, "all.sc", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "most True" in done.stdout  # something has flowed, crept, is pulled, has slipped
     (found,) = (line for line in done.stdout.splitlines() if line.startswith("digest"))
@@ -82,10 +82,10 @@ def ended(launch: Launcher, folder: Path, ranks: int, script: str, *options: str
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """The end of the run on one rank, and its folder with what it saved in mid-creep."""
     folder = tmp_path_factory.mktemp("alone")
-    return ended(Launcher(), folder, 1, START + "pcdc model save 'middle.sav'\n" + REST, "-j", "1"), folder
+    return ended(resident, folder, 1, START + "pcdc model save 'middle.sav'\n" + REST, "-j", "1"), folder
 
 
 @pytest.mark.mpi
@@ -93,12 +93,12 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     ("ranks", "threads"),
     [(3, 1), pytest.param(1, 2, marks=pytest.mark.slow), pytest.param(2, 2, marks=pytest.mark.slow)],
 )
-def test_the_same_on_any_ranks(alone, launch, tmp_path, ranks, threads):
-    assert ended(launch, tmp_path, ranks, START + REST, "-j", str(threads)) == alone[0]
+def test_the_same_on_any_ranks(alone, resident, tmp_path, ranks, threads):
+    assert ended(resident, tmp_path, ranks, START + REST, "-j", str(threads)) == alone[0]
 
 
 @pytest.mark.mpi
-def test_from_the_middle(alone, launch, tmp_path):
+def test_from_the_middle(alone, resident, tmp_path):
     """Of the restored law the script must say where it is: a checkpoint names no file that is executed."""
     begin = f"pcdc element law 'stiff.py:stiff'\npcdc model restore '{alone[1] / 'middle.sav'}'\n"
-    assert ended(launch, tmp_path, 2, begin + REST, "-j", "1") == alone[0]
+    assert ended(resident, tmp_path, 2, begin + REST, "-j", "1") == alone[0]
