@@ -43,8 +43,7 @@ def main() -> None:
                 talk.write(json.dumps({"rank": comm.rank} | answer) + "\n")
                 talk.flush()
 
-            if threads == 1:
-                get_ready(comm)
+            get_ready(comm, "", threads=threads)
             say({"pid": os.getpid()})
             for words in talk:
                 job = json.loads(words)
@@ -52,12 +51,20 @@ def main() -> None:
     shutdown.leave(shutdown.ExitStatus(rank=comm.rank))
 
 
-def get_ready(comm: Any) -> None:
-    """Load the kernels, or compile them: a script is not to wait for that."""
+READY: set[str] = set()
+"""Kinds of kernels that are loaded."""
+
+
+def get_ready(comm: Any, *kinds: str, threads: int = 1) -> None:
+    """Load kernels, or compile them: a script is not to wait for that, and each kind has to be loaded before a script
+    imports some of it."""
     from hpcdem import session
     from hpcdem.runtime.progress import Log
 
-    session.prepare(comm, Log(comm.rank, stream=io.StringIO()), "", 1)
+    for kind in kinds:
+        if kind not in READY:
+            session.prepare(comm, Log(comm.rank, stream=io.StringIO()), kind, threads)
+            READY.add(kind)
 
 
 # ---- a script --------------------------------------------------------------------------------------------------------
@@ -163,9 +170,6 @@ def prepare_accident(sim: Any, kind: str) -> None:
 
 # ---- the program -----------------------------------------------------------------------------------------------------
 
-READY: set[str] = set()
-"""Kinds of kernels that were called by earlier runs."""
-
 
 def carry_out_words(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
     """`hpcdem WORDS` in job["folder"]: exit code, what is printed to stdout and to stderr."""
@@ -173,6 +177,7 @@ def carry_out_words(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> d
     from hpcdem.runtime.progress import Log
     from hpcdem.session import enter
 
+    get_ready(comm, "", "blocks", "coupled", threads=job["threads"])
     os.chdir(job["folder"])
     words, path, modules = list(sys.argv), list(sys.path), set(sys.modules)
     out, err, session, failure = io.StringIO(), io.StringIO(), None, None
