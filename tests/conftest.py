@@ -57,6 +57,7 @@ def mpi_environment() -> dict[str, str]:
     """
     env = dict(os.environ)
     env.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    env.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # tests run side by side: a thread that waits must let go of its core
     if mpiexec() and is_open_mpi():
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
@@ -174,9 +175,10 @@ GREEN = Path(os.environ.get("HPCDEM_TEST_GREEN", os.devnull))
 """The tests that have passed before; they are left out."""
 
 
-def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Note what has passed, in the process that hears of all tests."""
-    if report.when == "call" and report.passed and "PYTEST_XDIST_WORKER" not in os.environ:
+@pytest.hookimpl(tryfirst=True)
+def pytest_report_teststatus(report: pytest.TestReport) -> None:
+    """Note what has passed, in the process that tells of all tests."""
+    if report.when == "call" and report.passed:
         with GREEN.open("a") as file:
             file.write(f"{report.nodeid}\n")
 
