@@ -16,7 +16,7 @@ STEPS, MIDDLE = 1100, 703
 """The checkpoint is written after excavation and a change of channels."""
 
 
-@pytest.fixture(scope="module", params=["bursting", "seeping"])
+@pytest.fixture(scope="module", params=["bursting", "pumped", "seeping"])
 def alone(request, tmp_path_factory):
     """The run on one rank with one thread, with a checkpoint from the middle of it."""
     folder = tmp_path_factory.mktemp(request.param)
@@ -30,7 +30,11 @@ def test_much_happens(alone):
         assert (wet == 1.0).sum() > 10 and ((wet > 0.0) & (wet < 1.0)).sum() > 5
         assert found["flow-node_pressure"].max() > 1e3
         assert found["account_relative"] < 1e-11 and found["account_stored"] > 0.0
-        if kind == "bursting":
+        if kind == "pumped":
+            print({name: float(found[name]) for name in found if name.startswith("well")}, found["clock"])
+            assert found["well_long_stage"] == 3.0 and found["well_short_stage"] == 2.0
+            assert found["well_long_injected"] > 0.0 and found["well_short_rate"] < 0.0
+        if kind != "seeping":
             assert found["counts"][2] > 20 and found["account_leaked"] > 0.0 and found["account_removed"] > 0.0
             assert np.ptp(found["flow-channel_aperture"]) > 1e-3
 

@@ -5,6 +5,7 @@ python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import PRESSURE, QUANTITIES, RATE, SHUT
 from tests.blocks.support import ROCK, rectangle, shaken
 from tests.blocks.worker import COHESIVE, WEAK, communicator
 from tests.flow.support import WATER, inner
@@ -56,6 +58,23 @@ def more(sim: Blocks) -> None:
         sim.flow_clock(every=3)
 
 
+def pumped(sim: Blocks) -> None:
+    """The same with wells across the strips of the ranks in place of conditions, in channels that slip opens further;
+    stages end where steps do not, one of them after the checkpoint."""
+    bursting(sim)
+    flow = Flow.of(sim)
+    flow.remove_conditions(None)
+    flow.adjust(None, {"shear_dilation": 20.0, "shear_dilation_limit": 4e-3})
+    points = sim.mesh.points
+    flow.drill("long", np.flatnonzero((np.abs(points[:, 1] - 0.3) < 0.03) & (points[:, 0] > 0.3)))
+    flow.drill("short", np.flatnonzero(points[:, 0] < 0.05))
+    flow.stage("long", RATE, 10.0, 1.23e-3, 2e6)
+    flow.stage("long", SHUT, 0.0, 2.1e-4, math.inf)
+    flow.stage("long", RATE, 10.0, math.inf, 1e6)
+    flow.stage("short", PRESSURE, "pump", 1.7e-3, math.inf)
+    flow.stage("short", RATE, -1e-2, math.inf, math.inf)
+
+
 def seeping(sim: Blocks) -> None:
     """Water rises in a block that stands still, then moves."""
     sim.take_mesh(shaken(rectangle(20, 6, 2.0, 0.6), 0.2))
@@ -78,7 +97,7 @@ def move(sim: Blocks) -> None:
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
 
 
-KINDS = {"bursting": (bursting, more), "seeping": (seeping, move)}
+KINDS = {"bursting": (bursting, more), "pumped": (pumped, more), "seeping": (seeping, move)}
 
 
 def main() -> None:
@@ -104,6 +123,9 @@ def main() -> None:
     for name in ("aperture", "flow_rate"):
         found[f"flow-channel_{name}"] = flow.values("flow-channel", name)
     found.update({f"account_{name}": np.array(value) for name, value in flow.account().items()})
+    for name in (well.name for well in flow.wells):
+        for value in QUANTITIES:
+            found[f"well_{name}_{value}"] = np.array(flow.well_value(name, value))
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["clock"] = np.array([flow.time, flow.dt, flow.sub_steps, flow.cycles, sim.clock.time])
     found["about"] = np.array([sim.rebuilds])
