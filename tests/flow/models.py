@@ -1,31 +1,34 @@
-"""Runs wet blocks, on any number of ranks and threads, and writes what became of them.
-
-python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
-"""
+"""Fluid that tears a block apart, and water that seeps: models for tests/parallel/test_models.py."""
 
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import PRESSURE, QUANTITIES, RATE, SHUT
+from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
-from tests.blocks.worker import COHESIVE, WEAK, communicator
+from tests.bolts.models import WEAKER
 from tests.flow.support import WATER, inner
+from tests.parallel.model import Found, Model
 
 LEAKS = {
     "leak_off": 1.0, "matrix_permeability": 1e-14, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9,
 }  # fmt: skip
 WIDE = {**WATER, "fluid_bulk": 1e7, "aperature_initial": 2e-4, "aperature_minumum": 5e-5, "aperature_maximum": 5e-3}
+
+
+SOIL = {
+    "density": 2000.0, "young": 1e8, "poisson_ratio": 0.3, "friction": 20.0, "cohesion": 4e3, "tensile": 2e3,
+    "dilation": 5.0,
+}  # fmt: skip
 
 
 def bursting(sim: Blocks) -> None:
@@ -97,21 +100,49 @@ def move(sim: Blocks) -> None:
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
 
 
-KINDS = {"bursting": (bursting, more), "pumped": (pumped, more), "seeping": (seeping, move)}
+def resting(sim: Blocks) -> None:
+    """Rock that yields, with bolts, water in some of its joints and a well: in relaxation, then in motion."""
+    sim.take_mesh(shaken(rectangle(16, 6, 1.6, 0.6), 0.2))
+    changes.element_model(sim, None, "mech_mohr_coulomb", SOIL)
+    joints = inner(sim.mesh)
+    sim.joint_model(joints[::3], COHESIVE, {**WEAK, "cohesion": 4e3, "tensile_strength": 1e3})
+    sim.gravity(0.0, -9.81)
+    sim.option(dynamic=False, collision=False)
+    y = sim.mesh.points[:, 1]
+    sim.velocity_condition(np.flatnonzero(y == 0.0), vx=0.0, vy=0.0)
+    bolts = Bolts.of(sim)
+    for x in (0.33, 1.01):
+        _, elements = bolts.create([(x, 0.6), (x + 0.1, 0.1)], plate=True, grout=(0.2, 0.6))
+        bolts.assign(elements, {**WEAKER, "pretension_force": 3e3})
+    flow = Flow.of(sim)
+    flow.assign(joints[joints % 5 > 0], {**WATER, "fluid_bulk": 1e6, "aperature_initial": 1e-4, "shear_dilation": 5.0})
+    flow.fill(np.flatnonzero(y < 0.3), pressure=2e3)
+    sim.flow_clock(dt=1e-3)
+    flow.drill("pump", np.flatnonzero((np.abs(y - 0.3) < 0.03) & (sim.mesh.points[:, 0] < 1.2)))
+    flow.stage("pump", RATE, 1e-3, 0.5005, 6e4)
+    flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
 
 
-def main() -> None:
-    kind, threads, steps, out, *rest = sys.argv[1:]
-    sim = Blocks(communicator(), int(threads))
-    if rest[:1] == ["resume"]:
-        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
-    else:
-        KINDS[kind][0](sim)
-    while sim.clock.step < int(steps):
-        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
-            saved_state.save(sim, rest[1], {"kind": kind})
-        KINDS[kind][1](sim)
-        convergence.advance(sim, 1)
+def dig(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=150.0)
+    if sim.clock.step == 900:
+        sim.option(dynamic=True)
+        sim.flow_clock(dt=0.0, every=2)
+        Flow.of(sim).stage("pump", PRESSURE, 2e4, math.inf, math.inf)
+
+
+def all_of_it(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """That of the fluid, of bolts and of plastic flow."""
+    found = result(sim, notes)
+    found["plastic"] = diagnostics.values(sim, "plastic_shear_strain")
+    found["axial"] = Bolts.of(sim).values("bolt-element", "axial_force")
+    return found
+
+
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx")}
     flow = Flow.of(sim)
     for on in ("flow-node", "flow-channel"):
@@ -128,10 +159,39 @@ def main() -> None:
             found[f"well_{name}_{value}"] = np.array(flow.well_value(name, value))
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["clock"] = np.array([flow.time, flow.dt, flow.sub_steps, flow.cycles, sim.clock.time])
-    found["about"] = np.array([sim.rebuilds])
-    if sim.comm.rank == 0:
-        np.savez(out, **found)
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def water_moves(found: Found) -> None:
+    wet = found["flow-node_saturation"]
+    assert (wet == 1.0).sum() > 10 and ((wet > 0.0) & (wet < 1.0)).sum() > 5
+    assert found["flow-node_pressure"].max() > 1e3
+    assert found["account_relative"] < 1e-11 and found["account_stored"] > 0.0
+
+
+def water_bursts(found: Found) -> None:
+    water_moves(found)
+    assert found["counts"][2] > 20 and found["account_leaked"] > 0.0 and found["account_removed"] > 0.0
+    assert np.ptp(found["flow-channel_aperture"]) > 1e-3
+
+
+def wells_pump(found: Found) -> None:
+    water_bursts(found)
+    assert found["well_long_stage"] == 3.0 and found["well_short_stage"] == 2.0
+    assert found["well_long_injected"] > 0.0 and found["well_short_rate"] < 0.0
+
+
+def all_acts(found: Found) -> None:
+    assert found["account_relative"] < 1e-11 and found["account_removed"] > 0.0
+    assert found["well_pump_stage"] == 3.0 and found["well_pump_injected"] > 0.0
+    assert found["flow-node_pressure"].max() > 1e3 and np.abs(found["axial"]).max() > 10.0
+    assert np.nanmax(found["plastic"]) > 0.0 and np.ptp(found["flow-channel_aperture"]) > 1e-7
+
+
+# Checkpoints after excavation and a change of channels.
+MODELS = {
+    "bursting": Model(bursting, result, water_bursts, more, steps=1100, middle=703),
+    "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703),
+    "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=1100, middle=703),
+    "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703),
+}
