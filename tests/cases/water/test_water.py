@@ -31,17 +31,12 @@ def test_pressure_around_a_hole_in_the_documented_mesh(launch, tmp_path):
 
 
 def test_levels_in_a_dam(launch, tmp_path):
-    done = results(launch, tmp_path, DamSeepage(size=1.0))
-    print(vars(done))
-    assert done.level_error < 0.08 and done.discharge == pytest.approx(done.exact, rel=0.06)
-    assert done.exact == pytest.approx(1.5 * math.sqrt(3.0) * 1e-15 / 12.0 * 9.81e6, rel=1e-9)
-    assert (tmp_path / "data" / "dam-seepage.png").stat().st_size > 5000
-
-
-@pytest.mark.slow
-def test_levels_in_a_dam_in_the_documented_mesh(launch, tmp_path):
+    """9.11 in the documented mesh: levels within 4 % of Dupuit's up to x = 12 m, discharge within 3 % of Charny's."""
     done = results(launch, tmp_path, DamSeepage())
+    print(vars(done))
     assert done.level_error < 0.04 and done.discharge == pytest.approx(done.exact, rel=0.03)
+    assert done.exact == pytest.approx(1.5 * math.sqrt(3.0) * 1e-15 / 6.0 * 9.81e6, rel=1e-9)
+    assert (tmp_path / "data" / "dam-seepage.png").stat().st_size > 5000
 
 
 def test_uplift_with_curtain_and_drain(launch, tmp_path):
@@ -75,7 +70,7 @@ def test_uplift_in_the_documented_mesh(launch, tmp_path):
 
 
 def test_a_fault_slips_when_coulomb_says_so(launch, tmp_path):
-    done = results(launch, tmp_path, FaultInjection(size=4.0, coarse=40.0, steps=6000))
+    done = results(launch, tmp_path, FaultInjection(size=4.0, coarse=40.0, duration=40.0, shut_in=4.0, steps=8000))
     print({name: value for name, value in vars(done).items() if name != "curve"})
     assert done.normal == pytest.approx(12.5e6) and done.shear == pytest.approx(10e6 * math.sqrt(3.0) / 4.0)
     assert done.exact_onset == pytest.approx(12.5e6 - (done.shear - 1e3) / math.tan(math.radians(35.0)))
