@@ -100,6 +100,10 @@ class Coupled:
                 )
         if not sim.options.hydraulic:
             raise CommandError("the hydraulic part is switched off: model option hydraulic on comes first")
+        if self.flow.wells:
+            raise CommandError(
+                "implicit steps of flow know no wells: prescribe rates and pressures of nodes, or step the flow"
+            )
         if not self.moves:
             return
         if sim.options.dynamic:
