@@ -178,13 +178,16 @@ drop = shear - mu * (normal - pressure)
 along = places @ np.array([math.cos(turn), math.sin(turn)])
 final = np.abs(pcdc.values('joint', 'slip', geometry='fault'))
 def closed_form(s):
-    return 4 * (1 - poisson**2) / young * drop * math.sqrt(max(half**2 - s**2, 0.0))
+    return 4 * (1 - poisson**2) / young * max(drop, 0.0) * math.sqrt(max(half**2 - s**2, 0.0))
 slip, exact_slip = float(final[np.argsort(np.abs(along))[:2]].mean()), closed_form(0.5 * size)
 injected, account = curve[-1][2], pcdc.fluid['relative']
 print('stress on the fault: normal %.5g (closed form %.5g), shear %.5g (%.5g) MPa' % (
     1e-6*found_normal, 1e-6*normal, 1e-6*found_shear, 1e-6*shear))
-print('the fault slips beside the well at %.4g MPa after %.3g s; closed form %.4g MPa' % (
-    1e-6*onset, seconds, 1e-6*exact_onset))
+if len(yielded):
+    print('the fault slips beside the well at %.4g MPa after %.3g s; closed form %.4g MPa' % (
+        1e-6*onset, seconds, 1e-6*exact_onset))
+else:
+    print('the fault does not slip: %.4g MPa in the well, needed %.4g MPa' % (1e-6*curve[-1][1], 1e-6*exact_onset))
 print('slip in the middle at the end %.4g mm with %.4g MPa; closed form %.4g mm' % (
     1e3*slip, 1e-6*pressure, 1e3*exact_slip))
 print('injected %.4g m2' % injected)
@@ -193,7 +196,8 @@ pcdc chart create 'fault-injection' x-label 'time (s)' y-label 'pressure in the 
 pcdc chart add 'fault-injection' values [[(t, 1e-6 * p) for t, p, _, _ in curve]] label 'well'
 line = [(0.0, 1e-6 * exact_onset), (curve[-1][0], 1e-6 * exact_onset)]
 pcdc chart add 'fault-injection' values [line] label 'Coulomb'
-pcdc chart add 'fault-injection' values [[(seconds, 1e-6 * onset)]] label 'first joint yields' style points
+if len(yielded):
+    pcdc chart add 'fault-injection' values [[(seconds, 1e-6 * onset)]] label 'first joint yields' style points
 pcdc chart export 'fault-injection' 'fault-injection.png' fluid pressure
 pcdc chart create 'volume' x-label 'time (s)' y-label 'slip (mm), injected volume (1e-4 m2)'
 pcdc chart add 'volume' values [[(t, 1e3 * u) for t, _, _, u in curve]] label 'slip in the middle'

@@ -79,6 +79,14 @@ def test_a_fault_slips_when_coulomb_says_so(launch, tmp_path):
     assert done.injected > 0.0 and done.account < 1e-10
 
 
+def test_a_fault_that_does_not_slip_says_so(launch, tmp_path):
+    done = results(
+        launch, tmp_path, FaultInjection(size=4.0, coarse=40.0, duration=2.0, shut_in=0.5, steps=1000),
+        more="more['onset'] = more['seconds'] = None\n",
+    )  # fmt: skip
+    assert done.onset is None and done.exact_slip == 0.0 and done.slip < 1e-4
+
+
 @pytest.mark.slow
 def test_a_fault_slips_in_the_documented_mesh(launch, tmp_path):
     done = results(launch, tmp_path, FaultInjection())
