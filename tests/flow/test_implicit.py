@@ -43,7 +43,10 @@ def test_derivatives_are_those_of_differences() -> None:
     sim.gravity(2.0, -9.81)
     flow, joints = Flow.of(sim), inner(mesh)
     matrix = {"matrix_permeability": 1e-13, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}
-    flow.assign(joints, {**WATER, "fluid_bulk": 1e7, "aperature_initial": 1e-4, "leak_off": 1.0, **matrix})
+    flow.assign(
+        joints,
+        {**WATER, "fluid_bulk": 1e7, "aperature_initial": 1e-4, "shear_dilation": 30.0, "leak_off": 1.0, **matrix},
+    )
     changes.crack(sim, joints[:4])
     flow.prescribe(at(sim, 0.0), kernels.SURFACE, 0.1)
     flow.prescribe(np.array([7]), kernels.RATE, -1e-6)
@@ -65,7 +68,7 @@ def test_derivatives_are_those_of_differences() -> None:
         residual = slice(2 * count, None, 2)
         assert now.held.any() and not now.held.all() and (now.lost > 0.0).any()
         for i in range(fluid.n):
-            h = 1e-7
+            h = 1e-6
             ends = [fluid.balance(step, u + s * h * np.eye(fluid.n)[i], x) for s in (1.0, -1.0)]
             wanted = (ends[0].residual - ends[1].residual) / (2.0 * h)
             found = np.where(step.known, 0.0, matrix_of[residual, 2 * (count + i)])
@@ -335,7 +338,8 @@ SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}
      (lambda sim: sim.parts(hydraulic=False), "hydraulic on"),
      (lambda sim: sim.velocity_condition(np.array([0]), vx=1e-3), "velocities"),
      (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", SOIL), "yield"),
-     (lambda sim: Bolts.of(sim), "bolts")],
+     (lambda sim: Bolts.of(sim), "bolts"),
+     (lambda sim: Flow.of(sim).create_well("w", at(sim, 0.0, 0.0)), "wells")],
 )  # fmt: skip
 def test_what_implicit_steps_cannot_do_is_refused(spoil, words) -> None:
     sim, _ = plate(4)

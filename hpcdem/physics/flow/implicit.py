@@ -238,7 +238,11 @@ class Fluid:
         across = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None]
         law = self.laws[self.law[mine]]
         moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
-        by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * across[:, None, :]
+        along = way / h[:, None]
+        slip = 0.5 * ((((d - a) + (c - b)) * along).sum(axis=1))
+        gains = law[:, kernels.DILATE] * np.abs(slip) < law[:, kernels.GAIN]
+        opens = across + np.where(gains, law[:, kernels.DILATE] * np.sign(slip), 0.0)[:, None] * along
+        by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * opens[:, None, :]
         by_x = by_x.reshape(m, 8)  # of the aperture
         fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
         out = np.zeros((m, 12, 12))
