@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
-    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "creep": "Creep",
+    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar",
+    "creep": "Creep",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name."""
 __all__ = ["CASES", "find", *CASES.values()]
