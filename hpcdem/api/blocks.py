@@ -760,19 +760,27 @@ class Charts(Words):
         scale_x: float | None = None,
         scale_y: float | None = None,
         values: Sequence[Point] | None = None,
+        profile: str | None = None,
         label: str | None = None,
         style: str | None = None,
+        where: Where = None,
     ) -> None:
-        """A curve of history y against history x (or time), or of points; style: "line" or "points"."""
+        """A curve of history y against history x (or time), of points, or of what fluid has now along the line of
+        channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity"); style: "line" or
+        "points"."""
         given = {
-            "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values, "label": label,
-            "style": style,
+            "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values,
+            "profile": None if profile is None else _script_word(profile), "label": label, "style": style,
         }  # fmt: skip
-        self._do("chart add", given)
+        self._do("chart add", given, where, g.JOINT)
 
-    def export(self, name: str, file: File, cracks: bool = False, plastic: bool = False) -> None:
-        """Write a diagram as figure and CSV; cracks, plastic: beside it the model as it is now, with one of them."""
-        self._do("chart export", {"name": name, "file": file, "cracks": cracks, "plastic": plastic})
+    def export(
+        self, name: str, file: File, cracks: bool = False, plastic: bool = False, fluid: str | None = None
+    ) -> None:
+        """Write a diagram as figure and CSV; cracks, plastic, fluid ("pressure", "saturation", "aperture" or
+        "velocity"): beside it the model as it is now, with one of them."""
+        given = {"name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid}
+        self._do("chart export", given)
 
 
 @commands

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission")
+WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid")
 FORMATS = ("png", "jpg", "pdf", "svg")
 
 
@@ -125,6 +125,7 @@ def measure(**options: Any) -> None:
     cracks     broken bonds or joints, by mode and time, and damage
     fragments  of blocks: number, areas, distribution of sizes
     emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value
+    fluid      of blocks: wet length, volume, largest pressure, aperture and velocity; each channel of the last frame
     """
 
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from hpcdem.post.series import Job
     from hpcdem.runtime.progress import Log
 
-PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic")} | {"both": ("cracks", "stress")}
+FLUID = ("pressure", "saturation", "aperture", "velocity")
+PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", *FLUID)} | {"both": ("cracks", "stress")}
 """By words of --show."""
 PAGE = 17.0
 """Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
@@ -34,7 +35,8 @@ PAGE = 17.0
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
 @click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
 @click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
-              "they broke, compressive stress, plastic strain; both: the first two [what there is].")  # fmt: skip
+              "they broke, compressive stress, plastic strain, of fluid in joints pressure, saturation, aperture or "
+              "velocity; both: the first two [what there is].")  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @looks
 def movie(**options: Any) -> None:
@@ -158,13 +160,13 @@ def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) ->
     from hpcdem.post.series import Job
 
     views = []
-    spans: dict[str, list[tuple[float, float]]] = {name: [] for name in blocks.CONTOURS}
+    spans: dict[str, list[tuple[float, float]]] = {name: [] for name in blocks.COLOURED}
     panels: set[str] = set()
     for file in files:
         state = read_mesh_frame(file)
         views.append(blocks.view(state))
         panels.update(blocks.panels_of(state))
-        for name, shown in blocks.CONTOURS.items():
+        for name, shown in blocks.COLOURED.items():
             spans[name].append(shown.range(state))
     limits = [
         bound if options[name] is None else options[name]

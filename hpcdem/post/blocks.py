@@ -1,6 +1,5 @@
 """Pictures of blocks: cracks coloured by the way they broke, axial forces of bolts, forces and moments of liners,
-contours of the compressive stress
-and of plastic strain.
+contours of the compressive stress and of plastic strain, and fluid in channels.
 
 matplotlib is imported where it is used, and only its file-writing parts: no window system, no global state.
 """
@@ -20,10 +19,10 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
-from hpcdem.post import bolts, liners
+from hpcdem.post import bolts, fluid, liners
 
 CRACKS, STRESS, PLASTIC = "cracks", "stress", "plastic"
-PANELS = (CRACKS, STRESS, PLASTIC)
+PANELS = (CRACKS, STRESS, PLASTIC, *fluid.PICTURES)
 CM = 1.0 / 2.54
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
@@ -39,15 +38,14 @@ MOST_EDGES = 4000
 NEAR = 1e-3
 """Corners nearer than this part of an edge share the mean of their stress."""
 LEVELS = 14
-PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the panels, between them, for the colours
 
 
 @dataclass(frozen=True)
 class Looks:
-    """panels: of PANELS, none: cracks, stress, and plastic strain where there is some; page: width [cm]; font and lines
-    in points; dpi: dots per inch; title: in the corner, with {step} and {time}; ranges: of the colours of panels, SI;
-    those that are not given are those of the frame."""
+    """panels: of PANELS, none: cracks, stress, and plastic strain and pressure of fluid where there is some; page:
+    width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with {step} and {time}; ranges: of
+    the colours of panels, SI; those that are not given are those of the frame."""
 
     panels: tuple[str, ...] = ()
     page: float = 17.0
@@ -134,9 +132,10 @@ class Contours:
 
 def panels_of(state: MeshState) -> tuple[str, ...]:
     """The panels that show what there is."""
+    wet = ("pressure",) if fluid.there(state) else ()
     if plastic_range(state)[1] > 0.0:
-        return PANELS if len(state.joints) else (STRESS, PLASTIC)
-    return CRACKS, STRESS
+        return ((CRACKS,) if len(state.joints) else ()) + (STRESS, PLASTIC, *wet)
+    return CRACKS, STRESS, *wet
 
 
 def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: View | None = None) -> Path:
@@ -195,9 +194,9 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         if panel == CRACKS:
             cracks(axes, state, looks.font, width / seen.width)
         else:
-            shown = CONTOURS[panel]
+            shown = COLOURED[panel]
             span = looks.ranges.get(panel) or shown.range(state)
-            filled = contours(axes, state, shown, span)
+            filled = coloured(axes, state, panel, span, width / seen.width)
             if number == 0:  # no panel of cracks, which would show them
                 supports(axes, state)
             colours = figure.add_axes(
@@ -248,12 +247,11 @@ def cracks(axes: Any, state: MeshState, font: float = 9.0, scale: float = 1.0) -
         )  # fmt: skip
 
 
-def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
+def rock(axes: Any, state: MeshState, edges: str) -> None:
+    """Elements coloured by group; edges: their colour, or "face"."""
     from matplotlib.collections import PolyCollection
-    from matplotlib.lines import Line2D
 
     colour = _group_colours(state)
-    edges = EDGE if len(state.cells) <= MOST_EDGES else "face"
     for n in (3, 4):
         rows = np.flatnonzero((state.cells[:, 3] >= 0) == (n == 4))
         if len(rows):
@@ -262,6 +260,12 @@ def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
                 PolyCollection(corners, facecolors=colour[rows], edgecolors=edges, linewidths=0.25, zorder=1),
                 autolim=False,
             )
+
+
+def _cracks(axes: Any, state: MeshState, scale: float) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    rock(axes, state, EDGE if len(state.cells) <= MOST_EDGES else "face")
     width = line_width(state, scale)
     at = state.points[state.joints]
     joint_state, mode = state.of_joints.get("state", np.empty(0)), state.of_joints.get("mode", np.empty(0))
@@ -324,9 +328,20 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 
 
 CONTOURS = {
-    STRESS: Contours(compression, stress_range, PRESSURES, "compressive stress", "YlOrBr"),
+    STRESS: Contours(compression, stress_range, fluid.PRESSURES, "compressive stress", "YlOrBr"),
     PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGn"),
 }
+COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
+"""Panels with a bar of colours."""
+
+
+def coloured(axes: Any, state: MeshState, panel: str, span: tuple[float, float], scale: float) -> Any:
+    """One of them, colours from ... to ...; returns what the bar is made of. scale: cm on paper per metre."""
+    shown = COLOURED[panel]
+    if isinstance(shown, Contours):
+        return contours(axes, state, shown, span)
+    rock(axes, state, "face")
+    return fluid.draw(axes, state, shown, span, unit_of(shown, span)[0], 1.6 * line_width(state, scale))
 
 
 def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, float]) -> Any:
@@ -346,7 +361,7 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
     return filled
 
 
-def unit_of(shown: Contours, span: Sequence[float]) -> tuple[float, str]:
+def unit_of(shown: Contours | fluid.Shown, span: Sequence[float]) -> tuple[float, str]:
     """The unit in which values of this range are read best, in SI, and its name."""
     largest = max(abs(value) for value in span)
     return next(((size, name) for size, name in shown.units if largest >= size), shown.units[-1])

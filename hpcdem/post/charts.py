@@ -26,10 +26,10 @@ def draw(
     y_label: str,
     curves: Sequence[tuple[str, str, Points]],
     model: MeshState | None = None,
-    plastic: bool = False,
+    beside: str = "cracks",
 ) -> None:
     """Draw (label, "line" or "points", points) into a file of this kind: png, pdf or svg. model: blocks that are drawn
-    beside the diagram, with their cracks or with contours of plastic shear strain."""
+    beside the diagram, as one of hpcdem.post.blocks.PANELS."""
     try:
         import matplotlib
     except ImportError:
@@ -41,7 +41,7 @@ def draw(
         figure = Figure(figsize=SIZE, layout="constrained")
         axes = figure.add_subplot()
     else:
-        figure, axes = _beside(model, plastic)
+        figure, axes = _beside(model, beside)
     for label, style, points in curves:
         x, y = [p[0] for p in points], [p[1] for p in points]
         if style == "points":
@@ -58,14 +58,16 @@ def draw(
     figure.savefig(path, format=kind, dpi=200)
 
 
-def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
+def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
     """A figure with a model on the left, and the axes for a diagram on the right."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     from hpcdem.post import blocks
 
-    seen = blocks.view_of_flow(model) if plastic else blocks.view(model)
-    height = SIZE[1] - (0.95 if plastic else 0.75)  # of the panels: above and below there are words
+    coloured = panel != blocks.CRACKS
+    seen = blocks.view_of_flow(model) if panel == blocks.PLASTIC else blocks.view(model)
+    height = SIZE[1] - (0.95 if coloured else 0.75)  # of the panels: above and below there are words
     width = min(max(height * seen.width / seen.height, 0.3 * height), 1.5 * height)
     page = 0.7 + width + 0.75 + SIZE[0] - 1.4 + 0.15, SIZE[1]
     figure = Figure(figsize=page)
@@ -74,10 +76,10 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
         ((0.7 + width + 0.75) / page[0], 0.5 / page[1], (SIZE[0] - 1.4) / page[0], height / page[1])
     )
     modes: list[Any] = []
-    if plastic:
-        shown = blocks.CONTOURS[blocks.PLASTIC]
+    if coloured:
+        shown = blocks.COLOURED[panel]
         blocks.frame(left, seen, blocks.USUAL, first=True, last=True)
-        filled = blocks.contours(left, model, shown, shown.range(model))
+        filled = blocks.coloured(left, model, panel, shown.range(model), 2.54 * width / seen.width)
         modes = blocks.supports(left, model)
         left.apply_aspect()
         box = left.get_position()
@@ -88,9 +90,9 @@ def _beside(model: MeshState, plastic: bool) -> tuple[Any, Any]:
         if filled is None:
             bar.set_axis_off()
         else:
-            figure.colorbar(
-                filled, cax=bar, orientation="horizontal", ticks=filled.levels[:: 4 if begin == 0.55 else 8]
-            )
+            every = 4 if begin == 0.55 else 8
+            ticks = filled.levels[::every] if panel in blocks.CONTOURS else MaxNLocator(3)
+            figure.colorbar(filled, cax=bar, orientation="horizontal", ticks=ticks)
         bar.tick_params(labelsize=0.8 * FONT, width=0.5, length=2.0, labelbottom=False, labeltop=True, bottom=False,
                         top=True, pad=1.0)  # fmt: skip
         unit = blocks.unit_of(shown, shown.range(model))[1]

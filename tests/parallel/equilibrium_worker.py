@@ -1,8 +1,9 @@
 """Static solves of a model with joints, rollers, a hole and stages, on any number of ranks; writes what came out.
 
-python equilibrium_worker.py SOLVER OUT [yields]
+python equilibrium_worker.py RUN...
 
-yields: instead, rock that yields under a stamp, in increments, the second of which softens.
+RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens; one
+after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, rectangle, shaken
+from tests.parallel.model import communicator
 
 NAMES = (
     "stress_xx", "stress_yy", "stress_xy", "stress_zz", "displacement_x", "displacement_y", "velocity_x", "velocity_y",
@@ -26,17 +27,7 @@ NAMES = (
 )  # fmt: skip
 
 
-def communicator():
-    from mpi4py import MPI
-
-    return MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.Get_size() > 1 else SerialComm()
-
-
-def main(solver: str, out: str, yields: str = "") -> None:
-    sim = Blocks(communicator())
-    if yields:
-        stamp(sim, solver, out)
-        return
+def excavation(sim: Blocks, solver: str, out: str) -> None:
     mesh = shaken(rectangle(24, 8, 2.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
@@ -92,4 +83,6 @@ def stamp(sim: Blocks, solver: str, out: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    for run in sys.argv[1:]:
+        solver, _, yields = run.partition("-")
+        (stamp if yields else excavation)(Blocks(communicator()), solver, f"{run}.npz")

@@ -56,13 +56,13 @@ def test_the_linear_law_has_the_bits_of_the_built_in_one(alone):
     built_in, linear = states(alone / "built-in"), states(alone / "linear")
     for name in ("particles/x", "particles/vy", "particles/spin", "particles/fx"):
         assert built_in[name].tobytes() == linear[name].tobytes()
-    assert np.count_nonzero(linear["pairs/fs"]) > 1000
+    assert np.count_nonzero(linear["pairs/fs"]) > 100
 
 
 def test_contacts_remember(alone):
     sticky = states(alone / "sticky")
     stamp, most, age = (sticky[f"pairs/memory{k}"] for k in range(3))
-    assert len(set(stamp.tolist())) == 1 and len(stamp) > 1000
+    assert len(set(stamp.tolist())) == 1 and len(stamp) > 100
     assert (most > 0.0).all() and age.min() < 1.1 < age.max() < 1.0 + 3500 * 2e-4 + 1e-9
     assert states(alone / "linear")["particles/x"].tobytes() != sticky["particles/x"].tobytes()
 
@@ -108,8 +108,9 @@ def test_another_text_does_not_go_on(alone, launch, tmp_path):
     shutil.copy(LAWS, folder)
     done = launch(1, "again.py", "--no-figure", "--outdir", "other", cwd=folder)
     assert done.returncode == 0, done.stderr
-    (folder / "again.py").unlink()
-    done = launch(1, "--resume", "--no-figure", "--outdir", "data", cwd=folder)  # the script out of the checkpoint
+    (folder / "push.py").unlink()
+    (folder / "data" / "run.json").unlink()
+    done = launch(1, "resume", "data", "--no-figure", cwd=folder)  # the script out of the checkpoint
     assert done.returncode != 0 and "a law of the user is executed, and this script was taken from a" in done.stderr
 
 
@@ -119,5 +120,5 @@ def test_a_wrong_law_stops_before_the_first_line(launch, tmp_path):
     (tmp_path / "push.py").write_text(PUSH.replace("LAW", WORDS["linear"]))
     done = launch(1, "push.py", "--no-figure", cwd=tmp_path)
     assert done.returncode != 0
-    assert "push.py:5: PROP: pairs.py:7: the law must return 2 numbers (fn, fs), it returns float64" in done.stderr
+    assert "push.py:5: PROP: pairs.py:6: the law must return 2 numbers (fn, fs), it returns float64" in done.stderr
     assert not (tmp_path / "data").exists() or not list((tmp_path / "data").glob("*.vtkhdf"))

@@ -1,4 +1,5 @@
-"""Laws of the user at rest and in motion: the same bits on any number of ranks and threads, and across a restart."""
+"""Scripts with laws of the user on several ranks: they are compiled once, named again after a restart, and wrong ones
+stop all. The same bits on any ranks: test_models.py."""
 
 from __future__ import annotations
 
@@ -6,47 +7,9 @@ import shutil
 import uuid
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.parallel import workers
-from tests.parallel.workers import equal
-
-WORKER = Path(__file__).resolve().parent.parent / "blocks" / "worker.py"
-LAWS = WORKER.with_name("laws")
-STEPS = 900
-SLOW = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """The run on one rank with one thread, with a checkpoint from the middle of it."""
-    return workers.alone(WORKER, "obeying", STEPS, 701, tmp_path_factory.mktemp("obeying"))
-
-
-def test_much_happens(folder):
-    with np.load(folder / "alone.npz") as found:
-        assert found["counts"][2] > 10 and found["about"][0] > 5  # joints that broke; rebuilds
-        slip = found["law_slip"]
-        assert np.isnan(slip).sum() == 22 and (slip > 1e-5).sum() > 20 and (slip == 0.0).sum() > 3
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize(
-    "ranks, threads", [(4, 1), (1, 2), pytest.param(2, 1, marks=SLOW), pytest.param(2, 2, marks=SLOW)]
-)
-def test_ranks_and_threads_do_not_change_a_bit(folder, launch, ranks, threads):
-    out = equal(launch, WORKER, "obeying", STEPS, folder, ranks, threads)
-    if ranks > 1:
-        with np.load(out) as found:
-            assert found["about"][3] > 3  # elements that came from another rank, with their states
-
-
-@pytest.mark.mpi
-@pytest.mark.parametrize("ranks, threads", [(2, 1), pytest.param(4, 1, marks=SLOW), (1, 2)])
-def test_a_restart_does_not_change_a_bit(folder, launch, ranks, threads):
-    equal(launch, WORKER, "obeying", STEPS, folder, ranks, threads, "resume", "middle.sav")
-
+LAWS = Path(__file__).resolve().parent.parent / "blocks" / "laws"
 
 SCRIPT = """
 pcdc mesh structured (0,0) (2,1) cells 8 4 diagonal alternate

@@ -60,7 +60,7 @@ EXCLUDING = {
     "model time-step": ("value", "mass-scaling"), "model solve": ("time", "elastic", "cycles", "solver", "steps"),
     "history create": ("id", "nearest", "mean", "minimum", "sum", "variable"),
     "bolt create polyline": ("length",), "flow-node initial": ("saturation",),
-    "chart add": ("values",), "field create": ("weibull", "lognormal"), "output vtk": ("off",),
+    "chart add": ("values", "x", "y"), "field create": ("weibull", "lognormal"), "output vtk": ("off",),
 }  # fmt: skip
 """Keywords that do not go with the others of their command."""
 

@@ -215,7 +215,7 @@ REFUSED = [
     ("history create 'h' node value reaction-y range boundary", "needs sum, mean, minimum or maximum"),
     ("history create 'h' node value reaction-y sum id 3", "sum goes with range"),
     ("history create 'h' model value time id 3", "a history of the model takes no id"),
-    ("chart add 'c'", "a curve has either y, the name of a history, or values"),
+    ("chart add 'c'", "a curve has either y, the name of a history, or values or profile, got none"),
     ("chart add 'c' values (0,0) scale-x 2", "scale-x goes with histories"),
     ("model time-step auto on value 1e-6", "exclude each other"),
 ]  # fmt: skip

@@ -228,7 +228,7 @@ class TestPictures:
         state = state_of(strip())
         assert blocks.panels_of(state) == ("cracks", "stress")
         state.of_elements["plastic_shear_strain"] = np.where(np.arange(12) < 6, 0.0, 0.02)
-        assert blocks.panels_of(state) == blocks.PANELS and blocks.plastic_range(state) == (0.0, 0.02)
+        assert blocks.panels_of(state) == ("cracks", "stress", "plastic") and blocks.plastic_range(state) == (0.0, 0.02)
         assert len(blocks.draw(state).axes) == 5  # three panels, two of them with a bar of colours
         looks = blocks.Looks(panels=("plastic",), dpi=100)
         seen = self.pixels(blocks.plot(state, tmp_path / "a.png", looks, View(0.0, 6.0, 0.0, 1.0)))

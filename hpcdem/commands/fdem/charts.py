@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from hpcdem.commands.fdem import frames, histories
+from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.histories import find
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.files import write_sections
+from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.network import path as path_of
 
 FIGURES = (".png", ".pdf", ".svg")
 
@@ -31,12 +37,46 @@ def add(
     values: Sequence[tuple[float, float]] = (),
     label: str = "",
     style: str = "line",
+    profile: str = "",
+    where: Range | None = None,
 ) -> None:
-    """One more curve: history y against history x (or time), or points."""
+    """One more curve: history y against history x (or time), or points, or what fluid has at this moment along the line
+    of channels that a range chooses, over the distance from its left end (profile: a quantity of channels). Collective.
+    """
     chart = _chart(project, name)
+    if profile:
+        values, label = _profile(project, profile, where), label or profile.replace("_", " ")
+        values = [(scale_x * s, scale_y * value) for s, value in values]
     for history in filter(None, (x, y)):
         find(project, history)
     chart.curves.append(Curve(label or y or "points", x, y, scale_x, scale_y, list(values), style))
+
+
+def _profile(project: Project, name: str, where: Range | None) -> list[tuple[float, float]]:
+    """(distance [m], value) along channels: pressure and saturation of their nodes, else of their middles."""
+    channels = everything(project, CHANNEL, where)
+    flow, at = Flow.of(project.blocks), project.positions()
+    network = flow.network
+    found = path_of(network.ends[np.searchsorted(network.channels, channels)])
+    if found is None:
+        raise CommandError(
+            f"a profile is along one line with two ends; the {len(channels)} channels of the range make none"
+        )
+    order, points = found
+    if tuple(at[points[-1]]) < tuple(at[points[0]]):
+        order, points = order[::-1], points[::-1]
+    s = np.append(0.0, np.cumsum(np.hypot(*np.diff(at[points], axis=0).T)))
+    if name in ("pressure", "saturation"):
+        values = _by_number(flow.values(FLOW_NODE, name, np.sort(points)), points)
+    else:
+        s = 0.5 * (s[1:] + s[:-1])
+        values = np.abs(flow.values(CHANNEL, name, channels)[order])
+    return list(zip(s.tolist(), values.tolist(), strict=True))
+
+
+def _by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Values in ascending order of these numbers, in their order."""
+    return values[np.argsort(np.argsort(numbers))]
 
 
 def figure_name(path: str) -> None:
@@ -45,16 +85,21 @@ def figure_name(path: str) -> None:
         raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
 
 
-def export(project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False) -> None:
+def export(
+    project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False, fluid: str = ""
+) -> None:
     """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
-    row per point. cracks, plastic: the figure also shows the model at this moment, with the one or the other.
-    Collective."""
+    row per point. cracks, plastic, fluid (pressure, saturation, aperture or velocity): the figure also shows the model
+    at this moment, with one of them. Collective."""
     from hpcdem.post.charts import draw
 
     chart, figure = _chart(project, name), project.result(path)
     figure_name(path)
-    if cracks and plastic:
-        raise CommandError("cracks and plastic: beside a diagram there is room for one of them")
+    beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, fluid) if panel]
+    if len(beside) > 1:
+        raise CommandError("cracks, plastic and fluid: beside a diagram there is room for one of them")
+    if fluid and Flow.there(project.ready(use=False)) is None:
+        raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]
     if not any(points for _, _, points in curves):
         raise CommandError(f"chart '{name}' has no points yet")
@@ -65,14 +110,14 @@ def export(project: Project, name: str, path: str, cracks: bool = False, plastic
         project.to_write(file)
     project.folder()
     write_sections(figure.with_suffix(".csv"), project.comm, lambda: [text.encode()])
-    if cracks or plastic:
+    if beside:
         project.ready(use=False)
-    model = frames.whole(project) if cracks or plastic else None
+    model = frames.whole(project) if beside else None
 
     def picture() -> None:
         with atomic_path(figure) as temporary:
             draw(Path(temporary), figure.suffix[1:].lower(), chart.title, _x_label(project, chart),
-                 _y_label(project, chart), curves, model, plastic)  # fmt: skip
+                 _y_label(project, chart), curves, model, *beside)  # fmt: skip
 
     on_first(project.comm, picture)
 

@@ -276,6 +276,13 @@ def _solve(call: Call) -> None:
         fdem.steps.solve(call.project, **call.given())
 
 
+def _curve(call: Call) -> None:
+    given = call.given()
+    if "profile" in given:
+        given["profile"] = python(given["profile"])
+    fdem.charts.add(call.project, **given, where=call.where)
+
+
 def _output(call: Call) -> None:
     if "off" in call.arguments:
         fdem.frames.stop(call.project, call["file"])
@@ -360,9 +367,9 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "history delete": lambda c: fdem.histories.delete(c.project, c["name"]),
     "history export": lambda c: fdem.histories.export(c.project, c["file"], c.get("names", ())),
     "chart create": lambda c: fdem.charts.create(c.project, **c.given()),
-    "chart add": lambda c: fdem.charts.add(c.project, **c.given()),
+    "chart add": _curve,
     "chart export": lambda c: fdem.charts.export(
-        c.project, c["name"], c["file"], "cracks" in c.arguments, "plastic" in c.arguments
+        c.project, c["name"], c["file"], "cracks" in c.arguments, "plastic" in c.arguments, c.get("fluid", "")
     ),
     "output vtk": _output,
 }

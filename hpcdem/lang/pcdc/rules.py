@@ -52,10 +52,18 @@ def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if ("values" in arguments) == ("y" in arguments):
-        raise ValueError("a curve has either y, the name of a history, or values")
-    if "values" in arguments and (wrong := [w for w in ("x", "scale-x", "scale-y") if w in arguments]):
+    given = [word for word in ("values", "y", "profile") if word in arguments]
+    if len(given) != 1:
+        raise ValueError(
+            f"a curve has either y, the name of a history, or values or profile, got {' and '.join(given) or 'none'}"
+        )
+    (word,) = given
+    if word == "values" and (wrong := [w for w in ("x", "scale-x", "scale-y") if w in arguments]):
         raise ValueError(f"{wrong[0]} goes with histories, not with values")
+    if word == "profile" and "x" in arguments:
+        raise ValueError("x goes with histories, not with profile")
+    if terms is not None and word != "profile":
+        raise ValueError("range goes with profile: it says along which joints")
 
 
 def _dimensions(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:

@@ -47,6 +47,27 @@ def at_nodes(ends: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return begin, channel[order], side[order]
 
 
+def path(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Channels (m,) with these ends (m, 2) in the order of the line that they make, and its points (m + 1,), from the
+    free end of the lower number on; None if they make no single line with two free ends."""
+    beside: dict[int, list[int]] = {}
+    for channel, pair in enumerate(ends.tolist()):
+        for point in pair:
+            beside.setdefault(point, []).append(channel)
+    free = [point for point, channels in beside.items() if len(channels) == 1]
+    if len(free) != 2 or max(map(len, beside.values())) > 2:
+        return None
+    order: list[int] = []
+    points = [min(free)]
+    while len(order) < len(ends):
+        ways = [channel for channel in beside[points[-1]] if not order or channel != order[-1]]
+        if not ways:
+            return None  # the rest is closed in itself
+        order.append(ways[0])
+        points.append(int(ends[ways[0]].sum()) - points[-1])
+    return np.array(order), np.array(points)
+
+
 def wet_faces(
     cells: np.ndarray,
     partner: np.ndarray,

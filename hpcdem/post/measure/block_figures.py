@@ -1,4 +1,4 @@
-"""The figures of cracks, fragments and emission of blocks."""
+"""The figures of cracks, fragments, fluid and emission of blocks."""
 
 from __future__ import annotations
 
@@ -241,6 +241,53 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
     blocks.lines(ax, state.points[state.joints[broken]], INK, 0.5 * blocks.line_width(state, sheet.scale))
     _letters([a, b, ax])
     return sheet.figure
+
+
+# --- fluid -------------------------------------------------------------------------------------------------------
+
+
+def fluid(parts: Sequence[Part], state: MeshState) -> Any:
+    """Wet length, and largest pressure and aperture over time; below, the pressure in the last frame."""
+    from hpcdem.post import fluid as pictures
+
+    sheet = _Maps(state, [3.8, 3.8], [GAP, LOWER_GAP], 1, right=1.6)
+    a, b = sheet.panels
+    at, axis = when(parts)
+    some = [one.fluid for one in parts if one.fluid is not None]
+    size, unit = length_unit(max(max(f.length for f in some), 1e-12))
+    a.plot(at, [f.length / size for f in some], _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="wet")
+    a.plot(at, [f.open_length / size for f in some], "--", lw=1.0, color=INK, label="of it open")
+    label(a, None, f"length of channels ({unit})")
+    key(a, loc="upper left")
+    pressure, kind = _in_unit([f.pressure for f in some], pictures.PRESSURES)
+    b.plot(at, pressure, _marks(len(at)), ms=2.5, lw=1.2, color=INK)
+    label(b, axis, f"largest pressure ({kind})")
+    aperture, kind = _in_unit([f.aperture for f in some], pictures.LENGTHS)
+    other = b.twinx()
+    other.plot(at, aperture, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[1])
+    other.set_ylabel(f"largest aperture ({kind})", fontsize=plots.FONT, color=LINES[1])
+    other.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0, colors=LINES[1])
+    for ax in (a, b):
+        _plain(ax)
+        ax.set_xlim(*_ends(at))
+    for ax in (a, b, other):
+        ax.set_ylim(bottom=0.0)
+    shown = pictures.PICTURES["pressure"]
+    span = shown.range(state)
+    drawn = blocks.coloured(sheet.maps[0], state, "pressure", span, sheet.scale)
+    bar = sheet.figure.colorbar(drawn, cax=sheet.bar())
+    bar.set_label(f"{shown.title} ({blocks.unit_of(shown, span)[1]})", fontsize=plots.FONT)
+    bar.ax.tick_params(labelsize=plots.FONT - 1.0, width=0.5, length=2.5)
+    bar.outline.set_linewidth(0.5)
+    _letters([a, b, sheet.maps[0]])
+    return sheet.figure
+
+
+def _in_unit(values: Sequence[float], units: Sequence[tuple[float, str]]) -> tuple[list[float], str]:
+    """Values in the unit in which they are read best, and its name."""
+    most = max(map(abs, values))
+    size, name = next(((size, name) for size, name in units if most >= size), units[-1])
+    return [value / size for value in values], name
 
 
 # --- emission ----------------------------------------------------------------------------------------------------

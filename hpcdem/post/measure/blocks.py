@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post.blocks import BROKEN, FREE, YIELDED
+from hpcdem.post.fluid import WET
 from hpcdem.post.measure import emission
 from hpcdem.post.measure.emission import BIN, MODES, Curve, Events, Fit
 from hpcdem.post.measure.kinds import NAN, Sheet
@@ -76,6 +77,22 @@ class Cracks:
 
 
 @dataclass(frozen=True)
+class Fluid:
+    """Fluid in the channels of a frame: how many there are, how many are wet (saturation from one half on); lengths of
+    wet ones, and of wet ones whose joint is broken or was open from the beginning [m]; volume of fluid as it is
+    [m3/m]; largest pressure [Pa], aperture [m] and velocity [m/s]."""
+
+    channels: int
+    wet: int
+    length: float
+    open_length: float
+    volume: float
+    pressure: float
+    aperture: float
+    velocity: float
+
+
+@dataclass(frozen=True)
 class Part:
     """What is taken from a frame."""
 
@@ -83,6 +100,7 @@ class Part:
     time: float
     cracks: Cracks
     pieces: Pieces | None
+    fluid: Fluid | None
 
 
 def frames(request: Request) -> list[FrameFile]:
@@ -102,7 +120,8 @@ def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
     """Joints, and fragments if they are asked for, of a frame."""
     wanted = chosen(state, request)
     pieces = fragments(state, wanted) if "fragments" in what else None
-    return Part(state.step, state.time, cracks(state, wanted), pieces)
+    fluid = fluid_of(state, wanted) if "fluid" in what else None
+    return Part(state.step, state.time, cracks(state, wanted), pieces, fluid)
 
 
 def chosen(state: MeshState, request: Request) -> np.ndarray:
@@ -123,12 +142,7 @@ def chosen(state: MeshState, request: Request) -> np.ndarray:
 def cracks(state: MeshState, wanted: np.ndarray) -> Cracks:
     """Joints between elements that are wanted (ne,)."""
     j = state.of_joints
-    keep = np.ones(len(state.joints), bool)
-    if not wanted.all():
-        lower, upper = sides(state)
-        there = np.append(wanted, True)  # the last: what was taken out
-        keep = there[lower] & there[upper]
-    keep &= j["state"] != FREE
+    keep = _between(state, wanted) & (j["state"] != FREE)
     now, length, damage = j["state"][keep], j["length"][keep], np.nan_to_num(j["damage"][keep])
     broken = now == BROKEN
     kind = np.searchsorted(emission.LIMITS, j["mode"][keep][broken], side="right")
@@ -140,6 +154,42 @@ def cracks(state: MeshState, wanted: np.ndarray) -> Cracks:
         float((length * damage).sum()) / total if total > 0.0 else 0.0, float(state.of_elements["area"][wanted].sum()),
         math.fsum(energy),
     )  # fmt: skip
+
+
+def _between(state: MeshState, wanted: np.ndarray) -> np.ndarray:
+    """(nj,) joints between elements that are wanted (ne,)."""
+    if wanted.all():
+        return np.ones(len(state.joints), bool)
+    lower, upper = sides(state)
+    there = np.append(wanted, True)  # the last: what was taken out
+    return there[lower] & there[upper]
+
+
+def channels(state: MeshState, wanted: np.ndarray) -> np.ndarray:
+    """Rows of the joints that are channels between elements that are wanted (ne,)."""
+    aperture = state.of_joints.get("aperture", np.full(len(state.joints), np.nan))
+    return np.flatnonzero(np.isfinite(aperture) & _between(state, wanted))
+
+
+def fluid_of(state: MeshState, wanted: np.ndarray) -> Fluid:
+    """What is in the channels between elements that are wanted (ne,)."""
+    rows = channels(state, wanted)
+    if not len(rows):
+        return Fluid(0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    j = {name: values[rows] for name, values in state.of_joints.items()}
+    length = _lengths(state)[rows]
+    wet = j["saturation"] >= WET
+    gone = wet & ((j["state"] == BROKEN) | (j["state"] == FREE))
+    volume = math.fsum((j["saturation"] * j["aperture"] * length).tolist())
+    return Fluid(
+        len(rows), int(wet.sum()), math.fsum(length[wet].tolist()), math.fsum(length[gone].tolist()), volume,
+        float(j["fluid_pressure"].max()), float(j["aperture"].max()), float(np.abs(j["fluid_velocity"]).max()),
+    )  # fmt: skip
+
+
+def _lengths(state: MeshState) -> np.ndarray:
+    """(nj,) of joints as they are [m]."""
+    return np.hypot(*np.diff(state.points[state.joints], axis=1)[:, 0].T)
 
 
 def _pairs(state: MeshState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -259,6 +309,25 @@ def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
     each = ((k, *row) for k, row in enumerate(zip(*(c.tolist() for c in columns), strict=True), 1))
     names = ("fragment", "elements", "area[m2]", "size[m]", "passing", "x[m]", "y[m]")
     return [Sheet("fragments", head, rows()), Sheet("fragments_last", names, each)]
+
+
+def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
+    """Over time, and each channel of a frame, the last one."""
+    head = (
+        *HEAD, "channels", "wet", "wet_length[m]", "open_wet_length[m]", "volume[m3/m]", "pressure[Pa]", "aperture[m]",
+        "velocity[m/s]",
+    )  # fmt: skip
+    some = [(one, one.fluid) for one in parts if one.fluid is not None]
+    rows = ((one.step, one.time, *astuple(fluid)) for one, fluid in some)
+    names = ("joint", "x[m]", "y[m]", "length[m]", "state", "pressure[Pa]", "saturation", "aperture[m]",
+             "flow_rate[m2/s]", "velocity[m/s]")  # fmt: skip
+    at = channels(state, wanted)
+    j, middle = state.of_joints, state.points[state.joints[at]].mean(axis=1)
+    given = (j[name][at] for name in ("state", "fluid_pressure", "saturation", "aperture", "flow_rate",
+                                      "fluid_velocity"))  # fmt: skip
+    columns = (j["number"][at].astype(np.int64), *middle.T, _lengths(state)[at], *given)
+    each = zip(*(c.tolist() for c in columns), strict=True)
+    return [Sheet("fluid", head, rows), Sheet("fluid_last", names, each)]
 
 
 @dataclass(frozen=True)

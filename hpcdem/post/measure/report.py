@@ -16,6 +16,7 @@ from hpcdem.core.fields import sides_of_box
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames
+from hpcdem.post import fluid
 from hpcdem.post.measure import block_figures, blocks, cracks, emission, figures, kinds
 from hpcdem.post.measure import walls as curves
 from hpcdem.post.measure.grains import Grains
@@ -163,7 +164,9 @@ def _of_blocks(request: Request) -> list[str]:
     """What can be measured of blocks in the folder, of what is asked for. Raises HpcdemError where a word asks for
     blocks, and there are none."""
     frames = blocks.frames(request)
-    there = {"cracks": bool(frames), "fragments": bool(frames)}
+    there = dict.fromkeys(("cracks", "fragments", "fluid"), bool(frames))
+    if frames and "fluid" not in request.what:
+        there["fluid"] = fluid.there(blocks.read(frames[-1], request))
     there["emission"] = bool(frames) or (request.folder / emission.TABLE).is_file()
     for kind in request.what:
         if kind in BLOCK_KINDS and kind not in KINDS and not there[kind]:
@@ -185,7 +188,7 @@ def _blocks(comm: Any, log: Any, request: Request, what: Sequence[str]) -> list[
         others = on_first(comm, lambda: "" if list_frames(request.folder) else left_out(request.folder))
         if others:
             log.warn(others)
-    n = len(files) if {"cracks", "fragments"} & set(what) else 0
+    n = len(files) if {"cracks", "fragments", "fluid"} & set(what) else 0
     mine, error = [], None
     try:
         for file in files[n * comm.rank // comm.size : n * (comm.rank + 1) // comm.size]:
@@ -215,6 +218,12 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
         found = blocks.emitted(request, files)
         sheets = blocks.emission_sheets(found)
         draw = lambda: block_figures.emitted(found)  # noqa: E731
+    elif kind == "fluid":
+        if not any(part.fluid is not None and part.fluid.channels for part in parts):
+            raise _NothingThere(f"fluid: the blocks in {request.folder} have no channels")
+        last = blocks.read(files[-1], request)
+        sheets = blocks.fluid_sheets(parts, last, blocks.chosen(last, request))
+        draw = lambda: block_figures.fluid(parts, last)  # noqa: E731
     else:
         if kind == "cracks" and not parts[-1].cracks.joints:
             raise _NothingThere(f"cracks: the blocks in {request.folder} have no joints")

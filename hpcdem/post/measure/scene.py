@@ -26,7 +26,7 @@ from hpcdem.post.measure.grains import (
 
 KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks")
 """What can be measured of particles, by its word on the command line."""
-BLOCK_KINDS = ("cracks", "fragments", "emission")
+BLOCK_KINDS = ("cracks", "fragments", "emission", "fluid")
 """What can be measured of blocks."""
 
 

@@ -1,23 +1,19 @@
-"""Runs bolted blocks, on any number of ranks and threads, and writes what became of them.
-
-python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
-"""
+"""Bolts that are pulled apart, excavated, installed in mid-run: models for tests/parallel/test_models.py."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
+from hpcdem.physics.bolts import kernels
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
-from tests.blocks.worker import COHESIVE, WEAK, communicator
 from tests.bolts.support import STEEL, state
+from tests.parallel.model import Found, Model
 
 WEAKER = {
     **STEEL, "tensile_yield_force": 4e3, "tension_failure_strain": 2e-3, "friction_rock_grout": 25.0,
@@ -77,21 +73,8 @@ def excavate(sim: Blocks) -> None:
         sim.option(dynamic=True)
 
 
-KINDS = {"breaking": (breaking, more), "relaxing": (relaxing, excavate)}
-
-
-def main() -> None:
-    kind, threads, steps, out, *rest = sys.argv[1:]
-    sim = Blocks(communicator(), int(threads))
-    if rest[:1] == ["resume"]:
-        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
-    else:
-        KINDS[kind][0](sim)
-    while sim.clock.step < int(steps):
-        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
-            saved_state.save(sim, rest[1], {"kind": kind})
-        KINDS[kind][1](sim)
-        convergence.advance(sim, 1)
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx", "damage")}
     found.update(state(Bolts.of(sim)))
     found["counts"] = np.array(diagnostics.joint_counts(sim))
@@ -99,10 +82,27 @@ def main() -> None:
     if sim.budget is not None:
         found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
         found.update({f"bolts_{name}": np.array(value) for name, value in Bolts.of(sim).energies().items()})
-    found["about"] = np.array([sim.rebuilds])
-    if sim.comm.rank == 0:
-        np.savez(out, **found)
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def grout_slips(found: Found) -> None:
+    grout, host = found["node_bond_state"], found["node_host"]
+    assert (host < 0).sum() >= 3 and (grout & kernels.SLIPPED).sum() > 10
+    assert np.abs(found["element_force"]).max() > 100.0
+
+
+def bars_rupture(found: Found) -> None:
+    grout_slips(found)
+    bars = found["element_state"]
+    assert (bars & kernels.RUPTURED).any() and (bars & kernels.WAS_IN_TENSION).sum() > 10
+    assert not (bars & kernels.RUPTURED).all() and found["counts"][2] > 20
+    assert found["energy_relative"] < 0.01 and found["bolts_relative"] < 0.01
+    assert found["bolts_lost_in_bars"] > 1.0 and found["bolts_lost_in_grout"] > 1.0
+    assert found["bolts_work_on_rock"] == found["energy_work_bolts"] > 50.0
+
+
+# Checkpoints after rupture, excavation, and the change to motion.
+MODELS = {
+    "bolts torn": Model(breaking, result, bars_rupture, more, steps=1400, middle=1101),
+    "bolts at rest": Model(relaxing, result, grout_slips, excavate, steps=1400, middle=1101),
+}

@@ -1,24 +1,19 @@
-"""Runs wet blocks, on any number of ranks and threads, and writes what became of them.
-
-python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
-"""
+"""Fluid that tears a block apart, and water that seeps: models for tests/parallel/test_models.py."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
+from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
-from tests.blocks.worker import COHESIVE, WEAK, communicator
 from tests.flow.support import WATER, inner
+from tests.parallel.model import Found, Model
 
 LEAKS = {
     "leak_off": 1.0, "matrix_permeability": 1e-14, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9,
@@ -78,21 +73,8 @@ def move(sim: Blocks) -> None:
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
 
 
-KINDS = {"bursting": (bursting, more), "seeping": (seeping, move)}
-
-
-def main() -> None:
-    kind, threads, steps, out, *rest = sys.argv[1:]
-    sim = Blocks(communicator(), int(threads))
-    if rest[:1] == ["resume"]:
-        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
-    else:
-        KINDS[kind][0](sim)
-    while sim.clock.step < int(steps):
-        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
-            saved_state.save(sim, rest[1], {"kind": kind})
-        KINDS[kind][1](sim)
-        convergence.advance(sim, 1)
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx")}
     flow = Flow.of(sim)
     for on in ("flow-node", "flow-channel"):
@@ -106,10 +88,24 @@ def main() -> None:
     found.update({f"account_{name}": np.array(value) for name, value in flow.account().items()})
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["clock"] = np.array([flow.time, flow.dt, flow.sub_steps, flow.cycles, sim.clock.time])
-    found["about"] = np.array([sim.rebuilds])
-    if sim.comm.rank == 0:
-        np.savez(out, **found)
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def water_moves(found: Found) -> None:
+    wet = found["flow-node_saturation"]
+    assert (wet == 1.0).sum() > 10 and ((wet > 0.0) & (wet < 1.0)).sum() > 5
+    assert found["flow-node_pressure"].max() > 1e3
+    assert found["account_relative"] < 1e-11 and found["account_stored"] > 0.0
+
+
+def water_bursts(found: Found) -> None:
+    water_moves(found)
+    assert found["counts"][2] > 20 and found["account_leaked"] > 0.0 and found["account_removed"] > 0.0
+    assert np.ptp(found["flow-channel_aperture"]) > 1e-3
+
+
+# Checkpoints after excavation and a change of channels.
+MODELS = {
+    "bursting": Model(bursting, result, water_bursts, more, steps=1100, middle=703),
+    "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703),
+}

@@ -1,23 +1,19 @@
-"""Runs lined blocks, on any number of ranks and threads, and writes what became of them.
-
-python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
-"""
+"""Liners that are torn apart, excavated, put on and deleted in mid-run: models for tests/parallel/test_models.py."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.liners import kernels
 from hpcdem.physics.liners.model import Liners
+from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, near, rectangle, shaken
-from tests.blocks.worker import COHESIVE, WEAK, communicator
 from tests.liners.support import SHOTCRETE, state
+from tests.parallel.model import Found, Model
 
 WEAKER = {
     **SHOTCRETE, "young": 2e9, "thickness": 0.02, "tensile_strength": 3e5, "compressive_strength": 2e6,
@@ -76,21 +72,8 @@ def excavate(sim: Blocks) -> None:
         sim.option(dynamic=True)
 
 
-KINDS = {"breaking": (breaking, more), "relaxing": (relaxing, excavate)}
-
-
-def main() -> None:
-    kind, threads, steps, out, *rest = sys.argv[1:]
-    sim = Blocks(communicator(), int(threads))
-    if rest[:1] == ["resume"]:
-        assert saved_state.restore(sim, rest[1]) == {"kind": kind}
-    else:
-        KINDS[kind][0](sim)
-    while sim.clock.step < int(steps):
-        if len(rest) == 2 and rest[0] != "resume" and sim.clock.step == int(rest[0]):
-            saved_state.save(sim, rest[1], {"kind": kind})
-        KINDS[kind][1](sim)
-        convergence.advance(sim, 1)
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx", "damage")}
     found.update(state(Liners.of(sim)))
     found["counts"] = np.array(diagnostics.joint_counts(sim))
@@ -98,10 +81,27 @@ def main() -> None:
     if sim.budget is not None:
         found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
         found.update({f"liners_{name}": np.array(value) for name, value in Liners.of(sim).energies().items()})
-    found["about"] = np.array([sim.rebuilds])
-    if sim.comm.rank == 0:
-        np.savez(out, **found)
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def liners_yield_and_part(found: Found) -> None:
+    bond = found["element_bond_state"]
+    assert (found["element_host"] < 0).sum() >= 3
+    assert (bond & kernels.SLIPPED > 0).sum() > 5 and (bond & kernels.PARTED > 0).sum() > 2
+    assert np.abs(found["element_force"]).max(axis=0).min() > 0.1
+    assert (found["element_state"] & kernels.HAS_YIELDED > 0).any()
+
+
+def liners_are_torn(found: Found) -> None:
+    liners_yield_and_part(found)
+    assert found["counts"][2] > 20
+    assert found["energy_relative"] < 0.01 and found["liners_relative"] < 0.01
+    assert found["liners_lost_in_beams"] > 1.0 and found["liners_lost_in_bond"] > 0.1
+    assert found["liners_work_on_rock"] == found["energy_work_liners"] != 0.0
+
+
+# Checkpoints after excavation and deletion, and the change to motion.
+MODELS = {
+    "liners torn": Model(breaking, result, liners_are_torn, more, steps=1400, middle=1101),
+    "liners at rest": Model(relaxing, result, liners_yield_and_part, excavate, steps=1400, middle=1101),
+}

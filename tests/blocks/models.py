@@ -1,39 +1,21 @@
-"""Runs a model of blocks to which much happens, on any number of ranks and threads, and writes what became of it.
-
-python worker.py KIND THREADS STEPS OUT [SAVE_AT SAVE_PATH | resume SAVE_PATH]
-"""
+"""Blocks that break, slide, yield, creep, fly about and are excavated: models for tests/parallel/test_models.py."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-
-from hpcdem.halo.comm import MpiComm, SerialComm
-from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state, user_functions, user_laws
+from hpcdem.physics.fdem import changes, creep, diagnostics, user_functions, user_laws
 from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.support import JOINT, ROCK, joined, rectangle, shaken
+from tests.parallel.model import Found, Model
 
 COHESIVE = "classic_intrinsic_cohesive_interface"
 WEAK = {**JOINT, "gf1": 20.0, "gf2": 100.0, "tensile_strength": 1.5e6, "cohesion": 5e6}
-
-
-def communicator():
-    from mpi4py import MPI
-
-    return MpiComm(MPI.COMM_WORLD) if MPI.COMM_WORLD.Get_size() > 1 else SerialComm()
-
-
-def make(kind: str, threads: int) -> Blocks:
-    """A model of one of `KINDS`."""
-    sim = empty(kind, threads)
-    KINDS[kind][0](sim)
-    return sim
 
 
 LAWS: dict[str, user_laws.UserLaw] = {}
@@ -41,14 +23,11 @@ FUNCTIONS: dict[str, str] = {}
 """Of laws/rock.py, compiled."""
 
 
-def empty(kind: str, threads: int) -> Blocks:
-    """What flies goes through borders that stay; else they follow the load."""
-    sim = Blocks(communicator(), threads, balance_on=kind != "flight")
-    if kind == "obeying":
-        file = Path(__file__).with_name("laws") / "rock.py"
-        LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("elastic", "tresca")})
-        FUNCTIONS["beat"] = user_functions.load(sim, file, "rock.py:beat")
-    return sim
+def load_laws(sim: Blocks) -> None:
+    """Before the model is made or comes back from a checkpoint."""
+    file = Path(__file__).with_name("laws") / "rock.py"
+    LAWS.update({name: user_laws.load(sim, file, f"rock.py:{name}") for name in ("elastic", "tresca")})
+    FUNCTIONS["beat"] = user_functions.load(sim, file, "rock.py:beat")
 
 
 def impact(sim: Blocks, shape: str = "cross") -> None:
@@ -306,89 +285,90 @@ def shake_more(sim: Blocks) -> None:
         FreeField.create(sim, right)
 
 
-def report_borders(sim: Blocks) -> None:
-    """A long bed, its left third shattered and at rest: how many elements each rank has, and their cost."""
-    sim.take_mesh(rectangle(60, 4, 6.0, 0.4))
-    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.1, "friction": 30.0})
-    sim.joint_model(None, COHESIVE, WEAK)
-    edges = sim.mesh.edges()
-    inner = edges.faces[edges.inner][:, 0]
-    changes.crack(sim, inner[sim.mesh.centroids()[inner // 4, 0] < 2.0])
-    x, y = sim.mesh.points.T
-    sim.velocity_condition(None, vx=0.0)
-    sim.velocity_condition(np.flatnonzero(y < 1e-9), vy=0.0)
-    sim.velocity_condition(np.flatnonzero(y > 0.4 - 1e-9), vy=-0.1)
-    convergence.advance(sim, 200)  # everything touches now, and remembers it
-    sim.open_model()
-    sim.ownership.wanted = True
-    sim.close_model()
-    sim.open_model()
-    # One write: ranks share a pipe, and pieces of lines would mix.
-    print(f"borders {sim.comm.rank} {len(sim.number)} {float(sim._costs().sum())}\n", end="", flush=True)
-
-
-def nothing(sim: Blocks) -> None:
-    """No commands on the way."""
-
-
-KINDS = {"impact": (impact, nothing), "mixed": (mixed, nothing), "flight": (flight, nothing),
-         "yielding": (yielding, yield_more), "obeying": (obeying, obey_more), "opening": (opening, open_up),
-         "backfill": (backfill, fill_up), "creeping": (creeping, creep_more),
-         "shaking": (shaking, shake_more),
-         "borders": (report_borders, nothing)}  # fmt: skip
-
-
-def main() -> None:
-    kind, threads, steps, out, *more = sys.argv[1:]
-    if more[:1] == ["resume"]:
-        sim = empty(kind, int(threads))
-        assert saved_state.restore(sim, more[1]) == {"kind": kind}
-    else:
-        sim = make(kind, int(threads))
-    first = None
-    if kind == "borders":
-        return
-    while sim.clock.step < int(steps):
-        if len(more) == 2 and more[0] != "resume" and sim.clock.step == int(more[0]):
-            saved_state.save(sim, more[1], {"kind": kind})
-        KINDS[kind][1](sim)
-        convergence.advance(sim, 1)
-        first = set(sim.number[sim.owned].tolist()) if first is None else first
-    found = {name: diagnostics.values(sim, name) for name in ("position_x", "position_y", "velocity_x", "velocity_y")}
-    for name in (
-        "stress_xx",
-        "stress_yy",
-        "stress_xy",
-        "state",
-        "damage",
-        "mode",
-        "reaction_y",
-        "displacement_x",
-        "normal_stress_largest",
-        "normal_stress_last",
-        "shear_stress_largest",
-        "shear_stress_first",
-    ):
-        found[name] = diagnostics.values(sim, name)
-    plastic = ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work")
-    for name in (*plastic, *user_laws.quantities(sim)):
-        found[name] = diagnostics.values(sim, name)
-    for name in ("creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work"):
-        found[name] = diagnostics.values(sim, name)
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks, and in `about` rebuilds, late ones, contact pairs, elements that came from
+    another rank."""
+    found = {name: diagnostics.values(sim, name) for name in (*NAMES, *user_laws.quantities(sim))}
     found["creep"] = np.array(list(vars(sim.creep).values()), float)
     found.update({f"event_{name}": values for name, values in diagnostics.events(sim).items()})
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["time"] = np.array([sim.clock.time, sim.clock.dt])
     if sim.budget is not None:
         found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
-    came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - (first or set())))
+    came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - notes["first"]))
     found["about"] = np.array([sim.rebuilds, sim.rebuild_state.late, len(sim.local.pairs), sum(came)])
-    if sim.comm.rank == 0:
-        np.savez(out, **found)
-    print(
-        sim.comm.rank, sim.n_own, sim.rebuilds, sim.rebuild_state.late, diagnostics.joint_counts(sim), came, flush=True
-    )
+    return found
 
 
-if __name__ == "__main__":
-    main()
+NAMES = (
+    "position_x", "position_y", "velocity_x", "velocity_y", "stress_xx", "stress_yy", "stress_xy", "state", "damage",
+    "mode", "reaction_y", "displacement_x", "normal_stress_largest", "normal_stress_last", "shear_stress_largest",
+    "shear_stress_first", "plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work",
+    "creep_strain_xx", "creep_strain_xy", "kelvin_strain_yy", "creep_work",
+)  # fmt: skip
+
+# ---- what must have happened -----------------------------------------------------------------------------------------
+
+
+def much_breaks(found: Found) -> None:
+    intact, yielded, broken = found["counts"]
+    assert broken > 20 and yielded > 5
+    assert found["about"][0] > 5  # rebuilds
+    assert found["about"][2] > 50  # contact pairs
+    assert (np.diff(found["event_step"]) >= 0).all()
+    assert found["energy_relative"] < 0.01
+
+
+def much_yields(found: Found) -> None:
+    much_breaks(found)
+    assert found["energy_plastic_lost"] > 0.05 * found["energy_joints_lost"] > 0.0
+    assert (found["plastic_state"] > 0).sum() > 20 and (found["plastic_state"] == 0).sum() > 3
+
+
+def a_hole_is_made(found: Found) -> None:
+    much_breaks(found)
+    assert np.isnan(found["stress_xx"]).sum() > 5  # elements that were taken out
+
+
+def laws_act(found: Found) -> None:
+    assert found["counts"][2] > 10 and found["about"][0] > 5  # joints that broke; rebuilds
+    slip = found["law_slip"]
+    assert np.isnan(slip).sum() == 22 and (slip > 1e-5).sum() > 20 and (slip == 0.0).sum() > 3
+
+
+def the_fill_carries(found: Found) -> None:
+    stress = found["stress_xx"]
+    assert np.isnan(stress).sum() == 3 and found["energy_relative"] < 1e-3
+    assert found["energy_commands"] != 0.0 and np.nanmax(np.abs(stress)) > 1e5
+
+
+def much_creeps(found: Found) -> None:
+    intact, _, broken = found["counts"]
+    assert broken > 10 and intact > 10
+    steps, times = found["event_step"], found["event_time"]
+    in_creep = (steps > 200) & (steps < 1000)
+    assert in_creep.sum() > 5 and len(set(times[in_creep])) > 2  # at several creep times
+    assert np.abs(found["creep_strain_xx"]).max() > 1e-6
+    assert (found["creep_work"] > 0.0).sum() > 50
+    assert found["energy_creep_lost"] > 0.0 and found["energy_relative"] < 0.01
+
+
+def the_ground_shakes(found: Found) -> None:
+    assert np.hypot(found["velocity_x"], found["velocity_y"]).max() > 0.1
+    assert found["counts"][1] + found["counts"][2] > 5  # joints behind their peak
+    assert found["energy_work_outside"] > 0.0 and found["energy_relative"] < 0.01
+
+
+# Checkpoints: of creep in the middle of a creep step, of the fill between two fillings. What flies goes through borders
+# that stay; else they follow the load.
+MODELS = {
+    "impact": Model(impact, result, much_breaks),
+    "mixed": Model(mixed, result, much_breaks, slow=True),
+    "flight": Model(flight, result, much_breaks, balance=False, come=10),
+    "yielding": Model(yielding, result, much_yields, yield_more, come=10),
+    "obeying": Model(obeying, result, laws_act, obey_more, prepare=load_laws, steps=900, come=3),
+    "opening": Model(opening, result, a_hole_is_made, open_up, slow=True),
+    "backfill": Model(backfill, result, the_fill_carries, fill_up, steps=1100),
+    "creeping": Model(creeping, result, much_creeps, creep_more, steps=1400),
+    "shaking": Model(shaking, result, the_ground_shakes, shake_more, steps=700, middle=401),
+}

@@ -1,0 +1,89 @@
+"""Fluid in pictures of blocks: channels coloured by what is in them, the wider the more they are open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.io.vtkhdf_mesh import MeshState
+
+DRY = "#b9b4aa"
+WET = 0.5
+"""Channels that are less saturated are drawn as dry."""
+PRESSURES = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
+LENGTHS = ((1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"))
+SPEEDS = ((1.0, "m/s"), (1e-3, "mm/s"), (1e-6, "µm/s"), (1e-9, "nm/s"))
+LEAST = 0.3
+"""Width of the narrowest channel, over that of the widest."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A picture of channels. column: of the frame; units: from the largest value to size and name of the unit; dry:
+    also dry channels have a value; colours: of matplotlib, as they stand out from pale rock."""
+
+    column: str
+    units: Sequence[tuple[float, str]]
+    title: str
+    dry: bool
+    colours: str
+
+    def values(self, state: MeshState) -> np.ndarray:
+        """(nj,) of joints, NaN where there is none."""
+        found = np.abs(state.of_joints.get(self.column, np.full(len(state.joints), np.nan)))
+        if not self.dry and there(state):
+            found = np.where(state.of_joints["saturation"] < WET, np.nan, found)
+        return found
+
+    def range(self, state: MeshState) -> tuple[float, float]:
+        """From 0, or the least value where that is not far below the greatest, to the greatest."""
+        values = self.values(state)
+        values = values[np.isfinite(values)]
+        if not len(values):
+            return 0.0, 0.0
+        low, high = float(values.min()), float(values.max())
+        return (low if low > 0.8 * high and high > low else 0.0), high
+
+
+PICTURES = {
+    "pressure": Shown("fluid_pressure", PRESSURES, "pressure of the fluid", False, "YlGnBu"),
+    "saturation": Shown("saturation", ((1.0, "-"),), "saturation", True, "Blues"),
+    "aperture": Shown("aperture", LENGTHS, "aperture", True, "YlOrRd"),
+    "velocity": Shown("fluid_velocity", SPEEDS, "velocity of the fluid", False, "PuRd"),
+}
+"""By the word for each."""
+
+
+def there(state: MeshState) -> bool:
+    """Whether a frame has channels."""
+    return bool(np.isfinite(state.of_joints.get("aperture", np.empty(0))).any())
+
+
+def draw(axes: Any, state: MeshState, shown: Shown, span: tuple[float, float], unit: float, width: float) -> Any:
+    """Draw the channels, colours from ... to ... in this unit; width: of the widest [points]. Returns what the colour
+    bar is made of, None without channels."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    if not there(state):
+        return None
+    from matplotlib import colormaps
+
+    ends, values = state.points[state.joints], shown.values(state)
+    aperture = state.of_joints["aperture"]
+    wide = width * np.clip(aperture / max(float(np.nanmax(aperture)), 1e-300), LEAST, 1.0)
+    dry = np.isfinite(aperture) & ~np.isfinite(values)
+    axes.add_collection(LineCollection(ends[dry], colors=DRY, linewidths=LEAST * width, zorder=2), autolim=False)
+    rows = np.flatnonzero(np.isfinite(values))
+    rows = rows[np.argsort(values[rows], kind="stable")]  # the largest on top
+    colours = LinearSegmentedColormap.from_list(shown.colours, colormaps[shown.colours](np.linspace(0.25, 1.0, 64)))
+    high = max(span[1], span[0] + 1e-12) / unit
+    lines = LineCollection(
+        ends[rows], array=values[rows] / unit, cmap=colours, norm=Normalize(span[0] / unit, high),
+        linewidths=wide[rows], capstyle="round", zorder=3,
+    )  # fmt: skip
+    axes.add_collection(lines, autolim=False)
+    return lines

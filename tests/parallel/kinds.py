@@ -1,0 +1,12 @@
+"""All models that tests/parallel/test_models.py runs, by name."""
+
+from __future__ import annotations
+
+from tests.blocks.models import MODELS as BLOCKS
+from tests.bolts.models import MODELS as BOLTS
+from tests.coupled.models import MODELS as COUPLED
+from tests.flow.models import MODELS as FLOW
+from tests.liners.models import MODELS as LINERS
+from tests.parallel.model import Model
+
+KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | COUPLED
