@@ -52,7 +52,7 @@ from hpcdem.physics.user_files import (
 from hpcdem.runtime import kept
 
 if TYPE_CHECKING:
-    from hpcdem.physics.dem.simulation import Simulation
+    from hpcdem.physics.model import Model
 
 FORCES = ("fn", "fs")
 OVERLAP = 1e-9
@@ -186,7 +186,7 @@ def pair_law(
     )
 
 
-def load(sim: Simulation, path: Path, law: str) -> PairLaw:
+def load(sim: Model, path: Path, law: str) -> PairLaw:
     """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
     text that rank 0 reads. CommandError with file and line. Collective."""
 

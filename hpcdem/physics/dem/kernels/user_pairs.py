@@ -60,8 +60,8 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
 
     @njit(nogil=True, error_model="numpy")
     def pair(e, slots, ihot, row, partner, n_mat):
-        k = slots[e]
-        return offset(ihot[row[k], MATERIAL] * n_mat + ihot[partner[k], MATERIAL], n_columns)
+        k = U(slots[e])
+        return offset(ihot[U(row[k]), MATERIAL] * n_mat + ihot[U(partner[k]), MATERIAL], n_columns)
 
     @njit(nogil=True, error_model="numpy")
     def gather_own(n, slots, ihot, row, partner, n_mat, table, memory, initial, stamp, lanes):
@@ -73,11 +73,12 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
             for k in range(U(0), U(n_columns), U(4)):
                 to = (U(first_column) + k) * U(CAPACITY) + e
                 four_columns(lanes, to, table, (at0 + k, at1 + k, at2 + k, at3 + k))
-        for s in range(n_states):
-            for e in range(n):
-                k = slots[e]
-                value = memory[k, 1 + s] if memory[k, 0] == stamp - 1.0 else initial[s]
-                lanes[U((LANES + s) * CAPACITY + e)] = value
+        if n_states > 0:
+            for e in range(U(n)):
+                k = U(slots[e])
+                lasts = memory[k, 0] == stamp - 1.0
+                for s in range(U(n_states)):
+                    lanes[(U(LANES) + s) * U(CAPACITY) + e] = memory[k, s + U(1)] if lasts else initial[s]
 
     @njit(nogil=True, error_model="numpy")
     def own_lanes(n, lanes, dt):
@@ -128,22 +129,21 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
                 ready, np.int64(0), slots, flat_hot, flat_ihot, row, partner, ibits, bond, u_made, flat_pairs,
                 flat_pairs, False, n_mat, lanes,
             )  # fmt: skip
-            own = 0
+            own = U(0)
             for e in range(U(ready)):
-                own += lanes[MODEL + e] == USER
-            if own > 0:
+                own += U(lanes[MODEL + e] == USER)
+            if own > U(0):
                 gather_own(ready, slots, ihot, row, partner, n_mat, flat_table, memory, initial, stamp, lanes)
-            if own == ready:
+            if own == U(ready):
                 own_lanes(ready, lanes, dt)
             else:
                 mixed_lanes(ready, slots, fs, lanes, dt)
-            for e in range(ready):
-                k = slots[e]
-                u_made[k] = lanes[NORMAL + U(e)]
-                memory[k, 0] = stamp if lanes[MODEL + U(e)] == USER else 0.0
-            for s in range(n_states):
-                for e in range(ready):
-                    memory[slots[e], 1 + s] = lanes[U((LANES + s) * CAPACITY + e)]
+            for e in range(U(ready)):
+                k = U(slots[e])
+                u_made[k] = lanes[NORMAL + e]
+                memory[k, 0] = stamp if lanes[MODEL + e] == USER else 0.0
+                for s in range(U(n_states)):
+                    memory[k, s + U(1)] = lanes[(U(LANES) + s) * U(CAPACITY) + e]
             for r in range((cleared + shift) * FORCE, (far + 1 + shift) * FORCE):
                 flat[r] = 0.0
             cleared = max(cleared, far + 1)
