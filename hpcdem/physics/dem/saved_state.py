@@ -294,7 +294,9 @@ def histories(
     fs, extra (see `Histories`).
     """
     columns = sum(name.startswith(MEMORY) for name in pairs)
-    memory = np.array([pairs[f"{MEMORY}{k}"] for k in range(columns)]).reshape(columns, -1).T
+    memory = np.empty((len(pairs["gid"]), columns))
+    for k in range(columns):
+        memory[:, k] = pairs[f"{MEMORY}{k}"]
     none = np.zeros(len(walls["gid"]), np.int64)
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
     entries = (
