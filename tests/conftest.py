@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,6 +57,7 @@ def mpi_environment() -> dict[str, str]:
     """
     env = dict(os.environ)
     env.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")
+    env.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # tests run side by side: a thread that waits must let go of its core
     if mpiexec() and is_open_mpi():
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT", "1")
         env.setdefault("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
@@ -128,7 +130,7 @@ def needs_manual_scripts(manual_scripts: Path) -> Path:
     return manual_scripts
 
 
-_WATCHES = {"launch_once", "wait_until", "slurm", "serve_page"}
+_WATCHES = {"launch_once", "wait_until", "slurm"}
 """Fixtures of tests that look at a program while it runs: nothing else may keep it waiting."""
 
 _RANKS = {"needs_mpi", "needs_parallel_hdf5"}
@@ -148,6 +150,43 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("alone")
         elif not item.get_closest_marker("alone") and not _RANKS.isdisjoint(item.fixturenames):
             item.add_marker("ranks")
+    shared: dict[Path, set[str]] = {}
+    for item in items:
+        if item.get_closest_marker("ranks"):
+            shared.setdefault(item.path, set()).update(_made_once(item))
+    for item in items:  # what is made once for a file is made in one of the two runs of pytest, not in both
+        if not item.get_closest_marker("alone") and not shared.get(item.path, set()).isdisjoint(_made_once(item)):
+            item.add_marker("ranks")
+
+    if GREEN.is_file():
+        passed = set(GREEN.read_text().splitlines())
+        items[:] = [item for item in items if item.nodeid not in passed]
+
+
+def _made_once(item: pytest.Item) -> set[str]:
+    """Fixtures of a test that are made once for its file."""
+    found = item._fixtureinfo.name2fixturedefs if isinstance(item, pytest.Function) else {}
+    return {name for name, fixtures in found.items() if fixtures[-1].scope == "module"}
+
+
+# --- tests that go on after a break: scripts/test --go-on --------------------------------------------------------
+
+GREEN = Path(os.environ.get("HPCDEM_TEST_GREEN", os.devnull))
+"""The tests that have passed before; they are left out."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_report_teststatus(report: pytest.TestReport) -> None:
+    """Note what has passed, in the process that tells of all tests."""
+    if report.when == "call" and report.passed:
+        with GREEN.open("a") as file:
+            file.write(f"{report.nodeid}\n")
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Nothing left to do is no failure then."""
+    if GREEN.is_file() and exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED:
+        session.exitstatus = pytest.ExitCode.OK
 
 
 # --- starting the program --------------------------------------------------------------------------------------
@@ -270,6 +309,16 @@ def launch() -> Iterator[Launcher]:
     for process in launcher.started:
         end(process)
         process.communicate()
+
+
+@pytest.fixture(scope="session")
+def resident() -> Iterator[Any]:
+    """`resident(n, "script.py", cwd=tmp_path)` does what `launch` does, without a start of processes for each run."""
+    from tests.property.workers import Resident
+
+    programs = Resident()
+    yield programs
+    programs.stop()
 
 
 @pytest.fixture

@@ -577,6 +577,39 @@ class Channels(Objects):
 
 
 @commands
+class Wells(Words):
+    """Wells: `sim.wells["injection"]` is what one has now: pressure [Pa], rate [m2/s], injected [m2], stage."""
+
+    _word = "wells"
+
+    def __getitem__(self, name: str) -> dict[str, float]:
+        found = fdem.queries.wells(self._do.project())
+        if name not in found:
+            known = ", ".join(f"'{other}'" for other in found) or "none so far"
+            raise CommandError(f"there is no well '{name}'; there is {known}")
+        return found[name]
+
+    def create(self, name: str, *, where: Where = None) -> None:
+        """Flow nodes of a range of nodes are a well, which is shut in."""
+        self._do("well create", {"name": name}, where, g.NODE)
+
+    def stage(
+        self,
+        name: str,
+        *,
+        rate: Number | None = None,
+        pressure: Number | None = None,
+        shut_in: bool = False,
+        time: float | None = None,
+        limit: float | None = None,
+    ) -> None:
+        """One more stage: rate [m2/s] up to a pressure (limit [Pa]), pressure [Pa], or shut in; numbers or names of
+        tables over the time of flow; time [s] that it takes, None: no end."""
+        given = {"name": name, "rate": rate, "pressure": pressure, "shut_in": shut_in, "time": time, "limit": limit}
+        self._do("well stage", given)
+
+
+@commands
 class Liners(Objects):
     """Liners: `sim.liners["axial-force"]` is that of their elements, see `Objects`."""
 
@@ -714,16 +747,17 @@ class Histories(Words):
         how: str | None = None,
         every: int | None = None,
         variable: str | None = None,
+        well: str | None = None,
         where: Where = None,
     ) -> None:
         """Follow a value of a "node", "element", "joint", a part of bolts or liners ("bolt-node", "liner-element"), a
-        "flow-node", a "flow-channel" or of the "model": of one (id, or nearest to a point), or of those of a range or
-        of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable: with the value "law-state",
-        which state variable of laws of the user."""
+        "flow-node", a "flow-channel", a "well" (well: its name) or of the "model": of one (id, or nearest to a point),
+        or of those of a range or of all by how: "sum", "mean", "minimum", "maximum"; every so many steps. variable:
+        with the value "law-state", which state variable of laws of the user."""
         ways = ("sum", "mean", "minimum", "maximum")
         words = None if value is None else _script_word(value)
         given = {"name": name, "object": object, "value": words, "id": id, "nearest": nearest, "every": every,
-                 "variable": variable}  # fmt: skip
+                 "variable": variable, "well": well}  # fmt: skip
         if how is not None and how not in ways:
             raise ValueError(f"how: expected one of {', '.join(ways)}, got {how!r}")
         if how is not None:
@@ -810,6 +844,7 @@ class BlockCommands:
     bolt_nodes: BoltNodes
     flow_nodes: FlowNodes
     channels: Channels
+    wells: Wells
     liners: Liners
     liner_nodes: LinerNodes
     tables: Tables
@@ -823,7 +858,7 @@ class BlockCommands:
         self.geometry, self.mesh = Geometry(do), Mesh(do)
         self.elements, self.faces, self.joints, self.nodes = Elements(do), Faces(do), Joints(do), Nodes(do)
         self.bolts, self.bolt_nodes = Bolts(do), BoltNodes(do)
-        self.flow_nodes, self.channels = FlowNodes(do), Channels(do)
+        self.flow_nodes, self.channels, self.wells = FlowNodes(do), Channels(do), Wells(do)
         self.liners, self.liner_nodes = Liners(do), LinerNodes(do)
         self.tables, self.fields = Tables(do), Fields(do)
         self.histories, self.charts, self.output = Histories(do), Charts(do), Output(do)

@@ -23,16 +23,17 @@ if TYPE_CHECKING:
 
 CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
-    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar",
-    "creep": "Creep",
+    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar", "creep": "Creep",
+    "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
+    "fault-injection": "FaultInjection",
 }  # fmt: skip
-"""Names on the command line, and the classes; a class stands in the module of its name."""
+"""Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]
 
 
 def find(name: str) -> type[Case]:
     """The class of a case by its name on the command line. KeyError if there is none."""
-    return getattr(importlib.import_module(f"hpcdem.cases.{name}"), CASES[name])
+    return getattr(importlib.import_module(f"hpcdem.cases.{name.replace('-', '_')}"), CASES[name])
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,7 @@ import importlib
 import subprocess
 import sys
 from functools import partial
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -21,6 +21,10 @@ from hpcdem.core.errors import EXIT_OK
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
 from hpcdem.session import Session, greet, prepare
+
+if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.runtime.progress import Log
 
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
@@ -62,30 +66,39 @@ def main() -> NoReturn:
     with messages_only(), launch.one_voice():
         if words[:1] == ["warmup"]:
             run_warmup(words[1:])
-        if words[:1] == ["resume"]:
-            options = resumed_options(read_command_line(resume, "hpcdem resume", words[1:]))
-        else:
-            options = Options(**read_command_line(hpcdem, "hpcdem", words))
+        options = read_options(words)
         wanted = options.threads or launch.threads_by_default(as_zdem=speaks_zdem(options.script))
         threads, warnings = launch.prepare_environment(wanted)
         comm = launch.start_mpi()
 
     def work() -> None:
         from hpcdem.runtime.progress import Log
-        from hpcdem.runtime.stop_requests import StopRequests, slurm_end_time
 
         log = Log(comm.rank)
         if not options.check:
             greet(comm, log, cores_before, threads, warnings, options.outdir or options.script.parent / "data")
-        end = comm.bcast(slurm_end_time() if comm.rank == 0 else None)
-        stop = StopRequests(options.time_limit, end, options.autosave)
-        session = Session(
-            comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance,
-            options.draw, keep=options.keep,
-        )  # fmt: skip
-        run(session, options)
+        run(new_session(comm, log, options, threads), options)
 
     shutdown.leave(shutdown.run_together(comm, work))
+
+
+def read_options(words: list[str]) -> Options:
+    """Of `hpcdem SCRIPT ...` and `hpcdem resume ...`; prints and leaves for what is not understood."""
+    if words[:1] == ["resume"]:
+        return resumed_options(read_command_line(resume, "hpcdem resume", words[1:]))
+    return Options(**read_command_line(hpcdem, "hpcdem", words))
+
+
+def new_session(comm: SerialComm, log: Log, options: Options, threads: int) -> Session:
+    """Collective: the session of a command line."""
+    from hpcdem.runtime.stop_requests import StopRequests, slurm_end_time
+
+    end = comm.bcast(slurm_end_time() if comm.rank == 0 else None)
+    stop = StopRequests(options.time_limit, end, options.autosave)
+    return Session(
+        comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance, options.draw,
+        keep=options.keep,
+    )  # fmt: skip
 
 
 def run_warmup(words: list[str]) -> NoReturn:

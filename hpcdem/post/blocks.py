@@ -72,14 +72,24 @@ def view_of_flow(state: MeshState) -> View:
     whole model where that is hardly more."""
     from hpcdem.post.bolts import areas
 
-    whole = view(state)
     cells = state.cells[plastic_shear(state) > 0.01 * plastic_range(state)[1]]
     points = [state.points[cells[cells >= 0]]]
     if "bolts" in state.supports:
         points.append(areas(state)[0].reshape(-1, 2))
     if "liners" in state.supports:
         points.append(liners.areas(state, "axial_force", "axial_force")[0].reshape(-1, 2))
-    there = np.concatenate(points)
+    return _around(state, np.concatenate(points))
+
+
+def view_of_fluid(state: MeshState) -> View:
+    """The same where there are channels."""
+    return _around(state, fluid.ends(state))
+
+
+def _around(state: MeshState, there: np.ndarray) -> View:
+    """The part of the plane with these points (n, 2) and half of its width around it; the whole model where that is
+    hardly more."""
+    whole = view(state)
     if not len(there):
         return whole
     low, high = there.min(axis=0), there.max(axis=0)

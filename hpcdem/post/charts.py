@@ -66,7 +66,8 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
     from hpcdem.post import blocks
 
     coloured = panel != blocks.CRACKS
-    seen = blocks.view_of_flow(model) if panel == blocks.PLASTIC else blocks.view(model)
+    views = {blocks.CRACKS: blocks.view, blocks.PLASTIC: blocks.view_of_flow}
+    seen = views.get(panel, blocks.view_of_fluid)(model)
     height = SIZE[1] - (0.95 if coloured else 0.75)  # of the panels: above and below there are words
     width = min(max(height * seen.width / seen.height, 0.3 * height), 1.5 * height)
     page = 0.7 + width + 0.75 + SIZE[0] - 1.4 + 0.15, SIZE[1]

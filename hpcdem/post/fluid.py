@@ -39,20 +39,20 @@ class Shown:
         return found
 
     def range(self, state: MeshState) -> tuple[float, float]:
-        """From 0, or the least value where that is not far below the greatest, to the greatest."""
+        """From 0, or the least value where that is a little below the greatest, to the greatest."""
         values = self.values(state)
         values = values[np.isfinite(values)]
         if not len(values):
             return 0.0, 0.0
         low, high = float(values.min()), float(values.max())
-        return (low if low > 0.8 * high and high > low else 0.0), high
+        return (low if 0.8 * high < low < 0.99 * high else 0.0), high
 
 
 PICTURES = {
-    "pressure": Shown("fluid_pressure", PRESSURES, "pressure of the fluid", False, "YlGnBu"),
+    "pressure": Shown("fluid_pressure", PRESSURES, "fluid pressure", False, "YlGnBu"),
     "saturation": Shown("saturation", ((1.0, "-"),), "saturation", True, "Blues"),
     "aperture": Shown("aperture", LENGTHS, "aperture", True, "YlOrRd"),
-    "velocity": Shown("fluid_velocity", SPEEDS, "velocity of the fluid", False, "PuRd"),
+    "velocity": Shown("fluid_velocity", SPEEDS, "fluid velocity", False, "PuRd"),
 }
 """By the word for each."""
 
@@ -60,6 +60,12 @@ PICTURES = {
 def there(state: MeshState) -> bool:
     """Whether a frame has channels."""
     return bool(np.isfinite(state.of_joints.get("aperture", np.empty(0))).any())
+
+
+def ends(state: MeshState) -> np.ndarray:
+    """(n, 2) of all channels [m]."""
+    rows = np.isfinite(state.of_joints.get("aperture", np.full(len(state.joints), np.nan)))
+    return state.points[state.joints[rows]].reshape(-1, 2)
 
 
 def draw(axes: Any, state: MeshState, shown: Shown, span: tuple[float, float], unit: float, width: float) -> Any:
@@ -72,18 +78,18 @@ def draw(axes: Any, state: MeshState, shown: Shown, span: tuple[float, float], u
         return None
     from matplotlib import colormaps
 
-    ends, values = state.points[state.joints], shown.values(state)
+    lines, values = state.points[state.joints], shown.values(state)
     aperture = state.of_joints["aperture"]
     wide = width * np.clip(aperture / max(float(np.nanmax(aperture)), 1e-300), LEAST, 1.0)
     dry = np.isfinite(aperture) & ~np.isfinite(values)
-    axes.add_collection(LineCollection(ends[dry], colors=DRY, linewidths=LEAST * width, zorder=2), autolim=False)
+    axes.add_collection(LineCollection(lines[dry], colors=DRY, linewidths=LEAST * width, zorder=2), autolim=False)
     rows = np.flatnonzero(np.isfinite(values))
     rows = rows[np.argsort(values[rows], kind="stable")]  # the largest on top
     colours = LinearSegmentedColormap.from_list(shown.colours, colormaps[shown.colours](np.linspace(0.25, 1.0, 64)))
     high = max(span[1], span[0] + 1e-12) / unit
-    lines = LineCollection(
-        ends[rows], array=values[rows] / unit, cmap=colours, norm=Normalize(span[0] / unit, high),
+    drawn = LineCollection(
+        lines[rows], array=values[rows] / unit, cmap=colours, norm=Normalize(span[0] / unit, high),
         linewidths=wide[rows], capstyle="round", zorder=3,
     )  # fmt: skip
-    axes.add_collection(lines, autolim=False)
-    return lines
+    axes.add_collection(drawn, autolim=False)
+    return drawn

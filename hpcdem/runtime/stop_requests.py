@@ -107,7 +107,9 @@ class StopRequests:
     # -- signals ---------------------------------------------------------------------------------------------
 
     def install(self, rank: int = 0) -> StopRequests:
-        """Take over the signals; call it after MPI has begun, which may set its own handlers. rank: for messages."""
+        """Take over the signals, once; after MPI has begun, which may set its own handlers. rank: for messages."""
+        if self._before:
+            return self
         for name in HANDLED:
             number = getattr(signal, name, None)
             if number is not None:

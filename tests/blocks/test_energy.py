@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA, softening
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks import worker
+from tests.blocks import models
 from tests.blocks.support import ROCK, jointed, model, rectangle, shaken
 
 E = ROCK["young"]
@@ -66,7 +66,7 @@ def test_a_block_that_falls_apart(shape, friction, penalty):
     comes out of that, even if contact has a penalty (over E) that would make it six times stiffer than the joints were.
     The block never gets faster than it came."""
     sim = Blocks()
-    worker.impact(sim, shape)
+    models.impact(sim, shape)
     if penalty:
         sim.face_model(None, "contact_mohr_coulomb", {"friction": friction, "penalty_normal": penalty * E})
     sim.joint_property(None, {"friction": friction})
@@ -117,11 +117,11 @@ def test_a_hole_blasted():
     """After a static stage: pressure that follows a table, mass scaling, an automatic time step, other properties on
     the way; commands change what is stored, and are told apart."""
     sim = Blocks()
-    worker.opening(sim)
+    models.opening(sim)
     while sim.clock.step < 751:
-        worker.open_up(sim)
+        models.open_up(sim)
         sim.step()
-    found = watched(sim, 2e-3, worker.open_up)
+    found = watched(sim, 2e-3, models.open_up)
     assert diagnostics.joint_counts(sim)[2] > 20 and found["commands"] != 0.0
     assert found["work_outside"] > 1000.0
 
@@ -131,9 +131,9 @@ def test_the_account_does_not_change_the_run():
     ends = []
     for keep in (True, False):
         sim = Blocks()
-        worker.opening(sim)
+        models.opening(sim)
         while sim.clock.step < 1300:
-            worker.open_up(sim)
+            models.open_up(sim)
             if not keep and sim.clock.step == 750:
                 diagnostics.account_energy(sim, False)
             sim.step()

@@ -119,10 +119,10 @@ print('went')
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_script_is_told_the_line(launch, tmp_path, ranks):
+def test_a_script_is_told_the_line(resident, tmp_path, ranks):
     for option, code in (("", 2), ("pcdc model option overlap keep", 0)):
         (tmp_path / "over.sc").write_text(SCRIPT.format(option=option))
-        done = launch(ranks, "over.sc", cwd=tmp_path)
+        done = resident(ranks, "over.sc", cwd=tmp_path)
         assert done.returncode == code, done.stdout + done.stderr
         assert ("over.sc:6: " in done.stderr and "by 0.0016 m at" in done.stderr) == (code == 2)
         assert ("went" in done.stdout) == (code == 0)

@@ -11,7 +11,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import convergence, diagnostics, saved_state
 from hpcdem.physics.fdem.properties import CONTACT_MOHR_COULOMB, Rows
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks import worker
+from tests.blocks import models
 from tests.blocks.support import jointed, model, rectangle
 
 
@@ -33,12 +33,12 @@ def test_a_run_with_all_kinds_of_stages_goes_on(at, tmp_path):
     """Before the first step, at rest, just after elements were taken out (not stepped yet), while forces fade, before
     and after the change to motion, while it breaks."""
     sim = Blocks()
-    worker.opening(sim)
+    models.opening(sim)
     while sim.clock.step < at:
-        worker.open_up(sim)
+        models.open_up(sim)
         sim.step()
     if at in (300, 750):
-        worker.open_up(sim)  # commands given, model open
+        models.open_up(sim)  # commands given, model open
     saved_state.save(sim, tmp_path / "a.sav", {"m_n": 3})
     again = Blocks(threads=1)
     assert saved_state.restore(again, tmp_path / "a.sav") == {"m_n": 3}
@@ -47,7 +47,7 @@ def test_a_run_with_all_kinds_of_stages_goes_on(at, tmp_path):
     for _ in range(60):
         for one in (sim, again):
             if not (one.clock.step == at and at in (300, 750)):
-                worker.open_up(one)
+                models.open_up(one)
             one.step()
     same(state(sim), state(again))
 
@@ -57,7 +57,7 @@ def test_looking_and_saving_change_nothing(tmp_path):
     ends = []
     for look in (False, True):
         sim = Blocks()
-        worker.impact(sim)
+        models.impact(sim)
         convergence.advance(sim, 900)
         for k in range(150):
             convergence.advance(sim, 1)

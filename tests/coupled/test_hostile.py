@@ -148,7 +148,7 @@ def test_blocks_that_are_replaced(tmp_path):
      ("s.cycle(1)", "CYC cannot be used by a function"), ("both.end()", "end cannot be used by a function"),
      ("pcdc model new", "model new cannot be used by a function"), ("1 / 0", "ZeroDivisionError: division by zero")],
 )  # fmt: skip
-def test_what_a_function_must_not_do(launch, tmp_path, inside, said):
+def test_what_a_function_must_not_do(resident, tmp_path, inside, said):
     """Called in the middle of a command: an error with the line, on whose way out nothing hangs."""
     (tmp_path / "script.sc").write_text(
         "import hpcdem\n"
@@ -165,6 +165,6 @@ def test_what_a_function_must_not_do(launch, tmp_path, inside, said):
         "sand.every(5, act)\n"
         "pcdc model step 20\n"
     )
-    done = launch(1, "script.sc", "--no-figure", cwd=tmp_path)
+    done = resident(1, "script.sc", "--no-figure", cwd=tmp_path)
     assert done.returncode in (1, 2) and "script.sc" in done.stderr and "11" in done.stderr, done.stderr
     assert said in done.stderr

@@ -12,39 +12,39 @@ import pytest
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
-from tests.conftest import Launcher
 from tests.pcdc.test_whole import tables
+from tests.property.workers import Resident
 
 SCRIPT = Path(__file__).parent / "fall.sc"
 APART = ("run.json", ".lock", "stop", "peep")
 """Files that tell of the run, not of the model."""
 
 
-def start(launch, folder: Path, ranks: int, *words: str):
+def start(resident, folder: Path, ranks: int, *words: str):
     folder.mkdir(exist_ok=True)
     shutil.copy(SCRIPT, folder)
-    return launch(ranks, SCRIPT.name, "--no-figure", *words, cwd=folder)
+    return resident(ranks, SCRIPT.name, "--no-figure", *words, cwd=folder)
 
 
 def said(text: str) -> list[str]:
     return [line for line in text.splitlines() if line.startswith("turn")]
 
 
-def stopped(launch, folder: Path, ranks: int) -> list[str]:
+def stopped(resident, folder: Path, ranks: int) -> list[str]:
     """A run that is sent SIGTERM in the sixth of its eight turns; what its script said."""
     folder.mkdir()
     (folder / "stop").touch()
-    done = start(launch, folder, ranks)
+    done = start(resident, folder, ranks)
     assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stderr
     (folder / "stop").unlink()
     return said(done.stdout)
 
 
 @pytest.fixture(scope="module")
-def straight(tmp_path_factory) -> tuple[Path, list[str]]:
+def straight(resident: Resident, tmp_path_factory) -> tuple[Path, list[str]]:
     """The run that was not stopped, and what its script said."""
     folder = tmp_path_factory.mktemp("fall") / "one"
-    done = start(Launcher(), folder, 1)
+    done = start(resident, folder, 1)
     assert done.returncode == 0, done.stderr
     lines = said(done.stdout)
     assert len(lines) == 10 and " 40 steps" in lines[0] and " 60 steps" in lines[-2] and "discs are gone" in lines[2]
@@ -52,10 +52,10 @@ def straight(tmp_path_factory) -> tuple[Path, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def halted(tmp_path_factory) -> tuple[Path, list[str]]:
+def halted(resident: Resident, tmp_path_factory) -> tuple[Path, list[str]]:
     """The run that was stopped, on one rank, and what its script said."""
     folder = tmp_path_factory.mktemp("fall") / "halted"
-    return folder, stopped(Launcher(), folder, 1)
+    return folder, stopped(resident, folder, 1)
 
 
 def assert_alike(one: Path, other: Path) -> None:
@@ -77,11 +77,11 @@ def assert_alike(one: Path, other: Path) -> None:
     "before, after",
     [(1, 2), *(pytest.param(*ranks, marks=pytest.mark.slow) for ranks in ((1, 3), (3, 1), (2, 4)))],
 )
-def test_it_goes_on_on_other_ranks(launch, straight, tmp_path, before, after):
+def test_it_goes_on_on_other_ranks(resident, straight, tmp_path, before, after):
     folder, lines = straight
-    first = stopped(launch, tmp_path / "a", before)
+    first = stopped(resident, tmp_path / "a", before)
     assert 0 < len(first) < len(lines)
-    again = start(launch, tmp_path / "a", after, "--resume")
+    again = start(resident, tmp_path / "a", after, "--resume")
     assert again.returncode == 0, again.stderr
     assert first + said(again.stdout) == lines
     assert_alike(folder, tmp_path / "a")
@@ -132,7 +132,7 @@ CHANGES = {
 
 @pytest.mark.parametrize("change", [pytest.param(c, marks=() if k % 3 == 2 else pytest.mark.slow)
                                     for k, c in enumerate(CHANGES)])  # fmt: skip
-def test_a_changed_call_is_refused_at_its_line(launch, halted, tmp_path, change):
+def test_a_changed_call_is_refused_at_its_line(resident, halted, tmp_path, change):
     """Nothing that is there is written again."""
     old, new, word = CHANGES[change]
     folder = tmp_path / "a"
@@ -142,7 +142,7 @@ def test_a_changed_call_is_refused_at_its_line(launch, halted, tmp_path, change)
     text = text.replace(old, new)
     (folder / SCRIPT.name).write_text(text)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file() and path.name not in APART}
-    done = launch(1, SCRIPT.name, "--no-figure", "--resume", cwd=folder)
+    done = resident(1, SCRIPT.name, "--no-figure", "--resume", cwd=folder)
     assert done.returncode == 2, done.stdout + done.stderr
     line = next(k for k, row in enumerate(text.splitlines(), 1) if word in row and (new.strip() in row or not new))
     assert f"fall.sc:{line}: " in done.stderr and "not what was done there before" in done.stderr
@@ -150,7 +150,7 @@ def test_a_changed_call_is_refused_at_its_line(launch, halted, tmp_path, change)
 
 
 @pytest.mark.mpi
-def test_what_one_of_several_ranks_saw_cannot_be_asked_again(launch, tmp_path):
+def test_what_one_of_several_ranks_saw_cannot_be_asked_again(resident, tmp_path):
     """A clear end at that line, no wrong values; the first run says beforehand that it will be so. What a rank saw that
     was alone can."""
     for ranks in (1, 2):
@@ -158,11 +158,11 @@ def test_what_one_of_several_ranks_saw_cannot_be_asked_again(launch, tmp_path):
         folder.mkdir()
         (folder / "peep").touch()
         (folder / "stop").touch()
-        done = start(launch, folder, ranks)
+        done = start(resident, folder, ranks)
         assert done.returncode == 85
         assert done.stdout.count("--resume will not be able to pass this line") == ranks - 1
         (folder / "stop").unlink()
-        again = start(launch, folder, 3 - ranks, "--resume")
+        again = start(resident, folder, 3 - ranks, "--resume")
         if ranks == 1:
             assert again.returncode == 0, again.stdout + again.stderr
             continue
@@ -193,15 +193,15 @@ pcdc model save 'end.sav'
 """
 
 
-def test_a_checkpoint_without_calls(launch, tmp_path):
+def test_a_checkpoint_without_calls(resident, tmp_path):
     """As earlier versions wrote it, which kept what a script asked, but not what it called: what stands before the two
     were coupled is done again."""
     for name in ("straight", "a"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "old.sc").write_text(OLD)
     (tmp_path / "a" / "stop").touch()
-    assert launch(1, "old.sc", "--no-figure", cwd=tmp_path / "straight").returncode == 0
-    assert launch(1, "old.sc", "--no-figure", cwd=tmp_path / "a").returncode == 85
+    assert resident(1, "old.sc", "--no-figure", cwd=tmp_path / "straight").returncode == 0
+    assert resident(1, "old.sc", "--no-figure", cwd=tmp_path / "a").returncode == 85
     (tmp_path / "a" / "stop").unlink()
     (path,) = (tmp_path / "a" / "data").glob("*.sav")
     state, tables_there = checkpoint.read(path)
@@ -218,7 +218,7 @@ def test_a_checkpoint_without_calls(launch, tmp_path):
     run["journal"] = kept
     slabs = {name: Table(columns, 0, len(next(iter(columns.values())))) for name, columns in tables_there.items()}
     checkpoint.write(path, state, slabs, SerialComm())
-    again = launch(1, "old.sc", "--no-figure", "--resume", cwd=tmp_path / "a")
+    again = resident(1, "old.sc", "--no-figure", "--resume", cwd=tmp_path / "a")
     assert again.returncode == 0, again.stderr
     assert again.stdout.count("CYC, 20 steps") == 1
     assert tables(tmp_path / "a" / "end.sav") == tables(tmp_path / "straight" / "end.sav")

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import PRESSURE, QUANTITIES, RATE, SHUT
 from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
+from tests.bolts.models import WEAKER
 from tests.flow.support import WATER, inner
 from tests.parallel.model import Found, Model
 
@@ -19,6 +23,12 @@ LEAKS = {
     "leak_off": 1.0, "matrix_permeability": 1e-14, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9,
 }  # fmt: skip
 WIDE = {**WATER, "fluid_bulk": 1e7, "aperature_initial": 2e-4, "aperature_minumum": 5e-5, "aperature_maximum": 5e-3}
+
+
+SOIL = {
+    "density": 2000.0, "young": 1e8, "poisson_ratio": 0.3, "friction": 20.0, "cohesion": 4e3, "tensile": 2e3,
+    "dilation": 5.0,
+}  # fmt: skip
 
 
 def bursting(sim: Blocks) -> None:
@@ -51,6 +61,23 @@ def more(sim: Blocks) -> None:
         sim.flow_clock(every=3)
 
 
+def pumped(sim: Blocks) -> None:
+    """The same with wells across the strips of the ranks in place of conditions, in channels that slip opens further;
+    stages end where steps do not, one of them after the checkpoint."""
+    bursting(sim)
+    flow = Flow.of(sim)
+    flow.remove_conditions(None)
+    flow.adjust(None, {"shear_dilation": 20.0, "shear_dilation_limit": 4e-3})
+    points = sim.mesh.points
+    flow.drill("long", np.flatnonzero((np.abs(points[:, 1] - 0.3) < 0.03) & (points[:, 0] > 0.3)))
+    flow.drill("short", np.flatnonzero(points[:, 0] < 0.05))
+    flow.stage("long", RATE, 10.0, 1.23e-3, 2e6)
+    flow.stage("long", SHUT, 0.0, 2.1e-4, math.inf)
+    flow.stage("long", RATE, 10.0, math.inf, 1e6)
+    flow.stage("short", PRESSURE, "pump", 1.7e-3, math.inf)
+    flow.stage("short", RATE, -1e-2, math.inf, math.inf)
+
+
 def seeping(sim: Blocks) -> None:
     """Water rises in a block that stands still, then moves."""
     sim.take_mesh(shaken(rectangle(20, 6, 2.0, 0.6), 0.2))
@@ -73,6 +100,47 @@ def move(sim: Blocks) -> None:
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
 
 
+def resting(sim: Blocks) -> None:
+    """Rock that yields, with bolts, water in some of its joints and a well: in relaxation, then in motion."""
+    sim.take_mesh(shaken(rectangle(16, 6, 1.6, 0.6), 0.2))
+    changes.element_model(sim, None, "mech_mohr_coulomb", SOIL)
+    joints = inner(sim.mesh)
+    sim.joint_model(joints[::3], COHESIVE, {**WEAK, "cohesion": 4e3, "tensile_strength": 1e3})
+    sim.gravity(0.0, -9.81)
+    sim.option(dynamic=False, collision=False)
+    y = sim.mesh.points[:, 1]
+    sim.velocity_condition(np.flatnonzero(y == 0.0), vx=0.0, vy=0.0)
+    bolts = Bolts.of(sim)
+    for x in (0.33, 1.01):
+        _, elements = bolts.create([(x, 0.6), (x + 0.1, 0.1)], plate=True, grout=(0.2, 0.6))
+        bolts.assign(elements, {**WEAKER, "pretension_force": 3e3})
+    flow = Flow.of(sim)
+    flow.assign(joints[joints % 5 > 0], {**WATER, "fluid_bulk": 1e6, "aperature_initial": 1e-4, "shear_dilation": 5.0})
+    flow.fill(np.flatnonzero(y < 0.3), pressure=2e3)
+    sim.flow_clock(dt=1e-3)
+    flow.drill("pump", np.flatnonzero((np.abs(y - 0.3) < 0.03) & (sim.mesh.points[:, 0] < 1.2)))
+    flow.stage("pump", RATE, 1e-3, 0.5005, 6e4)
+    flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
+
+
+def dig(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] < 0.4), relax=150.0)
+    if sim.clock.step == 900:
+        sim.option(dynamic=True)
+        sim.flow_clock(dt=0.0, every=2)
+        Flow.of(sim).stage("pump", PRESSURE, 2e4, math.inf, math.inf)
+
+
+def all_of_it(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """That of the fluid, of bolts and of plastic flow."""
+    found = result(sim, notes)
+    found["plastic"] = diagnostics.values(sim, "plastic_shear_strain")
+    found["axial"] = Bolts.of(sim).values("bolt-element", "axial_force")
+    return found
+
+
 def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx")}
@@ -86,6 +154,9 @@ def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     for name in ("aperture", "flow_rate"):
         found[f"flow-channel_{name}"] = flow.values("flow-channel", name)
     found.update({f"account_{name}": np.array(value) for name, value in flow.account().items()})
+    for name in (well.name for well in flow.wells):
+        for value in QUANTITIES:
+            found[f"well_{name}_{value}"] = np.array(flow.well_value(name, value))
     found["counts"] = np.array(diagnostics.joint_counts(sim))
     found["clock"] = np.array([flow.time, flow.dt, flow.sub_steps, flow.cycles, sim.clock.time])
     return found
@@ -104,8 +175,23 @@ def water_bursts(found: Found) -> None:
     assert np.ptp(found["flow-channel_aperture"]) > 1e-3
 
 
+def wells_pump(found: Found) -> None:
+    water_bursts(found)
+    assert found["well_long_stage"] == 3.0 and found["well_short_stage"] == 2.0
+    assert found["well_long_injected"] > 0.0 and found["well_short_rate"] < 0.0
+
+
+def all_acts(found: Found) -> None:
+    assert found["account_relative"] < 1e-11 and found["account_removed"] > 0.0
+    assert found["well_pump_stage"] == 3.0 and found["well_pump_injected"] > 0.0
+    assert found["flow-node_pressure"].max() > 1e3 and np.abs(found["axial"]).max() > 10.0
+    assert np.nanmax(found["plastic"]) > 0.0 and np.ptp(found["flow-channel_aperture"]) > 1e-7
+
+
 # Checkpoints after excavation and a change of channels.
 MODELS = {
     "bursting": Model(bursting, result, water_bursts, more, steps=1100, middle=703),
+    "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703),
+    "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=1100, middle=703),
     "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703),
 }

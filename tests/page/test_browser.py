@@ -547,6 +547,7 @@ def test_a_server_that_has_ended_is_told(open_page, serve_page, grading_file):
     assert page.tab.is_visible("#stale") and differing(page.pixels(), picture) < ALIKE
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("shape", ["circle", "pentagon"])
 def test_four_thousand_grains_are_redrawn_in_a_moment(open_page, shape, record_property):
     """Well under a second on a machine of two cores that does nothing else; the limit leaves room for one that does."""

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.clumped import write_lattice
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 from tests.ways import WAYS, ways
 
@@ -49,21 +49,21 @@ STOP
 """
 
 
-def run(launch: Launcher, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
+def run(resident: Resident, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
     """Run the model in a folder."""
     folder.mkdir(exist_ok=True)
     write_lattice(folder / "bodies.clumps", 3.0, 10, 6)
     script = folder / "clumps.py"
     script.write_text(SCRIPT)
-    done = launch(ranks, script, "--no-figure", *options, *(["--resume"] if resume else []), cwd=folder)
+    done = resident(ranks, script, "--no-figure", *options, *(["--resume"] if resume else []), cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def reference(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run on one rank and one thread."""
     folder = tmp_path_factory.mktemp("clumps") / "one"
-    run(Launcher(), folder, 1)
+    run(resident, folder, 1)
     return folder
 
 
@@ -84,9 +84,9 @@ def test_the_model_is_worth_comparing(reference: Path) -> None:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", ways({"3 ranks", "2 threads"}))
-def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
+def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = WAYS[case]
-    run(launch, tmp_path / "other", ranks, *options)
+    run(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 
 
@@ -101,7 +101,7 @@ def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_pat
     ],
 )
 def test_resumed_run_equals_the_uninterrupted_one(
-    reference: Path, launch: Launcher, tmp_path: Path, ranks: int, checkpoint: str
+    reference: Path, resident: Resident, tmp_path: Path, ranks: int, checkpoint: str
 ) -> None:
     saves = sorted((reference / "data").glob("*.sav"))
     start = {"first": 0, "middle": len(saves) // 2, "last": len(saves) - 2}[checkpoint]
@@ -109,5 +109,5 @@ def test_resumed_run_equals_the_uninterrupted_one(
     shutil.copytree(reference, folder)
     for path in saves[start + 1 :]:
         (folder / "data" / path.name).unlink()
-    run(launch, folder, ranks, resume=True)
+    run(resident, folder, ranks, resume=True)
     assert_same_files(reference, folder)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import SHORT_PUSH, contents
 
 STEPS = 100
@@ -33,20 +33,20 @@ def states(text: str) -> list[str]:
     return [line for line in text.splitlines() if line.startswith("state ")]
 
 
-def run(launch: Launcher, folder: Path, ranks: int, *options: object, code: int = 0, script: str = SCRIPT) -> str:
+def run(resident: Resident, folder: Path, ranks: int, *options: object, code: int = 0, script: str = SCRIPT) -> str:
     """The log of the model in a folder."""
     folder.mkdir(exist_ok=True)
     (folder / "model.py").write_text(script)
-    done = launch(ranks, "model.py", "--no-figure", "--check-reproducible", 20, *options, cwd=folder)
+    done = resident(ranks, "model.py", "--no-figure", "--check-reproducible", 20, *options, cwd=folder)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def one(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """Folder and log of the run on one rank and one thread."""
     folder = tmp_path_factory.mktemp("energy") / "one"
-    log = run(Launcher(), folder, 1)
+    log = run(resident, folder, 1)
     (folder / "log.txt").write_text(log)
     return folder, log
 
@@ -76,10 +76,10 @@ def test_the_log_tells(one: tuple[Path, str]) -> None:
     ],
 )
 def test_the_same_on_any_ranks_and_threads(
-    one: tuple[Path, str], launch: Launcher, tmp_path: Path, ranks: int, threads: int
+    one: tuple[Path, str], resident: Resident, tmp_path: Path, ranks: int, threads: int
 ) -> None:
     folder, log = one
-    other = run(launch, tmp_path / "other", ranks, "-j", threads, "--against", folder / "log.txt")
+    other = run(resident, tmp_path / "other", ranks, "-j", threads, "--against", folder / "log.txt")
     assert states(other) == states(log) and "13 states are those of" in other
     for name in ("energy.csv", "hist_1.csv", "hist_id_1.dat"):
         assert (tmp_path / "other/data" / name).read_bytes() == (folder / "data" / name).read_bytes()
@@ -87,7 +87,7 @@ def test_the_same_on_any_ranks_and_threads(
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_the_same_across_a_restart(one: tuple[Path, str], launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_the_same_across_a_restart(one: tuple[Path, str], resident: Resident, tmp_path: Path, ranks: int) -> None:
     """From the checkpoint in the middle of a CYC; the account is in it, whole."""
     folder, log = one
     resumed = tmp_path / "resumed"
@@ -96,7 +96,7 @@ def test_the_same_across_a_restart(one: tuple[Path, str], launch: Launcher, tmp_
     assert '"accounts"' in str(contents(saves[0])["@state"])
     for path in saves[1:]:
         path.unlink()
-    again = run(launch, resumed, ranks, "--resume", "--against", folder / "log.txt")
+    again = run(resident, resumed, ranks, "--resume", "--against", folder / "log.txt")
     assert states(again) == [line for line in states(log) if int(line.split()[1].rstrip(":")) > 140]
     assert (resumed / "data/energy.csv").read_bytes() == (folder / "data/energy.csv").read_bytes()
 
@@ -104,23 +104,23 @@ def test_the_same_across_a_restart(one: tuple[Path, str], launch: Launcher, tmp_
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_changed_state_is_found_at_its_step(
-    one: tuple[Path, str], launch: Launcher, tmp_path: Path, ranks: int
+    one: tuple[Path, str], resident: Resident, tmp_path: Path, ranks: int
 ) -> None:
     """Friction changed at step 100: particles that touch the wall with friction feel it within the next 20 steps."""
     folder, log = one
     script = SCRIPT.replace("tstrength 2e7 sstrength 4e7 fric 0.3", "tstrength 2e7 sstrength 4e7 fric 0.30000001")
     script = script.replace("WALL id 1 xv 2.0", "WALL id 1 xv 2.0000001")
-    other = run(launch, tmp_path / "other", ranks, "--against", folder / "log.txt", code=1, script=script)
+    other = run(resident, tmp_path / "other", ranks, "--against", folder / "log.txt", code=1, script=script)
     assert "step 120 is the first that differs" in other
     assert states(other) == [line for line in states(log)[:5]] + states(other)[5:] and len(states(other)) == 6
 
 
-def test_options_that_do_not_fit(launch: Launcher, tmp_path: Path) -> None:
+def test_options_that_do_not_fit(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "model.py").write_text("START\nSTOP\n")
     for words, said in (
         (("--against", "log.txt"), "--against LOG needs --check-reproducible N"),
         (("--check-reproducible", "20", "--against", "log.txt"), "cannot read it"),
         (("--check-reproducible", "0"), "--check-reproducible"),
     ):
-        done = launch(1, "model.py", *words, cwd=tmp_path)
+        done = resident(1, "model.py", *words, cwd=tmp_path)
         assert done.returncode == 2 and said in done.stderr + done.stdout

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 from tests.ways import WAYS, ways
 
@@ -44,20 +44,20 @@ STOP
 """
 
 
-def busy(launch: Launcher, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
+def busy(resident: Resident, folder: Path, ranks: int, *options: str, resume: bool = False) -> None:
     """Run the model in a folder."""
     folder.mkdir(exist_ok=True)
     script = folder / "busy.py"
     script.write_text(BUSY)
-    done = launch(ranks, script, "--no-figure", *options, *(["--resume"] if resume else []), cwd=folder)
+    done = resident(ranks, script, "--no-figure", *options, *(["--resume"] if resume else []), cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def reference(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run on one rank and one thread."""
     folder = tmp_path_factory.mktemp("busy") / "one"
-    busy(Launcher(), folder, 1)
+    busy(resident, folder, 1)
     return folder
 
 
@@ -74,16 +74,16 @@ def test_the_model_is_busy(reference: Path) -> None:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", ways({"4 ranks", "3 ranks, borders stay", "2 ranks x 2 threads"}))
-def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
+def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = WAYS[case]
-    busy(launch, tmp_path / "other", ranks, *options)
+    busy(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(("checkpoint", "ranks"), [("first", 2), ("middle", 1), ("middle", 3), ("last", 2)])
 def test_resumed_run_equals_the_uninterrupted_one(
-    reference: Path, launch: Launcher, tmp_path: Path, ranks: int, checkpoint: str
+    reference: Path, resident: Resident, tmp_path: Path, ranks: int, checkpoint: str
 ) -> None:
     """A run that was killed some time after a checkpoint, and goes on from there with another number of ranks: every
     file, time series too, is as if nothing had happened."""
@@ -93,5 +93,5 @@ def test_resumed_run_equals_the_uninterrupted_one(
     shutil.copytree(reference, folder)
     for path in saves[start + 1 :]:
         (folder / "data" / path.name).unlink()
-    busy(launch, folder, ranks, resume=True)
+    busy(resident, folder, ranks, resume=True)
     assert_same_files(reference, folder)

@@ -22,7 +22,7 @@ from hpcdem.physics.dem.kernels import fast
 from hpcdem.physics.dem.kernels.fast import Fast
 from hpcdem.physics.dem.kernels.walls import closest
 from hpcdem.physics.dem.simulation import Simulation
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 from tests.support import model, only, value
 from tests.ways import WAYS, ways
@@ -69,20 +69,20 @@ STOP
 """
 
 
-def run(launch: Launcher, folder: Path, ranks: int, *options: str) -> None:
+def run(resident: Resident, folder: Path, ranks: int, *options: str) -> None:
     """The model in a folder."""
     folder.mkdir(exist_ok=True)
     script = folder / "strays.py"
     script.write_text(STRAYS)
-    done = launch(ranks, script, "--no-figure", *options, cwd=folder)
+    done = resident(ranks, script, "--no-figure", *options, cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def reference(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run on one rank and one thread."""
     folder = tmp_path_factory.mktemp("strays") / "one"
-    run(Launcher(), folder, 1)
+    run(resident, folder, 1)
     return folder
 
 
@@ -103,16 +103,16 @@ def test_the_model_has_what_it_takes(reference: Path) -> None:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", ways({"4 ranks", "2 ranks x 2 threads"}))
-def test_same_files_however_it_is_run(reference: Path, launch: Launcher, tmp_path: Path, case: str) -> None:
+def test_same_files_however_it_is_run(reference: Path, resident: Resident, tmp_path: Path, case: str) -> None:
     ranks, options = WAYS[case]
-    run(launch, tmp_path / "other", ranks, *options)
+    run(resident, tmp_path / "other", ranks, *options)
     assert_same_files(reference, tmp_path / "other")
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_resumed_run_equals_the_uninterrupted_one(
-    reference: Path, launch: Launcher, tmp_path: Path, ranks: int
+    reference: Path, resident: Resident, tmp_path: Path, ranks: int
 ) -> None:
     """From the first checkpoint with fast particles whose pairs lie several columns apart."""
     folder = tmp_path / "resumed"
@@ -120,7 +120,7 @@ def test_resumed_run_equals_the_uninterrupted_one(
     start = next(k for k, state in enumerate(states(folder)) if state["lattice"]["columns"] >= 4 and state["closed"])
     for path in sorted((folder / "data").glob("*.sav"))[start + 1 :]:
         path.unlink()
-    run(launch, folder, ranks, "--resume")
+    run(resident, folder, ranks, "--resume")
     assert_same_files(reference, folder)
 
 

@@ -15,7 +15,7 @@ import pytest
 from hpcdem.commands.dem import particles
 from hpcdem.io.frames import list_frames, read_frame
 from hpcdem.physics.dem.simulation import Simulation
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 from tests.support import model
 
@@ -87,41 +87,41 @@ STOP
 GROUPS = ("bed", "rain", "second", "third")
 
 
-def run_text(launch: Launcher, text: str, folder: Path, ranks: int, *options: str) -> Path:
+def run_text(resident: Resident, text: str, folder: Path, ranks: int, *options: str) -> Path:
     """Run a script, by the name of its folder, in that folder."""
     folder.mkdir(parents=True, exist_ok=True)
     script = folder / "script.py"
     script.write_text(text)
-    done = launch(ranks, script, "--no-figure", *options, cwd=folder)
+    done = resident(ranks, script, "--no-figure", *options, cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
 
 @pytest.fixture(scope="module")
-def grown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def grown(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The growing model on one rank."""
-    return run_text(Launcher(), GROWING + REST, tmp_path_factory.mktemp("growing") / "one", 1)
+    return run_text(resident, GROWING + REST, tmp_path_factory.mktemp("growing") / "one", 1)
 
 
 @pytest.fixture(scope="module")
-def starved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def starved(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The model that loses its particles, on one rank."""
-    return run_text(Launcher(), STARVED, tmp_path_factory.mktemp("starved") / "one", 1)
+    return run_text(resident, STARVED, tmp_path_factory.mktemp("starved") / "one", 1)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=pytest.mark.slow), 3, pytest.param(4, marks=pytest.mark.slow)])
-def test_growing_model_on_more_ranks(grown: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
-    assert_same_files(grown, run_text(launch, GROWING + REST, tmp_path / "more", ranks))
+def test_growing_model_on_more_ranks(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
+    assert_same_files(grown, run_text(resident, GROWING + REST, tmp_path / "more", ranks))
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 3])
-def test_growth_goes_on_after_a_restart(grown: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_growth_goes_on_after_a_restart(grown: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """RES and GEN give what the run without a break gave: particles, ids, frames."""
     (tmp_path / "again").mkdir()
     shutil.copy(grown / "half.sav", tmp_path / "again")
-    again = run_text(launch, "RES half.sav\n" + REST, tmp_path / "again", ranks)
+    again = run_text(resident, "RES half.sav\n" + REST, tmp_path / "again", ranks)
     for path in list((again / "data").glob("all_*")) + [again / "end.dat"]:
         assert path.read_bytes() == (grown / path.relative_to(again)).read_bytes(), path.name
     assert len(list((again / "data").glob("all_*.dat"))) == 3
@@ -129,17 +129,17 @@ def test_growth_goes_on_after_a_restart(grown: Path, launch: Launcher, tmp_path:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, 4])
-def test_strips_without_particles(starved: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_strips_without_particles(starved: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     """No particles at all, and fewer columns than ranks: the run goes on."""
-    assert_same_files(starved, run_text(launch, STARVED, tmp_path / "more", ranks))
+    assert_same_files(starved, run_text(resident, STARVED, tmp_path / "more", ranks))
 
 
 @pytest.mark.mpi
-def test_restart_of_a_model_with_fewer_columns_than_ranks(starved: Path, launch: Launcher, tmp_path: Path) -> None:
+def test_restart_of_a_model_with_fewer_columns_than_ranks(starved: Path, resident: Resident, tmp_path: Path) -> None:
     """A run that got so far on 4 ranks must be able to go on with them."""
     shutil.copytree(starved, tmp_path / "again")
     rest = "RES column.sav\n" + STARVED.split("SAV column.sav\n")[1]
-    assert (run_text(launch, rest, tmp_path / "again", 4) / "end.dat").read_bytes() == (
+    assert (run_text(resident, rest, tmp_path / "again", 4) / "end.dat").read_bytes() == (
         starved / "end.dat"
     ).read_bytes()
 
@@ -228,29 +228,29 @@ WAYS = {
 }
 
 
-def run_program(launch: Launcher, folder: Path, ranks: int, *options: str) -> dict:
+def run_program(resident: Resident, folder: Path, ranks: int, *options: str) -> dict:
     """What the program saw."""
     folder.mkdir(exist_ok=True)
     (folder / "grow.py").write_text(PROGRAM)
-    done = launch(ranks, *options, "--no-figure", folder / "grow.py", folder / "seen.json", cwd=folder)
+    done = resident(ranks, *options, "--no-figure", folder / "grow.py", folder / "seen.json", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return json.loads((folder / "seen.json").read_text())
 
 
 @pytest.fixture(scope="module")
-def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict]]:
+def watched(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict]]:
     """What the program saw in each way of running it, filled as the tests go."""
     folder = tmp_path_factory.mktemp("watched")
-    yield {"alone": run_program(Launcher(), folder, 1)}
+    yield {"alone": run_program(resident, folder, 1)}
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("way", WAYS)
-def test_borders_move_at_once(watched: dict[str, dict], launch: Launcher, tmp_path: Path, way: str) -> None:
+def test_borders_move_at_once(watched: dict[str, dict], resident: Resident, tmp_path: Path, way: str) -> None:
     """In the step after GEN or DEL no rank has much more than its share, whatever it had before, and everything was
     made and moved as on one rank."""
     ranks, options = WAYS[way]
-    found = run_program(launch, tmp_path, ranks, *options)
+    found = run_program(resident, tmp_path, ranks, *options)
     assert found["made"] == watched["alone"]["made"]
     for moment in found["seen"]:
         now, before = np.array(moment["now"]), np.array(moment["before"])

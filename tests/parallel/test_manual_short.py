@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hpcdem.io.frames import list_frames, read_frame
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 from tests.ways import WAYS, ways
 
@@ -52,7 +52,7 @@ LAST_STEP = {
 """By CYC, and by the way and speed of the wall; None: it depends on the time step that is found."""
 
 
-def run_script(launch: Launcher, script: Path, folder: Path, needs: Path | None, ranks: int, *options: str) -> None:
+def run_script(resident: Resident, script: Path, folder: Path, needs: Path | None, ranks: int, *options: str) -> None:
     """Run a script of the manual in a new folder of its own, beside the file that it needs."""
     folder.mkdir(parents=True)
     text, at_the_end = re.subn(r"(?im)^stop$", "SAV end.sav\nSTOP", script.read_text())
@@ -60,25 +60,27 @@ def run_script(launch: Launcher, script: Path, folder: Path, needs: Path | None,
     (folder / script.name).write_text(text)
     if needs is not None:
         shutil.copy(needs, folder)
-    done = launch(ranks, folder / script.name, "--no-figure", *options, cwd=folder, timeout=600)
+    done = resident(ranks, folder / script.name, "--no-figure", *options, cwd=folder, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def run_chain(chain: str, scripts: Path, folder: Path, ranks: int) -> Path:
+def run_chain(resident: Resident, chain: str, scripts: Path, folder: Path, ranks: int) -> Path:
     """Run the short scripts of a chain, each in a folder of its name."""
     for name, needs in CHAINS[chain].items():
-        run_script(Launcher(), scripts / "short" / f"{name}.py", folder / name, needs and folder / needs, ranks)
+        run_script(resident, scripts / "short" / f"{name}.py", folder / name, needs and folder / needs, ranks)
     return folder
 
 
 @pytest.fixture(scope="module")
-def on_one_rank(manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Path]]:
+def on_one_rank(
+    resident: Resident, manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], Path]]:
     """`on_one_rank("push")`: folder of a chain on one rank and one thread, run when first asked for."""
     folder = tmp_path_factory.mktemp("short")
 
     def of(chain: str) -> Path:
         if not (folder / chain).exists():
-            run_chain(chain, manual_scripts, folder / chain, 1)
+            run_chain(resident, chain, manual_scripts, folder / chain, 1)
         return folder / chain
 
     yield of
@@ -95,10 +97,10 @@ def on_one_rank(manual_scripts: Path, tmp_path_factory: pytest.TempPathFactory) 
     ],
 )
 def test_same_files_on_more_ranks(
-    on_one_rank: Callable[[str], Path], manual_scripts: Path, tmp_path: Path, chain: str, ranks: int
+    on_one_rank: Callable[[str], Path], resident: Resident, manual_scripts: Path, tmp_path: Path, chain: str, ranks: int
 ) -> None:
     one, more = on_one_rank(chain), tmp_path / chain
-    run_chain(chain, manual_scripts, more, ranks)
+    run_chain(resident, chain, manual_scripts, more, ranks)
     assert_same_files(one, more)
     shutil.rmtree(more)
 
@@ -106,10 +108,10 @@ def test_same_files_on_more_ranks(
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", ways({"2 threads", "2 ranks x 2 threads"}))
 def test_same_push_however_it_is_run(
-    on_one_rank: Callable[[str], Path], manual_scripts: Path, launch: Launcher, tmp_path: Path, case: str
+    on_one_rank: Callable[[str], Path], manual_scripts: Path, resident: Resident, tmp_path: Path, case: str
 ) -> None:
     ranks, options = WAYS[case]
-    run_script(launch, manual_scripts / "short" / "push.py", tmp_path / "push", None, ranks, *options)
+    run_script(resident, manual_scripts / "short" / "push.py", tmp_path / "push", None, ranks, *options)
     assert_same_files(on_one_rank("push") / "push", tmp_path / "push")
     shutil.rmtree(tmp_path / "push")
 
@@ -188,8 +190,8 @@ def test_names_of_the_short_run(on_one_rank: Callable[[str], Path], suffix: str)
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_names_of_the_whole_run(launch: Launcher, manual_scripts: Path, tmp_path: Path) -> None:
-    run_script(launch, manual_scripts / "push_add_del.py", tmp_path / "whole", None, 2)
+def test_names_of_the_whole_run(resident: Resident, manual_scripts: Path, tmp_path: Path) -> None:
+    run_script(resident, manual_scripts / "push_add_del.py", tmp_path / "whole", None, 2)
     for suffix in (".dat", ".vtkhdf"):
         assert frames_on_disk(tmp_path / "whole" / "data", suffix) == sorted(PUBLISHED_NAMES)
     shutil.rmtree(tmp_path / "whole")

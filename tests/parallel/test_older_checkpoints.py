@@ -19,12 +19,12 @@ FILES = Path(__file__).with_name("checkpoints")
 
 @pytest.mark.parametrize("version", range(1, checkpoint.VERSION))
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
-def test_an_older_checkpoint_comes_to_the_same_end(launch, tmp_path, version, ranks):
+def test_an_older_checkpoint_comes_to_the_same_end(resident, tmp_path, version, ranks):
     saved = FILES / f"version{version}.sav"
     assert checkpoint.version_of(saved) == version
     (tmp_path / "data").mkdir()
     shutil.copyfile(saved, tmp_path / "data/0000001350.sav")
-    done = launch(ranks, "resume", "data", "--no-figure", cwd=tmp_path)
+    done = resident(ranks, "resume", "data", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "step 1350" in done.stdout
     assert (tmp_path / "end.dat").read_bytes() == (FILES / f"version{version}_end.dat").read_bytes()

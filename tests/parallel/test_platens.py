@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 
 BIAXIAL = """
 START
@@ -48,10 +48,10 @@ def outputs(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def one(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("platens")
     (folder / "script.py").write_text(BIAXIAL)
-    done = Launcher()(1, "script.py", "--no-figure", cwd=folder)
+    done = resident(1, "script.py", "--no-figure", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
@@ -66,34 +66,34 @@ def test_the_specimen_is_pressed(one: Path) -> None:
 @pytest.mark.mpi
 @pytest.mark.parametrize(("ranks", "threads"), [(2, 1), (3, 1), (1, 2)])
 def test_the_same_on_any_ranks_and_threads(
-    one: Path, launch: Launcher, tmp_path: Path, ranks: int, threads: int
+    one: Path, resident: Resident, tmp_path: Path, ranks: int, threads: int
 ) -> None:
     shutil.copy(one / "script.py", tmp_path)
-    done = launch(ranks, "-j", threads, "script.py", "--no-figure", cwd=tmp_path)
+    done = resident(ranks, "-j", threads, "script.py", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert outputs(tmp_path) == outputs(one)
 
 
 @pytest.mark.mpi
-def test_the_same_across_a_restart(one: Path, launch: Launcher, tmp_path: Path) -> None:
+def test_the_same_across_a_restart(one: Path, resident: Resident, tmp_path: Path) -> None:
     shutil.copytree(one, tmp_path / "again")
     folder = tmp_path / "again"
     for path in folder.glob("data/0000000300.sav"):
         path.unlink()
-    done = launch(2, "script.py", "--resume", "--no-figure", cwd=folder)
+    done = resident(2, "script.py", "--resume", "--no-figure", cwd=folder)
     assert done.returncode == 0 and "CYC, 300 steps, 150 left" in done.stdout, done.stdout + done.stderr
     assert outputs(folder) == outputs(one)
 
 
 @pytest.mark.mpi
-def test_a_loaded_frame_goes_on_alike(one: Path, launch: Launcher, tmp_path: Path) -> None:
+def test_a_loaded_frame_goes_on_alike(one: Path, resident: Resident, tmp_path: Path) -> None:
     written = []
     for ranks in (1, 2):
         folder = tmp_path / str(ranks)
         (folder / "start").mkdir(parents=True)
         shutil.copy(one / "data/all_0000000200.dat", folder / "start")
         (folder / "script.py").write_text(LOADED)
-        done = launch(ranks, "script.py", "--no-figure", cwd=folder)
+        done = resident(ranks, "script.py", "--no-figure", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
         written.append(outputs(folder))
     assert written[0] == written[1] and "all_0000000300.vtkhdf" in written[0]

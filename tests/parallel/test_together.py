@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 
 LAW = """\
 from hpcdem import StateVariable, element_law
@@ -35,18 +35,18 @@ pcdc node boundary mech-m-b-c type 1 (0,0) range y -0.01 0.01
 pcdc model gravity (0,-9.81)
 pcdc model option dynamic off
 pcdc model option collision off
-pcdc model solve ratio 1e-5
+pcdc model solve ratio 1e-4
 pcdc element-face boundary m-s-b-c stress-normal -6e5 range y 2.99 3.01
-pcdc model solve ratio 1e-5 cycles 4000
+pcdc model solve ratio 1e-4 cycles 4000
 pcdc bolt create polyline (2.0,3.0) (2.2,0.4) length 0.2 plate group 'a'
 pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 t-y-f 60e3 \\
     s-s-r-b 1e8 g-t 0.0125 c-r-g 2e5 c-g-b 2e5 friction-rock-grout 20
 pcdc model creep on dt 500
-pcdc model solve ratio 1e-5 time 3000
+pcdc model solve ratio 1e-4 time 3000
 """
 REST = """\
 pcdc element c-model null relax 200 range x 3.3 4 y 1.6 3
-pcdc model solve ratio 1e-5 time 2000
+pcdc model solve ratio 1e-4 time 2000
 pcdc model creep off
 pcdc model option dynamic on
 pcdc node reset velocity
@@ -69,12 +69,12 @@ if pcdc.rank == 0:
 """
 
 
-def ended(launch: Launcher, folder: Path, ranks: int, script: str, *options: str) -> str:
+def ended(resident: Resident, folder: Path, ranks: int, script: str, *options: str) -> str:
     """What the script prints last."""
     folder.mkdir(exist_ok=True)
     (folder / "stiff.py").write_text(LAW)
     (folder / "all.sc").write_text(script)
-    done = launch(ranks, "--no-figure", *options, "all.sc", cwd=folder)
+    done = resident(ranks, "--no-figure", *options, "all.sc", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "most True" in done.stdout  # something has flowed, crept, is pulled, has slipped
     (found,) = (line for line in done.stdout.splitlines() if line.startswith("digest"))
@@ -82,10 +82,10 @@ def ended(launch: Launcher, folder: Path, ranks: int, script: str, *options: str
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     """The end of the run on one rank, and its folder with what it saved in mid-creep."""
     folder = tmp_path_factory.mktemp("alone")
-    return ended(Launcher(), folder, 1, START + "pcdc model save 'middle.sav'\n" + REST, "-j", "1"), folder
+    return ended(resident, folder, 1, START + "pcdc model save 'middle.sav'\n" + REST, "-j", "1"), folder
 
 
 @pytest.mark.mpi
@@ -93,12 +93,12 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
     ("ranks", "threads"),
     [(3, 1), pytest.param(1, 2, marks=pytest.mark.slow), pytest.param(2, 2, marks=pytest.mark.slow)],
 )
-def test_the_same_on_any_ranks(alone, launch, tmp_path, ranks, threads):
-    assert ended(launch, tmp_path, ranks, START + REST, "-j", str(threads)) == alone[0]
+def test_the_same_on_any_ranks(alone, resident, tmp_path, ranks, threads):
+    assert ended(resident, tmp_path, ranks, START + REST, "-j", str(threads)) == alone[0]
 
 
 @pytest.mark.mpi
-def test_from_the_middle(alone, launch, tmp_path):
+def test_from_the_middle(alone, resident, tmp_path):
     """Of the restored law the script must say where it is: a checkpoint names no file that is executed."""
     begin = f"pcdc element law 'stiff.py:stiff'\npcdc model restore '{alone[1] / 'middle.sav'}'\n"
-    assert ended(launch, tmp_path, 2, begin + REST, "-j", "1") == alone[0]
+    assert ended(resident, tmp_path, 2, begin + REST, "-j", "1") == alone[0]

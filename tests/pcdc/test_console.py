@@ -79,7 +79,7 @@ def test_exit_ends(bench):
         ("pcdc node group 'a' range g", "group geometry"),
         (
             "pcdc history create 'h' ",
-            "node element joint bolt-node bolt-element flow-node flow-channel liner-node liner-element model",
+            "node element joint bolt-node bolt-element flow-node flow-channel well liner-node liner-element model",
         ),
         ("pcdc element group ", ""),
         ("pcdc nothing ", ""),

@@ -11,14 +11,14 @@ import pytest
 
 from hpcdem.commands.fdem.cracks import COLUMNS
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
-from tests.conftest import Launcher
 from tests.pcdc.test_whole import SCRIPTS, tables
+from tests.property.workers import Resident
 
 
-def start(launch, folder: Path, ranks: int, *words: str):
+def start(resident, folder: Path, ranks: int, *words: str):
     folder.mkdir(exist_ok=True)
     shutil.copy(SCRIPTS / "cracks.sc", folder)
-    return launch(ranks, "cracks.sc", "--no-figure", *words, cwd=folder, timeout=1200)
+    return resident(ranks, "cracks.sc", "--no-figure", *words, cwd=folder, timeout=1200)
 
 
 def equal(one: Path, other: Path) -> None:
@@ -34,12 +34,12 @@ def equal(one: Path, other: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory) -> Path:
+def alone(resident: Resident, tmp_path_factory) -> Path:
     """The run on one rank, in a folder in which another run left its table."""
     folder = tmp_path_factory.mktemp("cracks") / "one"
     (folder / "data").mkdir(parents=True)
     (folder / "data" / "cracks.csv").write_text("step,time [s]\n999999,1\n")
-    done = start(Launcher(), folder, 1)
+    done = start(resident, folder, 1)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -80,26 +80,26 @@ def test_corners_tell_their_nodes(alone):
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [3, pytest.param(2, marks=pytest.mark.slow), pytest.param(4, marks=pytest.mark.slow)])
-def test_on_several_ranks(launch, alone, tmp_path, ranks):
-    done = start(launch, tmp_path / "a", ranks)
+def test_on_several_ranks(resident, alone, tmp_path, ranks):
+    done = start(resident, tmp_path / "a", ranks)
     assert done.returncode == 0, done.stderr
     equal(alone, tmp_path / "a")
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(("before", "after"), [(2, 1), pytest.param(1, 4, marks=pytest.mark.slow)])
-def test_stopped_and_resumed(launch, alone, tmp_path, before, after):
+def test_stopped_and_resumed(resident, alone, tmp_path, before, after):
     """What the stopped run wrote after its checkpoint is cut off, and nothing is missing or there twice."""
     folder = tmp_path / "a"
     folder.mkdir()
     (folder / "stop").touch()
-    done = start(launch, folder, before)
+    done = start(resident, folder, before)
     assert done.returncode == 85, done.stderr
     (folder / "stop").unlink()
     table = folder / "data" / "cracks.csv"
     known = table.read_bytes()
     assert (alone / "data" / "cracks.csv").read_bytes().startswith(known) and len(known.splitlines()) > 4
     table.write_bytes(known + b"790,1.0,3,0.0,0.0,1.0,0.1,1.0,780,1.0\n79")
-    again = start(launch, folder, after, "--resume")
+    again = start(resident, folder, after, "--resume")
     assert again.returncode == 0, again.stderr
     equal(alone, folder)

@@ -58,8 +58,9 @@ def _without(options: tuple[Option, ...], *names: str) -> list[Option]:
 
 EXCLUDING = {
     "model time-step": ("value", "mass-scaling"), "model solve": ("time", "elastic", "cycles", "solver", "steps"),
-    "history create": ("id", "nearest", "mean", "minimum", "sum", "variable"),
+    "history create": ("id", "nearest", "mean", "minimum", "sum", "variable", "well"),
     "bolt create polyline": ("length",), "flow-node initial": ("saturation",),
+    "well stage": ("pressure", "shut-in"),
     "chart add": ("values", "x", "y"), "field create": ("weibull", "lognormal"), "output vtk": ("off",),
 }  # fmt: skip
 """Keywords that do not go with the others of their command."""

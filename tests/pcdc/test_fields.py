@@ -64,17 +64,15 @@ def test_what_they_say_is_what_the_objects_get(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory) -> Path:
-    from tests.conftest import Launcher
-
+def alone(resident, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("fields") / "one"
-    return run(Launcher(), folder, 1, RUN)
+    return run(resident, folder, 1, RUN)
 
 
-def run(launch, folder: Path, ranks: int, text: str) -> Path:
+def run(resident, folder: Path, ranks: int, text: str) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / "a.sc").write_text(text)
-    done = launch(ranks, "a.sc", "--no-figure", cwd=folder, timeout=600)
+    done = resident(ranks, "a.sc", "--no-figure", cwd=folder, timeout=600)
     assert done.returncode == 0, done.stderr
     if "joints" in text:
         assert int(done.stdout.split("joints ")[-1].split()[2]) > 3  # something broke
@@ -89,10 +87,10 @@ def test_frames_show_what_varies(alone):
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
-def test_ranks_and_a_restart_do_not_change_a_bit(launch, alone, tmp_path, ranks):
-    run(launch, tmp_path, ranks, RUN)
+def test_ranks_and_a_restart_do_not_change_a_bit(resident, alone, tmp_path, ranks):
+    run(resident, tmp_path, ranks, RUN)
     assert tables(tmp_path / "end.sav") == tables(alone / "end.sav")
-    run(launch, tmp_path, ranks, GO_ON)
+    run(resident, tmp_path, ranks, GO_ON)
     assert tables(tmp_path / "end.sav") == tables(alone / "end.sav")
 
 

@@ -114,6 +114,7 @@ def test_histories_record_what_the_commands_can():
         "element": g.ELEMENT,
         "joint": g.JOINT,
         "model": "model",
+        "well": "well",
         **{kind: kind for kind in (*g.SUPPORTS, *g.FLOW)},
     }
     for kind, values in t.RECORDED.items():

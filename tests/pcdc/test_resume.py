@@ -8,22 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Launcher
 from tests.pcdc.test_whole import SCRIPTS, tables
+from tests.property.workers import Resident
 
 
-def start(launch, folder: Path, ranks: int = 1, *words: str):
+def start(resident, folder: Path, ranks: int = 1, *words: str):
     """The script in a folder of its own."""
     folder.mkdir(exist_ok=True)
     shutil.copy(SCRIPTS / "loop.sc", folder)
-    return launch(ranks, "loop.sc", *words, cwd=folder, timeout=1200)
+    return resident(ranks, "loop.sc", *words, cwd=folder, timeout=1200)
 
 
 @pytest.fixture(scope="module")
-def straight(tmp_path_factory) -> tuple[Path, list[str]]:
+def straight(resident: Resident, tmp_path_factory) -> tuple[Path, list[str]]:
     """The run that was not stopped, and what its script said."""
     folder = tmp_path_factory.mktemp("loop") / "one"
-    done = start(Launcher(), folder)
+    done = start(resident, folder)
     assert done.returncode == 0, done.stderr
     assert "element-steps/s" in done.stdout and "closing error" in done.stdout
     return folder, said(done.stdout)
@@ -34,11 +34,11 @@ def said(text: str) -> list[str]:
     return [line for line in text.splitlines() if line.startswith(("step ", "last ")) and "|" not in line]
 
 
-def stopped(launch, folder: Path, ranks: int = 1) -> list[str]:
+def stopped(resident, folder: Path, ranks: int = 1) -> list[str]:
     """A run that stops itself in the fourth turn of its loop; what its script said."""
     folder.mkdir()
     (folder / "stop").touch()
-    done = start(launch, folder, ranks)
+    done = start(resident, folder, ranks)
     assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stderr
     (folder / "stop").unlink()
     (path,) = (folder / "data").glob("*.sav")
@@ -59,56 +59,56 @@ def check_equal(one: Path, other: Path) -> None:
             assert tables(one / "data" / name) == tables(other / "data" / name), name
 
 
-def test_it_goes_on_as_if_nothing_had_happened(launch, straight, tmp_path):
+def test_it_goes_on_as_if_nothing_had_happened(resident, straight, tmp_path):
     folder, lines = straight
-    before = stopped(launch, tmp_path / "a")
-    again = start(launch, tmp_path / "a", 1, "--resume")
+    before = stopped(resident, tmp_path / "a")
+    again = start(resident, tmp_path / "a", 1, "--resume")
     assert again.returncode == 0, again.stderr
     assert before + said(again.stdout) == lines  # no line twice: what was printed before is not printed again
     check_equal(folder, tmp_path / "a")
-    assert "there is nothing to go on with" in launch(1, "resume", "data", cwd=tmp_path / "a").stdout
+    assert "there is nothing to go on with" in resident(1, "resume", "data", cwd=tmp_path / "a").stdout
 
 
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize(("before", "after"), [(1, 2), (2, 3), (3, 1)])
-def test_on_another_number_of_ranks(launch, straight, tmp_path, before, after):
+def test_on_another_number_of_ranks(resident, straight, tmp_path, before, after):
     folder, lines = straight
-    first = stopped(launch, tmp_path / "a", before)
-    again = launch(after, "resume", "data", cwd=tmp_path / "a", timeout=1200)
+    first = stopped(resident, tmp_path / "a", before)
+    again = resident(after, "resume", "data", cwd=tmp_path / "a", timeout=1200)
     assert again.returncode == 0, again.stderr
     assert first + said(again.stdout) == lines
     check_equal(folder, tmp_path / "a")
 
 
-def test_a_changed_script_is_refused_and_a_damaged_checkpoint_passed_over(launch, tmp_path):
+def test_a_changed_script_is_refused_and_a_damaged_checkpoint_passed_over(resident, tmp_path):
     folder = tmp_path / "a"
-    stopped(launch, folder)
+    stopped(resident, folder)
     script = folder / "loop.sc"
     text = script.read_text()
     script.write_text(text.replace("model step 150", "model step 140"))
-    done = launch(1, "loop.sc", "--resume", cwd=folder)
+    done = resident(1, "loop.sc", "--resume", cwd=folder)
     assert done.returncode == 2 and "loop.sc:19: pcdc model step 140: this line is not what was" in done.stderr
     script.unlink()
-    done = launch(1, "resume", "data", cwd=folder)
+    done = resident(1, "resume", "data", cwd=folder)
     assert done.returncode == 2 and "a PCDC script is Python, which is not taken out of a checkpoint" in done.stderr
     script.write_text(text)
     (path,) = (folder / "data").glob("*.sav")
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    done = launch(1, "loop.sc", "--resume", "--time-limit", "0:00:00.001", cwd=folder)
+    done = resident(1, "loop.sc", "--resume", "--time-limit", "0:00:00.001", cwd=folder)
     assert "is damaged" in done.stdout and "starting at the beginning" in done.stdout
 
 
-def test_without_a_checkpoint_it_starts_at_the_beginning(launch, straight, tmp_path):
-    done = start(launch, tmp_path / "a", 1, "--resume", "--no-figure")
+def test_without_a_checkpoint_it_starts_at_the_beginning(resident, straight, tmp_path):
+    done = start(resident, tmp_path / "a", 1, "--resume", "--no-figure")
     assert done.returncode == 0 and "starting at the beginning" in done.stdout and said(done.stdout) == straight[1]
 
 
-def test_a_time_limit_stops_it(launch, straight, tmp_path):
+def test_a_time_limit_stops_it(launch, resident, straight, tmp_path):
     folder, lines = straight
-    done = start(launch, tmp_path / "a", 1, "--time-limit", "0.001")
+    done = start(resident, tmp_path / "a", 1, "--time-limit", "0.001")
     assert done.returncode == 85 and "by the time limit" in done.stderr, done.stderr
     told = launch(1, "info", "data", *(str(p) for p in (tmp_path / "a" / "data").glob("*.sav")), cwd=tmp_path / "a")
     assert told.returncode == 0, told.stdout
@@ -117,25 +117,25 @@ def test_a_time_limit_stops_it(launch, straight, tmp_path):
     assert facts["elements"] == "32" and facts["joints"] == "38" and facts["broken"] == "0"
     assert facts["at"] == "line 19: pcdc model step 150" and facts["histories"] == "load; kinetic"
     assert facts["names"] == "m_L; m_v" and "hpcdem resume data" in told.stdout
-    again = start(launch, tmp_path / "a", 1, "--resume", "--no-figure")
+    again = start(resident, tmp_path / "a", 1, "--resume", "--no-figure")
     assert again.returncode == 0 and said(done.stdout) + said(again.stdout) == lines
     check_equal(folder, tmp_path / "a")
 
 
-def test_checkpoints_that_nobody_asked_for(launch, straight, tmp_path):
+def test_checkpoints_that_nobody_asked_for(resident, straight, tmp_path):
     folder, _ = straight
-    done = start(launch, tmp_path / "a", 1, "--autosave", "0.001", "--no-figure")
+    done = start(resident, tmp_path / "a", 1, "--autosave", "0.001", "--no-figure")
     assert done.returncode == 0 and "written as the last one was long ago" in done.stdout
     assert 1 <= len(list((tmp_path / "a" / "data").glob("auto_*.sav"))) <= 2
     check_equal(folder, tmp_path / "a")
     (tmp_path / "a" / "end.sav").unlink()
-    again = start(launch, tmp_path / "a", 1, "--resume", "--no-figure")
+    again = start(resident, tmp_path / "a", 1, "--resume", "--no-figure")
     assert again.returncode == 0 and "going on from" in again.stdout
     check_equal(folder, tmp_path / "a")
 
 
-def test_what_is_for_particles_only_is_refused(launch, tmp_path):
-    done = start(launch, tmp_path / "a", 1, "--check-reproducible", "10")
+def test_what_is_for_particles_only_is_refused(resident, tmp_path):
+    done = start(resident, tmp_path / "a", 1, "--check-reproducible", "10")
     assert done.returncode == 2 and "--check-reproducible is for models of particles" in done.stderr
     assert not (tmp_path / "a" / "data").exists()
 

@@ -27,6 +27,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.liners.model import Liners
 from hpcdem.runtime.progress import Log
 from hpcdem.runtime.stop_requests import StopRequests
@@ -320,6 +321,8 @@ class Writer:
             self._bolts()
         if self.rng("liners").random() < 0.3:
             self._liners()
+        if self.kind == BLOCKS and not self.creeps and self.rng("fluid").random() < 0.35:
+            self._fluid()
         if draw.random() < 0.5:
             self._surfaces()
         vy = u.speed(draw.choice((-2.0, -4.0)))
@@ -439,6 +442,41 @@ class Writer:
         if self.has("properties"):
             self.add(f"pcdc liner c-model beam property {_words(values | {'young': 2.0 * values['young']})}{where}")
         self.add(f"pcdc liner c-model beam property {_words(values)}{where}")
+
+    def _fluid(self) -> None:
+        """In all joints or those of the lower body: a well pumps, is shut in and draws; a pressure on the left."""
+        u, rng = self.units, self.rng("water")
+        values = {
+            "fluid-density": u.density(1000.0), "fluid-bulk": u.stress(rng.choice((1e5, 1e6))),
+            "viscosity": 1e-6 * u.l**2 / u.t, "aperature-initial": u.length(rng.choice((1e-4, 3e-4))),
+            "aperature-minumum": u.length(2e-5), "aperature-maximum": u.length(2e-3),
+            "shear-dilation": rng.choice((0.0, 10.0)),
+        }  # fmt: skip
+        if self.static:
+            self.add(f"pcdc model time-step hydraulic {u.time(2.0**-18)!r}")
+        where = "" if rng.random() < 0.5 else f" range y 0 {u.length(self.high)!r}"
+        self._assign("pcdc face-joint c-model hydr-p-m", values, where or self.where("joint"), "joints", 5,
+                     "pcdc face-joint property")  # fmt: skip
+        if rng.random() < 0.5:
+            self.add(f"pcdc model sub-step mechanical {rng.choice((1, 3))}")
+        self.add(f"pcdc flow-node initial pressure {u.stress(2e3)!r}")
+        left = u.length(0.3)
+        self.add(f"pcdc node boundary hydra-c-f-b pressure {self._steady('held', u.stress(5e3))} range x 0 {left!r}")
+        right = f"range x {u.length(0.4)!r} {u.length(0.6)!r} y 0 {u.length(self.high)!r}"
+        rate, limit = rng.choice((1e-3, 0.1)) * u.l**2 / u.t, u.stress(2e4)
+        self.add(
+            f"pcdc well create 'pump' {right}",
+            f"pcdc well stage 'pump' rate {self._steady('pumped', rate)} limit {limit!r} time {u.time(3.3e-4)!r}",
+            f"pcdc well stage 'pump' shut-in time {u.time(1e-4)!r}",
+            f"pcdc well stage 'pump' rate {-rate!r}",
+        )
+
+    def _steady(self, name: str, value: float) -> str:
+        """A number, or a table of it."""
+        if not self.has("tables"):
+            return repr(value)
+        self.add(f"pcdc table create '{name}' values (0,{value!r}) ({self.units.time(100.0)!r},{value!r})")
+        return f"table '{name}'"
 
     def _surfaces(self) -> None:
         u = self.units
@@ -634,6 +672,13 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
         if liners is not None:
             found["thrust"] = liners.values("liner-element", "axial_force") / u.toughness(1.0)
             found["rotation"] = liners.values("liner-node", "rotation")
+        flow = Flow.there(blocks)
+        if flow is not None:
+            found["pressure"] = flow.values("flow-node", "pressure") / u.stress(1.0)
+            found["fluid"] = flow.values("flow-node", "fluid") / u.l**2
+            found["aperture"] = flow.values("flow-channel", "aperture") / u.l
+            found["injected"] = np.array([flow.well_value("pump", "injected") / u.l**2])
+            found["flow time"] = np.array([flow.time / u.t])
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
         found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():

@@ -1,4 +1,5 @@
-"""Carries out scripts one after the other, each in a session of its own: `[mpiexec -n R] python worker.py SOCKET`.
+"""Carries out scripts one after the other, each in a session of its own: `[mpiexec -n R] python worker.py SOCKET
+[THREADS]`.
 
 Every rank speaks with the tests through a socket of its own: one line of JSON in, one out. A script runs as it does
 under the program `hpcdem`; only the process stays.
@@ -6,6 +7,7 @@ under the program `hpcdem`; only the process stays.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
@@ -28,7 +30,8 @@ TOLD = re.compile(r"warning: |GEN: |LOAD: |step \d+: \d+ particles left")
 
 def main() -> None:
     """Until the other end hangs up."""
-    launch.prepare_environment(1)
+    threads = int((sys.argv[2:] or [1])[0])
+    launch.prepare_environment(threads)
     comm = launch.start_mpi()
     shutdown.GRACE = AT_ONCE
     channel = shutdown.private_channel(comm)
@@ -40,7 +43,7 @@ def main() -> None:
                 talk.write(json.dumps({"rank": comm.rank} | answer) + "\n")
                 talk.flush()
 
-            get_ready(comm)
+            get_ready(comm, "", threads=threads)
             say({"pid": os.getpid()})
             for words in talk:
                 job = json.loads(words)
@@ -48,12 +51,20 @@ def main() -> None:
     shutdown.leave(shutdown.ExitStatus(rank=comm.rank))
 
 
-def get_ready(comm: Any) -> None:
-    """Load the kernels, or compile them: a script is not to wait for that."""
+READY: set[str] = set()
+"""Kinds of kernels that are loaded."""
+
+
+def get_ready(comm: Any, *kinds: str, threads: int = 1) -> None:
+    """Load kernels, or compile them: a script is not to wait for that, and each kind has to be loaded before a script
+    imports some of it."""
     from hpcdem import session
     from hpcdem.runtime.progress import Log
 
-    session.prepare(comm, Log(comm.rank, stream=io.StringIO()), "", 1)
+    for kind in kinds:
+        if kind not in READY:
+            session.prepare(comm, Log(comm.rank, stream=io.StringIO()), kind, threads)
+            READY.add(kind)
 
 
 # ---- a script --------------------------------------------------------------------------------------------------------
@@ -157,6 +168,43 @@ def prepare_accident(sim: Any, kind: str) -> None:
     sim.watchers.append(Watcher(1, happen))
 
 
+# ---- the program -----------------------------------------------------------------------------------------------------
+
+
+def carry_out_words(comm: Any, channel: Any, job: dict[str, Any], say: Any) -> dict[str, Any]:
+    """`hpcdem WORDS` in job["folder"]: exit code, what is printed to stdout and to stderr."""
+    from hpcdem.cli import new_session, read_options, run
+    from hpcdem.runtime.progress import Log
+    from hpcdem.session import enter
+
+    get_ready(comm, "", "blocks", "coupled", threads=job["threads"])
+    os.chdir(job["folder"])
+    words, path, modules = list(sys.argv), list(sys.path), set(sys.modules)
+    out, err, session, failure = io.StringIO(), io.StringIO(), None, None
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            options = read_options(job["words"])
+            session = new_session(comm, Log(comm.rank), options, job["threads"])
+            session.ready = READY
+            session.stop.install(comm.rank)  # a session does so when it waits for kernels
+            run(session, options)
+        except BaseException as error:
+            failure = shutdown.describe(error)
+        if session is not None:
+            session.stop.uninstall()
+        if channel is not None and not shutdown.all_arrive(channel, failure):
+            say({"code": 1, "out": out.getvalue(), "err": failure.text if failure else "", "alone": True})
+            comm.abort(1)
+        if comm.rank == 0:
+            shutdown.report(failure, 0, 1)
+    enter(None)
+    sys.argv, sys.path = words, path
+    for name in set(sys.modules) - modules:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(job["folder"]):
+            del sys.modules[name]  # a helper that stands beside the script
+    return {"code": failure.code if failure else 0, "out": out.getvalue(), "err": err.getvalue()}
+
+
 # ---- a checkpoint ----------------------------------------------------------------------------------------------------
 
 
@@ -197,7 +245,7 @@ def digest(state: Any, tables: Any) -> str:
     return found.hexdigest()
 
 
-TASKS = {"script": carry_out, "damaged": read_damaged}
+TASKS = {"script": carry_out, "program": carry_out_words, "damaged": read_damaged}
 
 if __name__ == "__main__":
     main()

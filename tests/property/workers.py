@@ -37,8 +37,8 @@ class Lost(AssertionError):
 class Worker:
     """`ranks` processes of one job; started when first asked, and again after a loss."""
 
-    def __init__(self, ranks: int) -> None:
-        self.ranks = ranks
+    def __init__(self, ranks: int, threads: int = 1) -> None:
+        self.ranks, self.threads = ranks, threads
         self._process: subprocess.Popen | None = None
         self._lines: list[tuple[socket.socket, TextIO]] = []
         self._folder: tempfile.TemporaryDirectory | None = None
@@ -100,6 +100,7 @@ class Worker:
         self._folder = tempfile.TemporaryDirectory(prefix="hpcdem-")  # short: names of sockets have 100 letters
         address = f"{self._folder.name}/s"
         command = [*(mpi_command(self.ranks) if self.ranks > 1 else []), sys.executable, str(WORKER), address]
+        command += [str(self.threads)]
         with socket.socket(socket.AF_UNIX) as door, open(self._log, "wb") as log:
             door.bind(address)
             door.listen(self.ranks)
@@ -137,6 +138,31 @@ class Worker:
             line.close()
         self.stop()
         raise Lost(f"{why}\n{said}")
+
+
+class Resident:
+    """`hpcdem WORDS` on n ranks, as `Launcher` does it, but by processes that stay: for tests that compare what many
+    runs leave; others see to it that the program starts. Ranks and threads that were not asked before are started."""
+
+    def __init__(self) -> None:
+        self.workers: dict[tuple[int, int], Worker] = {}
+
+    def __call__(
+        self, n: int, *args: object, cwd: Path | None = None, timeout: float = 300.0
+    ) -> subprocess.CompletedProcess[str]:
+        """To its end; a test fails if it takes longer than `timeout` seconds, or if a rank is lost."""
+        words = [str(arg) for arg in args]
+        threads = int(words[words.index("-j") + 1]) if "-j" in words else 1
+        worker = self.workers.setdefault((n, threads), Worker(n, threads))
+        worker.ask(task="program", folder=str((cwd or Path()).resolve()), words=words, threads=threads)
+        answers = worker.answers(timeout)
+        out, err = ("".join(answer[name] for answer in answers) for name in ("out", "err"))
+        return subprocess.CompletedProcess(["hpcdem", *words], answers[0]["code"], out, err)
+
+    def stop(self) -> None:
+        """Of all."""
+        for worker in self.workers.values():
+            worker.stop()
 
 
 class Pair:

@@ -27,6 +27,7 @@ from hpcdem.physics.fdem import groups as g
 from hpcdem.runtime.run_folder import RECORD
 from tests.conftest import ROOT, Launcher
 from tests.pcdc.fake import Bench
+from tests.property.workers import Resident
 from tests.short_push import contents
 
 # ---- every command ---------------------------------------------------------------------------------------------------
@@ -165,6 +166,16 @@ SAME: list[tuple[str, str]] = [
     ("pcdc node boundary hydra-c-f-b flow-rate 2", "sim.nodes.fluid(flow_rate=2)"),
     ("pcdc flow-node initial saturation 1 range x 0 1", "sim.flow_nodes.initial(saturation=1, where='x 0 1')"),
     ("pcdc flow-node initial pressure 1e6", "sim.flow_nodes.initial(pressure=1e6)"),
+    ("pcdc well create 'w' range geometry 'l'", "sim.wells.create('w', where=g.OnLayer('l'))"),
+    ("pcdc well stage 'w' rate 1e-4 time 60 limit 8e6", "sim.wells.stage('w', rate=1e-4, time=60, limit=8e6)"),
+    ("pcdc well stage 'w' rate table 'v'", "sim.wells.stage('w', rate='v')"),
+    ("pcdc well stage 'w' pressure 2e6", "sim.wells.stage('w', pressure=2e6)"),
+    ("pcdc well stage 'w' shut-in time 5", "sim.wells.stage('w', shut_in=True, time=5)"),
+    ("pcdc history create 'h' well value injected well 'w' every 3",
+     "sim.histories.create('h', 'well', 'injected', well='w', every=3)"),
+    ("pcdc face-joint property a-initial field 'f' shear-dilation 5 shear-dilation-limit 1e-4 range crack",
+     "sim.joints.property(aperture_initial=sim.fields.drawn('f'), shear_dilation=5, shear_dilation_limit=1e-4, "
+     "where='crack')"),
     ("pcdc history create 'h' flow-channel value aperture max range crack",
      "sim.histories.create('h', 'flow-channel', 'aperture', how='maximum', where='crack')"),
     ("pcdc history create 'h' flow-node nearest (5,0) value pressure",
@@ -632,10 +643,10 @@ open("end_script.txt", "w").write(" ".join(float(v).hex() for v in values))
 
 
 @pytest.mark.mpi
-def test_particles_and_blocks_in_one_program(launch: Launcher, tmp_path: Path) -> None:
+def test_particles_and_blocks_in_one_program(resident: Resident, tmp_path: Path) -> None:
     """The same bits as the script, on two ranks, and when it was stopped and taken up."""
     (tmp_path / "script.sc").write_text(BOTH_AS_SCRIPT)
-    done = launch(1, "script.sc", "--no-figure", cwd=tmp_path)
+    done = resident(1, "script.sc", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     expected = (tmp_path / "end_script.txt").read_text()
     frames = {path.name for path in (tmp_path / "data" / "particles").glob("*.vtkhdf")}
@@ -643,10 +654,10 @@ def test_particles_and_blocks_in_one_program(launch: Launcher, tmp_path: Path) -
         (tmp_path / name).mkdir()
         (tmp_path / name / "study.py").write_text(BOTH)
         words = ("--", "stop") if name == "cut" else ()
-        done = launch(ranks, "study.py", "--no-figure", *words, cwd=tmp_path / name)
+        done = resident(ranks, "study.py", "--no-figure", *words, cwd=tmp_path / name)
         assert done.returncode == (85 if words else 0), done.stdout + done.stderr
     assert "go on with Simulation.resume()" in done.stderr
-    done = launch(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
+    done = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
     assert done.returncode == 0, done.stdout + done.stderr
     ends = [path.read_text() for name in ("whole", "cut") for path in (tmp_path / name).glob("end_*.txt")]
     assert ends == [expected] * 3
@@ -679,15 +690,15 @@ open(f"end_{sim.rank}.txt", "w").write(" ".join(float(v).hex() for v in sim.node
 
 
 @pytest.mark.mpi
-def test_stopped_in_the_middle_and_taken_up(launch: Launcher, tmp_path: Path) -> None:
+def test_stopped_in_the_middle_and_taken_up(resident: Resident, tmp_path: Path) -> None:
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "study.py").write_text(STOPPED.replace("STEPS", "150000"))
-    done = launch(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
+    done = resident(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
     assert done.returncode == 0, done.stdout + done.stderr
-    cut = launch(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
+    cut = resident(1, "study.py", "--no-figure", "--", "stop", cwd=tmp_path / "cut")
     assert cut.returncode == 85 and "go on with Simulation.resume()" in cut.stderr, cut.stdout + cut.stderr
-    rest = launch(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
+    rest = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
     assert rest.returncode == 0 and "going on from" in rest.stdout, rest.stdout + rest.stderr
     ends = {name: [file.read_text() for file in (tmp_path / name).glob("end_*.txt")] for name in ("whole", "cut")}
     assert ends["cut"] == ends["whole"] * 2
@@ -726,11 +737,11 @@ REFUSED = {
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_refused_in_a_run(launch: Launcher, tmp_path: Path, case: str) -> None:
+def test_what_is_refused_in_a_run(resident: Resident, tmp_path: Path, case: str) -> None:
     text, code, expected = REFUSED[case]
     (tmp_path / "study.py").write_text(HEAD + text + "\n")
     options = {"kind of run": ["--resume"], "fingerprints": ["--check-reproducible", "5"]}.get(case, [])
-    done = launch(1, "study.py", "--no-figure", *options, cwd=tmp_path)
+    done = resident(1, "study.py", "--no-figure", *options, cwd=tmp_path)
     assert done.returncode == code and re.search(expected, done.stderr), done.stdout + done.stderr
     assert "Traceback" not in done.stderr
 
@@ -762,9 +773,9 @@ with hpcdem.Simulation("b") as sand:
 """
 
 
-def test_several_models_and_their_folders(launch: Launcher, tmp_path: Path) -> None:
+def test_several_models_and_their_folders(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "study.py").write_text(QUIET)
-    done = launch(1, "study.py", "--no-figure", cwd=tmp_path)
+    done = resident(1, "study.py", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     first = done.stdout.partition("mesh:")[0]
     assert "step 4" not in first and done.stdout.count("mesh: ") == 1  # the first one is quiet
@@ -782,7 +793,7 @@ def test_the_example_comes_to_the_theory(launch: Launcher, tmp_path: Path) -> No
     assert len(away) == 3 and away[0] > away[1] > away[2] > 0.0 and away[2] < 0.01
 
 
-def test_the_programs_of_the_documentation_run(launch: Launcher, tmp_path: Path) -> None:
+def test_the_programs_of_the_documentation_run(resident: Resident, tmp_path: Path) -> None:
     """The section on blocks of docs/python.md, its programs one after the other."""
     text = (ROOT / "docs" / "python.md").read_text().split("## Blocks\n")[1].split("\n## ")[0]
     programs = [part.split("```")[0] for part in text.split("```python\n")[1:]]
@@ -790,11 +801,11 @@ def test_the_programs_of_the_documentation_run(launch: Launcher, tmp_path: Path)
     for k, program in enumerate(programs):
         assert "sim.step(20000)" in program
         (tmp_path / f"study{k}.py").write_text(program.replace("sim.step(20000)", "sim.step(50)"))
-        done = launch(1, f"study{k}.py", "--no-figure", f"--outdir=data{k}", cwd=tmp_path)
+        done = resident(1, f"study{k}.py", "--no-figure", f"--outdir=data{k}", cwd=tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_script_keeps_its_own_blocks(launch: Launcher, tmp_path: Path) -> None:
+def test_a_script_keeps_its_own_blocks(resident: Resident, tmp_path: Path) -> None:
     (tmp_path / "a.sc").write_text("import hpcdem\nsim = hpcdem.Simulation('b')\npcdc model new\nsim.mesh.quality()\n")
-    done = launch(1, "a.sc", "--no-figure", cwd=tmp_path)
+    done = resident(1, "a.sc", "--no-figure", cwd=tmp_path)
     assert done.returncode == 2 and "a.sc:4: mesh.quality: the blocks of a PCDC script are those" in done.stderr

@@ -18,7 +18,7 @@ from hpcdem.io.frames import read_frame
 from hpcdem.physics.dem import diagnostics, saved_state
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.diffusion.model import Diffusion
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import assert_same_files, contents
 
 N, RADIUS, DENSITY = 24, 0.5, 2.0
@@ -194,17 +194,17 @@ sim.finish()
 """
 
 
-def run(launch: Launcher, folder: Path, ranks: int, threads: int = 1, restore: str = "") -> Path:
+def run(resident: Resident, folder: Path, ranks: int, threads: int = 1, restore: str = "") -> Path:
     folder.mkdir()
     (folder / "heat.py").write_text(PROGRAM.format(outdir="data", restore=restore))
-    done = launch(ranks, "heat.py", "-j", threads, cwd=folder)
+    done = resident(ranks, "heat.py", "-j", threads, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder
 
 
 @pytest.mark.mpi
-def test_the_same_files_on_any_ranks_and_threads_and_after_a_restart(launch: Launcher, tmp_path: Path) -> None:
-    alone = run(launch, tmp_path / "alone", 1)
+def test_the_same_files_on_any_ranks_and_threads_and_after_a_restart(resident: Resident, tmp_path: Path) -> None:
+    alone = run(resident, tmp_path / "alone", 1)
     frame = read_frame(tmp_path / "alone/data/all_0000000120.vtkhdf")
     temperature = frame.tables["particles"].columns["temperature"]
     assert temperature.std() > 10.0 and frame.tables["particles"].columns["heat_given"].max() > 0.0
@@ -215,8 +215,8 @@ def test_the_same_files_on_any_ranks_and_threads_and_after_a_restart(launch: Lau
     first, last = ([float(v) for v in row.split(",")[-2:]] for row in (energy[1], energy[-1]))
     assert last[0] - first[0] == pytest.approx(last[1] - first[1], rel=1e-9) and last[1] > 0.0
     for ranks, threads in ((2, 1), (4, 1), (1, 2)):
-        assert_same_files(alone, run(launch, tmp_path / f"{ranks}x{threads}", ranks, threads))
-    on_two = run(launch, tmp_path / "again", 2, restore=str(alone / "middle.sav"))
+        assert_same_files(alone, run(resident, tmp_path / f"{ranks}x{threads}", ranks, threads))
+    on_two = run(resident, tmp_path / "again", 2, restore=str(alone / "middle.sav"))
     for name in ("end.sav", "data/all_0000000120.vtkhdf"):
         one, other = contents(alone / name), contents(on_two / name)
         assert one.keys() == other.keys()

@@ -8,6 +8,7 @@ import pytest
 
 from hpcdem.runtime.run_folder import RECORD
 from tests.conftest import Launcher
+from tests.property.workers import Resident
 from tests.short_push import contents
 
 ZDEM = """\
@@ -81,11 +82,11 @@ assert len(seen) == sim.steps // 7, len(seen)
 
 
 @pytest.fixture(scope="module")
-def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def script(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the run of the ZDEM script on one rank."""
     folder = tmp_path_factory.mktemp("zdem")
     (folder / "model.py").write_text(ZDEM.replace("CYC 300", "SET print 0\nCYC 300"))
-    done = Launcher()(1, "model.py", "--no-figure", cwd=folder)
+    done = resident(1, "model.py", "--no-figure", cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
@@ -112,9 +113,9 @@ def assert_same(one: Path, other: Path) -> None:
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
-def test_python_says_what_the_script_says(script: Path, launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_python_says_what_the_script_says(script: Path, resident: Resident, tmp_path: Path, ranks: int) -> None:
     (tmp_path / "model.py").write_text(PYTHON)
-    done = launch(ranks, "model.py", "--no-figure", cwd=tmp_path)
+    done = resident(ranks, "model.py", "--no-figure", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert_same(script, tmp_path)
 
@@ -171,14 +172,14 @@ if sim.rank == 0:
 
 
 @pytest.mark.mpi
-def test_a_function_may_steer_the_run(launch: Launcher, tmp_path: Path) -> None:
+def test_a_function_may_steer_the_run(resident: Resident, tmp_path: Path) -> None:
     """Servo wall, GEN, DEL and fields set in the middle of a cycle; an early end: the same on all numbers of ranks."""
     ends = []
     for ranks in (1, 2, 4):
         folder = tmp_path / str(ranks)
         folder.mkdir()
         (folder / "model.py").write_text(STEERED)
-        done = launch(ranks, "model.py", "--no-figure", cwd=folder)
+        done = resident(ranks, "model.py", "--no-figure", cwd=folder)
         assert done.returncode == 0, done.stdout + done.stderr
         ends.append([line for line in done.stdout.splitlines() if line.startswith("END")])
     assert len(ends[0]) == 1 and ends[0] == ends[1] == ends[2]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT, Launcher
+from tests.property.workers import Resident
 
 HEAD = """\
 import hpcdem
@@ -52,10 +53,10 @@ WRONG = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_mistake_is_named_with_its_line(launch: Launcher, tmp_path: Path, case: str) -> None:
+def test_a_mistake_is_named_with_its_line(resident: Resident, tmp_path: Path, case: str) -> None:
     text, expected = WRONG[case]
     program(tmp_path, text + "\n")
-    done = launch(1, "study.py", cwd=tmp_path)
+    done = resident(1, "study.py", cwd=tmp_path)
     line = len(HEAD.splitlines()) + 1
     assert done.returncode == 2, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
@@ -85,9 +86,9 @@ def test_an_error_of_one_rank_ends_all(launch: Launcher, tmp_path: Path, how: st
     assert "IndexError" in done.stderr and "study.py" in done.stderr and "runtime/shutdown" not in done.stderr
 
 
-def test_the_traceback_of_a_users_error_begins_in_the_program(launch: Launcher, tmp_path: Path) -> None:
+def test_the_traceback_of_a_users_error_begins_in_the_program(resident: Resident, tmp_path: Path) -> None:
     program(tmp_path, "def f(s):\n    return 1 / 0\nsim.every(3, f)\nsim.cycle(10)\n")
-    done = launch(1, "study.py", cwd=tmp_path)
+    done = resident(1, "study.py", cwd=tmp_path)
     assert done.returncode == 1
     assert "ZeroDivisionError" in done.stderr and "return 1 / 0" in done.stderr
     assert "cli/run.py" not in done.stderr
@@ -128,7 +129,7 @@ for mu in (0.0, 0.5):
 
 
 @pytest.mark.mpi
-def test_stopped_and_resumed(launch: Launcher, tmp_path: Path) -> None:
+def test_stopped_and_resumed(resident: Resident, tmp_path: Path) -> None:
     """A time limit ends the program with 85 and a checkpoint; `resume` finishes the cycle: nothing is different."""
     text = """\
 import sys
@@ -147,11 +148,11 @@ open(f"end_{sim.rank}.txt", "w").write(end)  # not printed: ranks write into one
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()
         program(tmp_path / name, text)
-    whole = launch(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
+    whole = resident(1, "study.py", "--no-figure", cwd=tmp_path / "whole")
     assert whole.returncode == 0, whole.stderr
-    cut = launch(1, "study.py", "--no-figure", "stop", cwd=tmp_path / "cut")
+    cut = resident(1, "study.py", "--no-figure", "stop", cwd=tmp_path / "cut")
     assert cut.returncode == 85 and "Simulation.resume()" in cut.stderr, cut.stderr
-    rest = launch(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
+    rest = resident(2, "study.py", "--no-figure", cwd=tmp_path / "cut")
     assert rest.returncode == 0, rest.stderr
     ends = {name: [file.read_text() for file in (tmp_path / name).glob("end_*.txt")] for name in ("whole", "cut")}
     assert len(ends["whole"]) == 1 and ends["whole"][0].startswith("20010 ")
@@ -202,9 +203,9 @@ assert sim.count == 0 and sim.steps == 0 and not sim.walls
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("ranks", [1, 3])
-def test_what_can_be_seen(launch: Launcher, tmp_path: Path, ranks: int) -> None:
+def test_what_can_be_seen(resident: Resident, tmp_path: Path, ranks: int) -> None:
     program(tmp_path, LOOK)
-    done = launch(ranks, "study.py", cwd=tmp_path)
+    done = resident(ranks, "study.py", cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -23,6 +23,7 @@ from hpcdem.lang.detect import kind
 from hpcdem.post.specimen import class_colours, packing
 from hpcdem.pre.specimen import Request, make_specimen
 from tests.conftest import ROOT, Launcher
+from tests.property.workers import Resident
 from tests.specimen.shapes import WINDOW
 
 CURVE = "".join(f"{d} {p}\n" for d, p in zip(*WINDOW))
@@ -177,14 +178,14 @@ def made_for_scripts(folder: Path) -> None:
     run(folder / "curve.txt", "-n", 60, "--void-ratio", 0.4, "--format", "none", "-o", folder)
 
 
-def test_deposit_runs(launch: Launcher, tmp_path: Path) -> None:
+def test_deposit_runs(resident: Resident, tmp_path: Path) -> None:
     """A tenth of the steps: grains fall, none is lost, all groups come out again."""
     made_for_scripts(tmp_path)
     script = tmp_path / "deposit.py"
     text = script.read_text()
     steps = int(re.search(r"^CYC (\d+)$", text, re.MULTILINE)[1])  # type: ignore[index]
     script.write_text(text.replace(f"CYC {steps}\n", f"CYC {steps // 10}\n"))
-    done = launch(1, script)
+    done = resident(1, script)
     assert done.returncode == 0, done.stdout + done.stderr
     before, after = ([line.split() for line in (tmp_path / f"{n}.xyr").read_text().splitlines()] for n in
                      ("specimen", "deposited"))  # fmt: skip
@@ -193,14 +194,14 @@ def test_deposit_runs(launch: Launcher, tmp_path: Path) -> None:
     assert y[1].mean() < y[0].mean() and (y[1] > 0).all()
 
 
-def test_biaxial_runs(launch: Launcher, tmp_path: Path) -> None:
+def test_biaxial_runs(resident: Resident, tmp_path: Path) -> None:
     """To one per cent of strain: the specimen hardens, at the side stress asked for."""
     made_for_scripts(tmp_path)
     script = tmp_path / "biaxial.py"
     text, found = re.subn(r"^STRAIN, RATE = 0\.2, \S+?\s", "STRAIN, RATE = 0.01, 20.0 ", script.read_text(), flags=re.M)
     assert found == 1
     script.write_text(text)
-    done = launch(1, script)
+    done = resident(1, script)
     assert done.returncode == 0, done.stdout + done.stderr
     with open(tmp_path / "data" / "biaxial.csv", newline="") as file:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]

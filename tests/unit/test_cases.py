@@ -236,9 +236,9 @@ def written(tmp_path_factory) -> Path:
     return folder
 
 
-def test_step_by_step_in_a_script(launch, written, tmp_path):
+def test_step_by_step_in_a_script(resident, written, tmp_path):
     (tmp_path / "a.sc").write_text(STEPWISE)
-    done = launch(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
+    done = resident(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
     assert done.returncode == 0, done.stderr
     assert histories(tmp_path / "data") == histories(written / "data")
     curve = np.loadtxt(written / "data" / "ucs.csv", delimiter=",", skiprows=1, usecols=(1, 2))
@@ -273,13 +273,13 @@ print('found %.17g %.17g' % (result.peak, result.modulus))
 """
 
 
-def test_a_stopped_case_goes_on(launch, written, tmp_path):
+def test_a_stopped_case_goes_on(resident, written, tmp_path):
     (tmp_path / "a.sc").write_text(STOPPED)
     (tmp_path / "stop").touch()
-    done = launch(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
+    done = resident(1, "a.sc", "--no-figure", cwd=tmp_path, timeout=600)
     assert done.returncode == 85 and "go on with --resume" in done.stderr, done.stderr
     (tmp_path / "stop").unlink()
-    again = launch(1, "a.sc", "--no-figure", "--resume", cwd=tmp_path, timeout=600)
+    again = resident(1, "a.sc", "--no-figure", "--resume", cwd=tmp_path, timeout=600)
     assert again.returncode == 0, again.stderr
     assert len(found(again.stdout)) == 1 and histories(tmp_path / "data") == histories(written / "data")
 
@@ -306,8 +306,8 @@ def test_on_several_ranks(launch, tmp_path):
     assert done.returncode == 2 and done.stderr.count("wrong.sc:3: UCS: size is -1") == 1
 
 
-def test_outdir_in_a_script_is_refused(launch, tmp_path):
+def test_outdir_in_a_script_is_refused(resident, tmp_path):
     (tmp_path / "a.sc").write_text("from hpcdem.cases import UCS\npcdc model new\nUCS().run(outdir='there')\n")
-    done = launch(1, "a.sc", cwd=tmp_path)
+    done = resident(1, "a.sc", cwd=tmp_path)
     assert done.returncode == 2 and "a.sc:3: UCS.run: outdir is for Python programs" in done.stderr
     assert not (tmp_path / "there").exists()

@@ -8,7 +8,7 @@ import pytest
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.clumps import read_clumps, write_clumps
 from tests.clumped import write_lattice
-from tests.conftest import Launcher
+from tests.property.workers import Resident
 
 GOOD = """\
 hpcdem clumps 1
@@ -105,9 +105,9 @@ def script(folder, line: str, text: str = GOOD):
 
 
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.mpi)])
-def test_a_bad_file_stops_the_script_on_all_ranks(launch: Launcher, tmp_path, ranks):
+def test_a_bad_file_stops_the_script_on_all_ranks(resident: Resident, tmp_path, ranks):
     """One message with both lines, exit code 2, nothing written."""
-    done = launch(ranks, script(tmp_path, "CLUMP file a.clumps", changed("0 0 1\n", "0 0 -1\n")), cwd=tmp_path)
+    done = resident(ranks, script(tmp_path, "CLUMP file a.clumps", changed("0 0 1\n", "0 0 -1\n")), cwd=tmp_path)
     said = done.stdout + done.stderr
     assert done.returncode == 2 and said.count("expected a radius above 0") == 1
     assert "run.py:3: CLUMP: " in said and "a.clumps:8: read '0 0 -1'" in said and "Traceback" not in said
@@ -126,16 +126,16 @@ def test_a_bad_file_stops_the_script_on_all_ranks(launch: Launcher, tmp_path, ra
         ("CLUMP file a.clumps\nCLUMP RANGE id 0 2", "belongs to a clump already"),
     ],
 )
-def test_lines_that_cannot_be_carried_out(launch: Launcher, tmp_path, line, message):
-    done = launch(1, script(tmp_path, line), cwd=tmp_path)
+def test_lines_that_cannot_be_carried_out(resident: Resident, tmp_path, line, message):
+    done = resident(1, script(tmp_path, line), cwd=tmp_path)
     assert done.returncode == 2 and message in done.stdout + done.stderr
     assert not list(tmp_path.rglob("*.vtkhdf"))
 
 
-def test_check_tells_of_the_file(launch: Launcher, tmp_path):
+def test_check_tells_of_the_file(resident: Resident, tmp_path):
     """--check counts the discs, and says when the file is not there."""
-    done = launch(1, "--check", script(tmp_path, "CLUMP file a.clumps x 3"), cwd=tmp_path)
+    done = resident(1, "--check", script(tmp_path, "CLUMP file a.clumps x 3"), cwd=tmp_path)
     assert done.returncode == 0 and "CLUMP file a.clumps x 3" in done.stdout
     assert any(row.split()[-1] == "3" for row in done.stdout.splitlines() if "CLUMP file" in row)
-    done = launch(1, "--check", script(tmp_path, "CLUMP file b.clumps"), cwd=tmp_path)
+    done = resident(1, "--check", script(tmp_path, "CLUMP file b.clumps"), cwd=tmp_path)
     assert "line 3: there is no file b.clumps beside the script" in done.stdout

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
+from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import JOINT, NODE, Range
+from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.properties import POROUS
 
 Number = float | str
 """A number, or the name of a table of time."""
 _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
 
 
-def model(project: Project, properties: Mapping[str, float], where: Range | None = None) -> None:
+def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Joints become channels with these properties (physics.flow.properties)."""
     if project.coupled is not None:
         raise CommandError("blocks that are coupled to particles have no fluid in their joints in this version")
@@ -30,6 +35,17 @@ def model(project: Project, properties: Mapping[str, float], where: Range | None
         if known is None:
             blocks.surface_loads.remove(flow)
         raise
+
+
+def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Change some properties of cohesive models, and of channels, each of the joints that a range chooses; without a
+    range of all that have them."""
+    of_fluid = {name: value for name, value in properties.items() if POROUS.has(name)}
+    others = {name: value for name, value in properties.items() if name not in of_fluid}
+    if of_fluid:
+        _flow(project).adjust(chosen(project, JOINT, where), of_fluid)
+    if others:
+        assignments.joint_property(project, others, where)
 
 
 def _flow(project: Project) -> Flow:
@@ -67,6 +83,31 @@ def initial(
 ) -> None:
     """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled."""
     _flow(project).fill(chosen(project, NODE, where), pressure, saturation)
+
+
+def well(project: Project, name: str, where: Range | None = None) -> None:
+    """Flow nodes are a well, see physics/flow/wells.py."""
+    _flow(project).drill(name, chosen(project, NODE, where))
+
+
+def stage(
+    project: Project,
+    name: str,
+    rate: Number | None = None,
+    pressure: Number | None = None,
+    shut_in: bool = False,
+    time: float | None = None,
+    limit: float | None = None,
+) -> None:
+    """One more stage of a well: a rate [m2/s] up to a pressure (limit [Pa]), a pressure [Pa], or shut in; time: of flow
+    that it takes [s], None: no end."""
+    given = {w.RATE: rate, w.PRESSURE: pressure, w.SHUT: 0.0 if shut_in else None}
+    said = {does: value for does, value in given.items() if value is not None}
+    if len(said) != 1:
+        raise CommandError(f"a stage of a well is one of rate, pressure, shut_in, got {' and '.join(said) or 'none'}")
+    does, value = said.popitem()
+    duration, most = (math.inf if one is None else one for one in (time, limit))
+    _flow(project).stage(name, does, value, duration, most)
 
 
 def sub_step(project: Project, mechanical: int | None = None, hydraulic: int | None = None) -> None:

@@ -8,13 +8,14 @@ import numpy as np
 
 from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.project import Project
-from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, History
+from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem import user_laws
 from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, NODE, SUPPORTS, Ids, Range
+from hpcdem.physics.flow.model import Flow
 
 FLUSH = 500
 """Records that wait at most before they go to the file."""
@@ -31,10 +32,11 @@ def create(
     every: int = 1,
     where: Range | None = None,
     variable: str = "",
+    well: str = "",
 ) -> None:
     """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
-    a range or of all (how: sum, mean, minimum, maximum), or of the model. variable: with the value law_state, a state
-    variable of laws of the user that elements have."""
+    a range or of all (how: sum, mean, minimum, maximum), of a well, by its name, or of the model. variable: with the
+    value law_state, a state variable of laws of the user that elements have."""
     file_name(name)
     if name in project.histories:
         raise CommandError(f"there is a history '{name}' already")
@@ -46,8 +48,15 @@ def create(
         raise CommandError("value law-state and variable, the name of a state variable, go together")
     if variable:
         value = user_laws.quantity(project.ready(), variable)
+    if (kind == WELL) != bool(well):
+        raise CommandError("object well and well, its name, go together")
+    if well:
+        flow = Flow.there(project.ready())
+        if flow is None:
+            raise CommandError(f"there is no well '{well}': there are no channels yet")
+        flow.well(well)
     numbers: list[int] = []
-    if kind != MODEL:
+    if kind not in (MODEL, WELL):
         if ident is not None:
             found = chosen(project, kind, (Ids(ident, ident),))
         elif nearest is not None:
@@ -58,7 +67,7 @@ def create(
             found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
         assert found is not None
         numbers = found.tolist()
-    project.histories[name] = History(kind, value, numbers, how, every)
+    project.histories[name] = History(kind, value, numbers, well or how, every)
 
 
 def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:

@@ -13,6 +13,7 @@ from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import FLOW, SUPPORTS, Range
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
@@ -46,6 +47,14 @@ def _of_supports(project: Project, kind: str, name: str, where: Range | None) ->
 def _of_flow(project: Project, kind: str, name: str, where: Range | None) -> np.ndarray:
     numbers = everything(project, kind, where)  # refuses where there is none
     return Flow.of(project.ready(use=False)).values(kind, name, numbers)
+
+
+def wells(project: Project) -> dict[str, dict[str, float]]:
+    """By name what wells have now (physics.flow.wells.QUANTITIES); empty without fluid."""
+    flow = Flow.there(project.ready(use=False))
+    return {} if flow is None else {
+        well.name: {name: flow.well_value(well.name, name) for name in OF_WELLS} for well in flow.wells
+    }  # fmt: skip
 
 
 def fluid(project: Project) -> dict[str, float]:

@@ -14,13 +14,14 @@ from hpcdem.physics.fdem import diagnostics, user_laws
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, SUPPORTS
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
     from hpcdem.physics.fdem.probes import Probe
     from hpcdem.physics.fdem.simulation import Blocks
 
-MODEL = "model"
+MODEL, WELL = "model", "well"
 LAW_STATE = "law_state"
 """A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
 UNITS = {
@@ -44,6 +45,7 @@ UNITS = {
         kind: {name: unit for name, (unit, _) in of.items()}
         for kind, of in {**supports.QUANTITIES, **OF_FLOW}.items()
     },
+    WELL: {name: unit for name, (unit, _) in OF_WELLS.items()},
     MODEL: {
         "time": "s", "creep_time": "s", "cycle": "1", "ratio": "1", "intact_joints": "1", "yielded_joints": "1",
         "broken_joints": "1",
@@ -112,9 +114,9 @@ ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")
 
 @dataclass
 class History:
-    """kind: of object, or MODEL; value: name of the quantity; numbers: of the objects; how: "", or sum, mean, minimum,
-    maximum of several; every: steps between two records; rows: (step, time, value); filed: rows that are in the
-    file."""
+    """kind: of object, MODEL, or WELL, whose name is `how`; value: name of the quantity; numbers: of the objects; how:
+    "", or sum, mean, minimum, maximum of several; every: steps between two records; rows: (step, time, value); filed:
+    rows that are in the file."""
 
     kind: str
     value: str
@@ -171,6 +173,9 @@ class History:
         """The number now. Collective, equal on all ranks."""
         if self.kind == MODEL:
             return _OF_MODEL[self.value](blocks)
+        if self.kind == WELL:
+            flow = Flow.there(blocks)
+            return math.nan if flow is None else flow.well_value(self.how, self.value)
         if self.kind in SUPPORTS:
             values = supports.of(blocks, self.kind).values(self.kind, self.value, np.array(self.numbers, np.int64))
             return float(_OF_SEVERAL[self.how](values))

@@ -217,6 +217,15 @@ def _face_condition(call: Call) -> None:
     fdem.assignments.stress(call.project, **given, where=call.where)
 
 
+def _stage(call: Call) -> None:
+    given = call.given()
+    for name, value in given.items():
+        if isinstance(value, FunctionName):
+            raise CommandError(f"{name} of a stage is a number or a table over the time of flow, no function of place")
+        given[name] = value.name if isinstance(value, TableName) else value
+    fdem.flow.stage(call.project, **{**given, "shut_in": "shut-in" in call.arguments})
+
+
 # ---- bolts ---------------------------------------------------------------------------------------------------------
 
 
@@ -265,7 +274,7 @@ def _history(call: Call) -> None:
     kind = {"joint": g.JOINT}.get(call["object"], call["object"])
     fdem.histories.create(
         call.project, call["name"], kind, python(call["value"]), call.get("id"), call.get("nearest"), how,
-        call.get("every", 1), call.where, **call.given_only("variable"),
+        call.get("every", 1), call.where, **call.given_only("variable", "well"),
     )  # fmt: skip
 
 
@@ -335,7 +344,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element-face boundary remove": lambda c: fdem.assignments.remove_face_conditions(c.project, c.where),
     "face-joint group": _group(g.JOINT),
     "face-joint c-model": _joint_model,
-    "face-joint property": lambda c: fdem.assignments.joint_property(c.project, c.given(), c.where),
+    "face-joint property": lambda c: fdem.flow.joint_property(c.project, c.given(), c.where),
     "face-joint reset state": lambda c: fdem.settings.reset_joints(c.project, c.where),
     "node group": _group(g.NODE),
     "node boundary": _node_condition,
@@ -345,6 +354,8 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),
     "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
     "flow-node initial": lambda c: fdem.flow.initial(c.project, **c.given(), where=c.where),
+    "well create": lambda c: fdem.flow.well(c.project, c["name"], c.where),
+    "well stage": _stage,
     "bolt create polyline": _bolt,
     "bolt c-model": lambda c: fdem.supports.assign(c.project, g.BOLT_ELEMENT, c.properties(), c.where),
     "bolt delete": lambda c: fdem.supports.delete(c.project, g.BOLT_ELEMENT, c.where),

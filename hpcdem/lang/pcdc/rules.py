@@ -31,11 +31,13 @@ def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | No
         raise ValueError("value law-state and variable, the name of a state variable, go together")
     if isinstance(kind, Pending):
         return
+    if (kind == "well") != ("well" in arguments):
+        raise ValueError("object well and well, its name, go together")
     if not isinstance(value, Pending) and value not in RECORDED[kind]:
         raise ValueError(f"a history of {kind} can follow {', '.join(RECORDED[kind])}, not {value}")
-    if kind == "model" and (given or how):
-        raise ValueError(f"a history of the model takes no {(given or how)[0]}")
-    if kind != "model" and not (given or how):
+    if kind in ("model", "well") and (given or how):
+        raise ValueError(f"a history of {'the model' if kind == 'model' else 'a well'} takes no {(given or how)[0]}")
+    if kind not in ("model", "well") and not (given or how):
         raise ValueError(
             f"a history of {kind} needs one of id, nearest and range, or it is sum, mean, minimum or maximum of all"
         )
@@ -49,6 +51,14 @@ def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None)
 def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if len(arguments) > 1:
         raise ValueError("pressure and saturation exclude each other: below full saturation there is no pressure")
+
+
+def _stage(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    given = [word for word in ("rate", "pressure", "shut-in") if word in arguments]
+    if len(given) != 1:
+        raise ValueError(f"a stage of a well is one of rate, pressure and shut-in, not {' and '.join(given) or 'none'}")
+    if "limit" in arguments and given != ["rate"]:
+        raise ValueError("limit, a pressure, goes with rate")
 
 
 def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -135,5 +145,6 @@ _RULES = {
     "model solve": _solve,
     "history create": _history,
     "chart add": _curve,
+    "well stage": _stage,
     "output vtk": _output,
 }

@@ -340,8 +340,8 @@ _POROUS = tuple(
     replace(o, values=(BOOL,), unit="", default="off") if o.name == "leak-off" else o for o in declared(
         POROUS_PROPERTIES, "f{luid}-den{sity}", "f{luid}-b{ulk}", "vis{cosity}", "a{perature}-i{nitial}",
         "a{perature}-min{umum}", "a{perature}-max{imum}", "leak-off", "m{atrix}-p{ore}-p{ressure}",
-        "m{atrix}-p{ermeability}", "m{atrix}-p{orosity}-c{ompressibility}", "m{atrix}-p{orosity}", also=_APERTURES,
-        uniform=True,
+        "m{atrix}-p{ermeability}", "m{atrix}-p{orosity}-c{ompressibility}", "m{atrix}-p{orosity}", "sh{ear}-d{ilation}",
+        "sh{ear}-d{ilation}-l{imit}", also=_APERTURES,
     )
 )  # fmt: skip
 POROUS = Model(
@@ -469,6 +469,7 @@ RECORDED = {
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s"},
     "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s"},
+    "well": {"pressure": "Pa", "rate": "m2/s", "injected": "m2", "stage": "1"},
     "liner-node": {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
         "velocity-y": "m/s", "rotation": "rad", "spin": "rad/s", "reaction-x": "N/m", "reaction-y": "N/m",
@@ -795,8 +796,9 @@ _OBJECTS = (
             models=(COHESIVE, POROUS, *_LATER_JOINT), ranged="face-joint"),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
-             "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'"),
-            options=_properties(COHESIVE),
+             "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
+             "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
+            options=(*_properties(COHESIVE), *_properties(POROUS)),
             ranged="face-joint", needs_option=True),
     Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint"),
@@ -824,6 +826,21 @@ _OBJECTS = (
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
                      Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1")),
             ranged="node", needs_option=True),
+    Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
+            "Stages say what it does; without one it is shut in.",
+            ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node"),
+    Command("well st{age}", "One more stage of a well, after those that it has; one without time that has begun ends "
+            "now. After the last the well is shut in. Times of tables are those of flow.",
+            ("pcdc well stage 'injection' rate 1e-4 time 60 limit 8e6", "pcdc well stage 'injection' shut-in time 600",
+             "pcdc well stage 'injection' pressure table 'bottom-hole'"),
+            (_NAME,),
+            options=(Option("ra{te}", (TABLED,), "volume that is pumped in; negative: drawn, as far as there is fluid",
+                            "m2/s"),
+                     Option("pr{essure}", (TABLED,), "pressure that is held", "Pa"),
+                     Option("sh{ut}-in", (), "nothing comes in or out"),
+                     Option("time", (POSITIVE,), "time of flow that it takes", "s", "no end"),
+                     Option("lim{it}", (NOT_NEGATIVE,), "with rate: pressure above which less is pumped in", "Pa",
+                            "none"))),
     Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
             "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
             "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "
@@ -912,12 +929,14 @@ _RECORDS = (
             ("pcdc history create 'load' node value reaction-y sum every 100 range group 'platen' set 'bc'",
              "pcdc history create 'gauge' element nearest (5,0) value stress-yy",
              "pcdc history create 'worst' element value stress-yy minimum every 10",
-             "pcdc history create 'cracks' model value broken-joints every 100"),
+             "pcdc history create 'cracks' model value broken-joints every 100",
+             "pcdc history create 'pump' well value pressure well 'injection' every 10"),
             (_NAME, _leading("object", choice(*RECORDED), "what it is a number of")),
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
              Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user"),
+             Option("well", (STRING,), "with object well: its name"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
             ranged="any"),

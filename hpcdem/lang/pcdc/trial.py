@@ -24,6 +24,7 @@ from hpcdem.lang.pcdc.table import (
 from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
+from hpcdem.physics.flow.properties import POROUS as FLUID
 
 MODELS = {
     model.keyword.name: model.of
@@ -50,7 +51,10 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
         if "model" in arguments:
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
-            _changes(_OF_COMMAND[command.name], _given(arguments))
+            given, model = _given(arguments), _OF_COMMAND[command.name]
+            of_fluid = {name: v for name, v in given.items() if model is properties.COHESIVE and FLUID.has(name)}
+            _changes(model, {name: value for name, value in given.items() if name not in of_fluid})
+            _changes(FLUID, of_fluid)
         elif command.name in _TRIALS and known(list(arguments.values())):
             _TRIALS[command.name](arguments)
     except CommandError as error:

@@ -65,6 +65,11 @@ class Model:
         return self._look(lambda: float(fdem.queries.ratio(self._project)))
 
     @property
+    def wells(self) -> dict[str, dict[str, float]]:
+        """Wells by name: pressure [Pa], rate [m2/s], injected [m2], stage."""
+        return self._look(lambda: fdem.queries.wells(self._project))
+
+    @property
     def fluid(self) -> dict[str, float]:
         """The account of the fluid [m2]: given, stored, leaked, removed, closing, relative."""
         return self._look(lambda: fdem.queries.fluid(self._project))

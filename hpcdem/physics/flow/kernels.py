@@ -15,9 +15,9 @@ from hpcdem.physics.fdem.kernels import joints
 
 P, S, E = range(3)
 STATE = 3
-# Columns of the table of channel laws (rows, 5).
-INITIAL, LEAST, MOST, LEAK, PORE = range(5)
-LAW = 5
+# Columns of the table of channel laws (rows, 7).
+INITIAL, LEAST, MOST, LEAK, PORE, DILATE, GAIN = range(7)
+LAW = 7
 # What is prescribed at nodes.
 FREE, PRESSURE, SURFACE, RATE = range(4)
 # Columns of the table of channels (m, 3) of `geometry`.
@@ -42,9 +42,12 @@ def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
     n = len(one)
     for c in range(n * t // threads, n * (t + 1) // threads):
         a, b, row = one[c], other[c], laws[law[c]]
-        _, _, h2, oa, _, ob, _ = joints.openings(x[a], x[a + 1], x[a + 2], x[a + 3], x[b], x[b + 1], x[b + 2], x[b + 3])
+        _, _, h2, oa, sa, ob, sb = joints.openings(
+            x[a], x[a + 1], x[a + 2], x[a + 3], x[b], x[b + 1], x[b + 2], x[b + 3]
+        )
         h = math.sqrt(h2)
-        delta = min(max(row[INITIAL] + 0.5 * (oa + ob) / h, row[LEAST]), row[MOST])
+        gain = min(row[DILATE] * abs(0.5 * (sa + sb) / h), row[GAIN])
+        delta = min(max(row[INITIAL] + 0.5 * (oa + ob) / h + gain, row[LEAST]), row[MOST])
         out[c, APERTURE] = delta
         out[c, CONDUCT] = delta * delta * delta / (12.0 * viscosity * h)
         out[c, HALF] = 0.5 * delta * h
@@ -52,8 +55,9 @@ def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def geometry(threads, *args):
-    """Aperture [m] (79), conductance delta^3 / (12 mu L) [m2 / (Pa s)] and half of the volume [m2] of channels, out
-    (m, 3). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic [Pa s]."""
+    """Aperture [m] (79) with what slip adds, conductance delta^3 / (12 mu L) [m2 / (Pa s)] and half of the volume [m2]
+    of channels, out (m, 3). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic
+    [Pa s]."""
     for t in range(threads):
         _geometry(t, threads, *args)
 

@@ -19,11 +19,15 @@ from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem.connectivity import corner_counts, face_points
-from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
+from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.network import Network, at_nodes, wet_faces
 from hpcdem.physics.flow.properties import FLUID, POROUS
+from hpcdem.physics.flow.wells import PRESSURE as HELD
+from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
+from hpcdem.physics.flow.wells import RATE, Stage, Well
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -89,6 +93,7 @@ class Flow(SurfaceLoad):
         self.rows: list[tuple[float, ...]] = []
         self._fluid: dict[str, float] = {}
         self.conditions: list[Condition] = [Condition()]
+        self.wells: list[Well] = []
         self.number = np.empty(0, np.int64)
         self.nodes = np.empty((0, kernels.NODE))
         self.state = np.empty((0, kernels.STATE))
@@ -119,15 +124,31 @@ class Flow(SurfaceLoad):
 
     # ---- what is said --------------------------------------------------------------------------------------------
 
-    def assign(self, joints: np.ndarray | None, given: Mapping[str, float]) -> None:
+    def assign(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
         """Joints (None: all) are channels with these properties. Fluid that has no room any more goes with it; new room
         is dry."""
-        values = tuple(POROUS.complete(given).values())
-        blocks = self.blocks
-        at = blocks.numbers_of_joints(joints)
-        rows = self.rows if values in self.rows else [*self.rows, values]
-        row = self.row.copy()
-        row[at] = rows.index(values) + 1
+        at = self.blocks.numbers_of_joints(joints)
+        self._put(at, self.blocks.complete(JOINT, at, POROUS, {}, given))
+
+    def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Change some properties of channels among these joints; None: of all channels."""
+        at = self.network.channels if joints is None else self.blocks.numbers_of_joints(joints)
+        bare = at[self.row[at] == 0]
+        if len(bare):
+            raise CommandError(f"{JOINT} {bare[0]} has no hydraulic model whose properties could be changed")
+        old = np.array(self.rows)[self.row[at] - 1]
+        self._put(at, self.blocks.complete(JOINT, at, POROUS, dict(zip(_PROPERTIES, old.T)), given))
+
+    def _put(self, at: np.ndarray, values: np.ndarray) -> None:
+        """Channels (n,) have these complete properties, (n, k) or (1, k) for all."""
+        blocks, rows, row = self.blocks, list(self.rows), self.row.copy()
+        known = {one: k for k, one in enumerate(rows, 1)}
+        sets, which = np.unique(values, axis=0, return_inverse=True)
+        for one in map(tuple, sets.tolist()):
+            if one not in known:
+                rows.append(one)
+                known[one] = len(rows)
+        row[at] = np.array([known[tuple(one)] for one in sets.tolist()], np.int32)[which.reshape(-1)]
         used = {tuple(rows[r - 1][: len(FLUID)]) for r in np.unique(row[row > 0]).tolist()}
         if len(used) > 1:
             name, one, other = next(
@@ -143,15 +164,11 @@ class Flow(SurfaceLoad):
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
         """What holds at flow nodes among these points (None: all) from now on, see `Condition`."""
         at = self._flow_nodes(nodes)
-        if isinstance(value, str):
-            if value not in self.blocks.tables:
-                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
-            values = self.blocks.tables[value].values
-        else:
-            values = np.array([value], np.float64)
-        if not np.isfinite(values).all():
-            raise CommandError(f"a condition of a flow node must be finite, got {value}")
+        for well in self.wells:
+            both = np.intersect1d(well.points, at)
+            if len(both):
+                raise CommandError(f"node {both[0]} belongs to well '{well.name}', whose stages say what holds there")
+        values = self._checked(value, "a condition of a flow node")
         if does == kernels.PRESSURE and values.min() < 0.0:
             raise CommandError(f"the pressure of a fluid must not be negative, got {values.min():g} Pa")
         self.blocks.before_change()
@@ -160,6 +177,67 @@ class Flow(SurfaceLoad):
             self.conditions.append(wanted)
         self.condition[at] = self.conditions.index(wanted)
         self.blocks.changed(stiffness=False)
+
+    def _checked(self, value: Number, what: str) -> np.ndarray:
+        """The finite values of a number or a table."""
+        if isinstance(value, str):
+            if value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+            values = self.blocks.tables[value].values
+        else:
+            values = np.array([value], np.float64)
+        if not np.isfinite(values).all():
+            raise CommandError(f"{what} must be finite, got {value}")
+        return values
+
+    def drill(self, name: str, nodes: np.ndarray | None) -> None:
+        """Flow nodes among these points (None: all) are a well."""
+        if any(well.name == name for well in self.wells):
+            raise CommandError(f"there is a well '{name}' already")
+        try:
+            at = self._flow_nodes(nodes)
+        except CommandError as error:
+            raise CommandError(f"well '{name}' has no flow node: {error}") from None
+        for well in self.wells:
+            both = np.intersect1d(well.points, at)
+            if len(both):
+                raise CommandError(f"node {both[0]} belongs to well '{well.name}' already")
+        held = at[self.condition[at] > 0]
+        if len(held):
+            raise CommandError(f"node {held[0]} of well '{name}' has a condition: node boundary remove comes first")
+        self.blocks.before_change()
+        self.wells.append(Well(name, at))
+        self.blocks.changed(stiffness=False)
+
+    def well(self, name: str) -> Well:
+        """The one of this name. Not collective."""
+        found = next((well for well in self.wells if well.name == name), None)
+        if found is None:
+            known = ", ".join(f"'{well.name}'" for well in self.wells) or "none so far"
+            raise CommandError(f"there is no well '{name}'; there is {known}")
+        return found
+
+    def stage(self, name: str, does: str, value: Number, duration: float, limit: float) -> None:
+        """One more stage of a well, see `Stage`; duration [s] of flow time."""
+        well = self.well(name)
+        values = self._checked(value, f"the {does} of a well")
+        if does == HELD and values.min() < 0.0:
+            raise CommandError(f"the pressure of a well must not be negative, got {values.min():g} Pa")
+        if not duration > 0.0:
+            raise CommandError(f"a stage of a well takes some time, got {duration:g} s")
+        if not limit >= 0.0 or (math.isfinite(limit) and does != RATE):
+            raise CommandError("limit, a pressure that is not negative, goes with a rate")
+        self.blocks.before_change()
+        well.add(Stage(does, value, 0.0, duration, limit), self.time)
+        self.blocks.changed(stiffness=False)
+
+    def well_value(self, name: str, quantity: str) -> float:
+        """A quantity of `wells.QUANTITIES`. Not collective."""
+        if quantity not in OF_WELLS:
+            raise CommandError(f"there is no quantity {quantity} of a well; there are {', '.join(OF_WELLS)}")
+        well = self.well(name)
+        return float(well.number(self.time) if quantity == "stage" else getattr(well, quantity))
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
         """Take back what is prescribed at these points (None: all)."""
@@ -201,8 +279,11 @@ class Flow(SurfaceLoad):
         return found
 
     def uses_table(self, name: str) -> bool:
-        """Whether a node follows this table. Not collective."""
-        return any(self.conditions[row].value == name for row in np.unique(self.condition).tolist())
+        """Whether a node or a stage that is not over follows this table. Not collective."""
+        stages = (one for well in self.wells for one in well.stages)
+        return any(one.value == name and one.end > self.time for one in stages) or any(
+            self.conditions[row].value == name for row in np.unique(self.condition).tolist()
+        )
 
     def fluid(self, name: str) -> float:
         """A property of the fluid. Not collective."""
@@ -307,26 +388,22 @@ class Flow(SurfaceLoad):
         return out
 
     def springs(self, blocks: Any) -> np.ndarray | None:
-        """A channel that cannot drain is as stiff as its fluid: K / aperture, in each step."""
+        """A channel that cannot drain is as stiff as its fluid: K / aperture, in each step. By the aperture without
+        opening and the length in the mesh: where things are must not count, as a restart finds masses again."""
         if not self._pushes or blocks.options.flow_every > 1:
             return None
-        faces = self._wet()
+        faces, mesh = self._wet(), self.blocks.the_mesh()
         lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
-        faces = faces[(self.row[lower] > 0) & blocks.joint_exists()[lower]]
-        table = self._geometry_of(faces)
-        each = self.fluid("fluid_bulk") * table[:, kernels.HALF] / table[:, kernels.APERTURE] ** 2  # K L / (2 delta)
+        there = (self.row[lower] > 0) & blocks.joint_exists()[lower]
+        faces, laws = faces[there], self._laws()[self.row[lower[there]] - 1]
+        way = np.diff(mesh.points[face_points(mesh.cells, faces)], axis=1)[:, 0]
+        delta = np.clip(laws[:, kernels.INITIAL], laws[:, kernels.LEAST], laws[:, kernels.MOST])
+        each = 0.5 * self.fluid("fluid_bulk") * np.hypot(way[:, 0], way[:, 1]) / delta
         out = np.zeros((blocks.n_own, 4))
         row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
         np.add.at(out, (row, k), each)
-        np.add.at(out, (row, (k + 1) % corner_counts(blocks.the_mesh().cells[faces // 4])), each)
+        np.add.at(out, (row, (k + 1) % corner_counts(mesh.cells[faces // 4])), each)
         return out
-
-    def _geometry_of(self, faces: np.ndarray) -> np.ndarray:
-        """The table of kernels.geometry of the channels on these faces."""
-        sides, law, _ = self._sides_of(faces)
-        table = np.empty((len(faces), kernels.CHANNEL))
-        kernels.geometry(1, sides[0], sides[1], law, self._laws(), self.blocks.x, self.viscosity, table)
-        return table
 
     def _sides_of(self, faces: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, int]:
         """Where both faces of channels begin in x, their laws, and a face that this rank does not hold, or -1."""
@@ -345,7 +422,8 @@ class Flow(SurfaceLoad):
         viscous = math.pi * of["viscosity"] * of["fluid_density"]
         leak = np.where(of["leak_off"] > 0.0, np.sqrt(of["matrix_permeability"] * inside / viscous), 0.0)
         apertures = [of[f"aperature_{name}"] for name in ("initial", "minumum", "maximum")]
-        return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"]]))
+        dilation = np.tan(np.radians(of["shear_dilation"])), of["shear_dilation_limit"]
+        return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"], *dilation]))
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
         """Largest distance from the first element around a flow node to the others there [m]; middle (n_own, 2): of
@@ -580,6 +658,10 @@ class Flow(SurfaceLoad):
         if surface and o.gx == 0.0 == o.gy:
             raise CommandError("flow-surface needs gravity: model gravity comes first")
 
+        for well in self.wells:
+            if well.will_act(self.time) and not self.network.there[well.points].any():
+                raise CommandError(f"well '{well.name}' has no flow node any more: what was around it is taken out")
+
     def follow(self) -> None:
         """Flow for as long as the step that the elements have moved by."""
         blocks, o = self.blocks, self.blocks.options
@@ -613,7 +695,7 @@ class Flow(SurfaceLoad):
         )  # fmt: skip
 
     def _sub_step(self) -> None:
-        threads = self.blocks.threads
+        threads, before = self.blocks.threads, self.time
         self._find_flows(self.dt)
         self.time += self.dt
         kernel = kernels.fill if threads == 1 else kernels.fill_threaded
@@ -621,7 +703,38 @@ class Flow(SurfaceLoad):
             threads, self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid, self.dt,
             self._condition, self._conditions_at(self.time), self.fluid("fluid_bulk"), self.nodes, self.state,
         )  # fmt: skip
+        if self.wells:
+            self._pump(before)
         self._refresh()
+
+    def _pump(self, before: float) -> None:
+        """What wells did since then."""
+        there, log = self.network.there, self.blocks.log
+        points = [well.points[there[well.points]] for well in self.wells]
+        at = np.concatenate(points)
+        row = np.minimum(np.searchsorted(self.number, at), max(len(self.number) - 1, 0))
+        mine = self.number[row] == at if len(self.number) else np.zeros(len(at), bool)
+        row = row[mine]
+        room = np.zeros((3, len(at)))
+        room[:2, mine], room[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
+        room = self.blocks.comm.sum_into(room)
+        after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
+        ends = np.cumsum([len(one) for one in points])
+        for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
+            if end > begin:
+                after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, self._value_at)
+            stage = well.number(self.time)
+            if log is not None and stage != well.number(before):
+                does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage any more"
+                log.info(f"well '{well.name}': {f'stage {stage}, ' * bool(stage)}{does}, at {self.time:.6g} s of flow")
+        came = (after - room[0])[mine]
+        self.nodes[row, kernels.W] = after[mine]
+        self.nodes[row, kernels.GIVEN] += came
+        self.nodes[row, kernels.INFLOW] = came / (self.time - before)
+        self._find_state(row)
+
+    def _value_at(self, value: Number, time: float) -> float:
+        return float(self.blocks.tables[value](time)) if isinstance(value, str) else value
 
     @property
     def _condition(self) -> np.ndarray:
@@ -665,7 +778,7 @@ class Flow(SurfaceLoad):
             "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
             "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
-            "reshaped": self._reshaped, "found_for": self._found_for,
+            "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
@@ -688,6 +801,7 @@ class Flow(SurfaceLoad):
         """Inverse of these: the blocks have this fluid; nodes go to their owners with the first storage."""
         made = Flow.of(blocks)
         made.rows = [tuple(math.inf if v is None else v for v in row) for row in state["rows"]]
+        made.wells = [Well.restored(one) for one in state["wells"]]
         made.conditions = [Condition(**one) for one in state["conditions"]]
         made.removed, made.time = dict(state["removed"]), state["time"]
         made.cycles, made.waited = state["cycles"], state["waited"]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.properties import JOINT, Model, Property
 
@@ -12,21 +14,27 @@ FLUID = ("fluid_density", "fluid_bulk", "viscosity")
 """Properties of the fluid: the same in all channels."""
 MATRIX = ("matrix_permeability", "matrix_porosity_compressibility", "matrix_porosity")
 """What leak-off needs."""
+NEEDED = ("matrix_permeability", "matrix_porosity")
+"""Of these, what must not be zero: nothing would leak."""
 
 
 def _apertures(values: dict[str, Any]) -> None:
     least, most = values["aperature_minumum"], values["aperature_maximum"]
-    if least > most:
-        raise CommandError(f"aperature_minumum must not be above aperature_maximum ({most:g} m), got {least:g}")
-    given = [name for name in (*MATRIX, "matrix_pore_pressure") if name in values]
-    if values["leak_off"]:
-        missing = [name for name in MATRIX if name not in values]
-        if missing:
-            raise CommandError(f"leak_off needs {missing[0]}")
-    elif given:
-        raise CommandError(f"{given[0]} goes with leak_off, which is off")
+    if np.any(least > most):
+        raise CommandError(
+            f"aperature_minumum must not be above aperature_maximum ({np.max(most):g} m), got {np.max(least):g}"
+        )
+    on = np.asarray(values["leak_off"]) > 0.0
     for name in (*MATRIX, "matrix_pore_pressure"):
-        values.setdefault(name, 0.0)
+        there = np.asarray(values.get(name, 0.0)) > 0.0
+        if np.any(there & ~on):
+            raise CommandError(f"{name} goes with leak_off, which is off")
+        if np.any(on) and ((name in MATRIX and name not in values) or (name in NEEDED and np.any(on & ~there))):
+            raise CommandError(f"leak_off needs {name}")
+        values.setdefault(name, np.zeros_like(least, dtype=np.float64))
+    limited = np.isfinite(values["shear_dilation_limit"])
+    if np.any(limited & (np.asarray(values["shear_dilation"]) == 0.0)):
+        raise CommandError("shear_dilation_limit goes with shear_dilation, which is 0")
 
 
 POROUS = Model(
@@ -53,6 +61,10 @@ POROUS = Model(
                  otherwise="needed by leak-off"),
         Property("matrix_porosity", "1", "leak-off: porosity of the rock", high=1.0, optional=True,
                  otherwise="needed by leak-off"),
+        Property("shear_dilation", "degrees", "the aperture grows by the tangent of this angle times the mean slip of "
+                 "the joint", 0.0, high=80.0),
+        Property("shear_dilation_limit", "m", "what slip adds to the aperture at most", math.inf, low_itself=False,
+                 otherwise="no limit"),
     ),
     _apertures,
 )  # fmt: skip

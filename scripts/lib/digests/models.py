@@ -62,6 +62,9 @@ def models() -> Iterator[Model]:
     yield Model("brazilian", made={"brazilian": ["brazilian", "--size", "0.003", "--transits", "10"]})
     yield Model("tunnel", made={"tunnel": ["tunnel", "--size", "0.6", "--coarse", "6", "--reach", "6", "--joints",
                                            "--relax", "4", "--rest", "4"]})  # fmt: skip
+    yield Model("fault", made={"fault": ["fault-injection", "--size", "4", "--coarse", "40", "--duration", "5",
+                                         "--shut-in", "1", "--steps", "1500", "--rate", "2e-4", "--dilation",
+                                         "5"]})  # fmt: skip
     yield Model("slope", made={"slope": ["slope"]})
     yield Model("coupled", {"coupled": _shortened((ROOT / "examples" / "rock_into_sand.sc").read_text())})
 

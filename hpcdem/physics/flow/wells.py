@@ -1,0 +1,138 @@
+"""Wells: flow nodes that are one room, into which fluid is pumped, or out of which it is drawn, by stages.
+
+The nodes of a well share one head: those of a hole without gravity have one pressure, with gravity it grows downwards;
+the pressure of a well is that at its highest node. All ranks hold all wells, and compute them from sums over their
+nodes in the order of these, so bits do not depend on ranks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+
+SHUT, RATE, PRESSURE = "shut_in", "rate", "pressure"
+QUANTITIES = {
+    "pressure": ("Pa", "pressure at its highest node"),
+    "rate": ("m2/s", "fluid that came in during the last sub-step"),
+    "injected": ("m2", "volume that came in, at the density without pressure"),
+    "stage": ("1", "number of the stage that is on, from 1; 0: none yet, or none any more"),
+}
+"""What can be asked of a well: unit and meaning."""
+Number = float | str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """does: SHUT, RATE [m2/s, of the whole well] or PRESSURE [Pa]; value: a number or the name of a table over the time
+    of flow; begin, end: times of flow [s]; limit: largest pressure [Pa] that a rate may lead to."""
+
+    does: str
+    value: Number = 0.0
+    begin: float = 0.0
+    end: float = math.inf
+    limit: float = math.inf
+
+
+@dataclass
+class Well:
+    """points (n,): of the mesh, ascending; see `QUANTITIES` for the rest."""
+
+    name: str
+    points: np.ndarray
+    stages: list[Stage] = field(default_factory=list)
+    pressure: float = 0.0
+    rate: float = 0.0
+    injected: float = 0.0
+
+    def add(self, stage: Stage, now: float) -> None:
+        """One more stage, after the others; one without an end that has begun ends now. CommandError if one would
+        never act."""
+        begin = max(now, self.stages[-1].end if self.stages else now)
+        if self.stages and math.isinf(begin):
+            last = self.stages[-1]
+            if last.begin >= now:
+                raise CommandError(
+                    f"stage {len(self.stages)} of well '{self.name}' has no time, so that no other can follow it; time "
+                    "gives it an end"
+                )
+            self.stages[-1], begin = replace(last, end=now), now
+        self.stages.append(replace(stage, begin=begin, end=begin + stage.end))
+
+    def number(self, time: float) -> int:
+        """Of the stage that is on just before a time of flow, from 1; 0: none."""
+        return next((k for k, one in enumerate(self.stages, 1) if one.begin < time <= one.end), 0)
+
+    def will_act(self, time: float) -> bool:
+        """Whether something is pumped or held from this time on."""
+        return any(one.does != SHUT and one.end > time for one in self.stages)
+
+    def pumping(self, before: float, after: float) -> list[Stage]:
+        """Stages with a rate that are on at some time between these two."""
+        return [one for one in self.stages if one.does == RATE and one.begin < after and one.end > before]
+
+    def filled(
+        self, room: np.ndarray, before: float, after: float, bulk: float, value: Callable[[Number, float], float]
+    ) -> np.ndarray:
+        """Fluid of its nodes (n,) at the end of a sub-step; room (3, n): their fluid and room [m2] and potential energy
+        [Pa] before, without wells."""
+        had, volume, energy = room
+        w, v, top = math.fsum(had.tolist()), math.fsum(volume.tolist()), float(energy.max())
+        number = self.number(after)
+        stage = self.stages[number - 1] if number else Stage(SHUT)
+        if stage.does == PRESSURE:
+            head = value(stage.value, after) + top
+            found = volume * (1.0 + (head - energy) / bulk)
+        else:
+            rates = self.pumping(before, after)
+            target = w + math.fsum(
+                value(one.value, min(after, one.end)) * (min(after, one.end) - max(before, one.begin)) for one in rates
+            )
+            target, limit = max(target, 0.0), min((one.limit for one in rates), default=math.inf)
+            if math.isfinite(limit):
+                most = math.fsum((volume * (1.0 + (limit + top - energy) / bulk)).tolist())
+                target = min(target, max(most, w))
+            if target < v:
+                head, found = top, volume * (target / v)
+            else:
+                head = _head(target - v, volume, energy, bulk)
+                found = volume * (1.0 + np.maximum(head - energy, 0.0) / bulk)
+            if len(found) == 1:
+                found = np.array([target])
+        came = math.fsum([*found.tolist(), -w])
+        self.pressure, self.rate = max(head - top, 0.0), came / (after - before)
+        self.injected += came
+        return found
+
+    def saved(self) -> dict[str, Any]:
+        """As JSON values."""
+        stages = [{**asdict(one), "end": _json(one.end), "limit": _json(one.limit)} for one in self.stages]
+        return {**vars(self), "points": self.points.tolist(), "stages": stages}
+
+    @staticmethod
+    def restored(state: dict[str, Any]) -> Well:
+        """Inverse of `saved`."""
+        known: list[dict[str, Any]] = [
+            {k: math.inf if v is None else v for k, v in one.items()} for one in state["stages"]
+        ]
+        points = np.array(state["points"], np.int64)
+        return Well(**{**state, "points": points, "stages": [Stage(**one) for one in known]})
+
+
+def _json(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _head(more: float, volume: np.ndarray, energy: np.ndarray, bulk: float) -> float:
+    """Head [Pa] with which nodes below it are so full that all of them hold this much [m2] more than their room: sum of
+    V (head - E) / K over nodes with E < head."""
+    order = np.argsort(energy, kind="stable")
+    v, e = volume[order], energy[order]
+    room, weight = np.cumsum(v), np.cumsum(v * e)
+    heads = (bulk * more + weight) / room
+    return float(heads[np.flatnonzero(heads >= e)[-1]])
