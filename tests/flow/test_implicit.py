@@ -339,7 +339,7 @@ SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}
      (lambda sim: sim.velocity_condition(np.array([0]), vx=1e-3), "velocities"),
      (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", SOIL), "yield"),
      (lambda sim: Bolts.of(sim), "bolts"),
-     (lambda sim: Flow.of(sim).create_well("w", at(sim, 0.0, 0.0)), "wells")],
+     (lambda sim: Flow.of(sim).drill("w", at(sim, 0.0, 0.0)), "wells")],
 )  # fmt: skip
 def test_what_implicit_steps_cannot_do_is_refused(spoil, words) -> None:
     sim, _ = plate(4)
