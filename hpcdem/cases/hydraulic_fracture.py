@@ -31,7 +31,7 @@ class Fracture:
 class HydraulicFracture(Case):
     """Fluid is pumped into the middle of a plane fracture, which grows along a line of joints (half of it is there)."""
 
-    name: ClassVar[str] = "fracture"
+    name: ClassVar[str] = "hydraulic-fracture"
     title: ClassVar[str] = "Plane hydraulic fracture (KGD)"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Fracture
@@ -142,14 +142,14 @@ pressure_error = sum(p / exact(t).pressure - 1 for t, l, o, p in late) / len(lat
 balance = pcdc.fluid['relative']
 print('errors: length %+.2f %%, opening %+.2f %%, net pressure %+.2f %%; %d implicit steps' % (
     100*length_error, 100*opening_error, 100*pressure_error, steps))
-pcdc output vtk 'fracture'
+pcdc output vtk 'hydraulic-fracture'
 last = exact(time)
 line = [(a, 1e6 * last.opening * math.sqrt(max(0.0, 1 - (a/last.length)**2)))
         for a in np.linspace(0, last.length, 200).tolist()]
-pcdc chart create 'fracture' x-label 'distance from the well (m)' y-label 'opening (um)'
-pcdc chart add 'fracture' values [list(zip(x.tolist(), (1e6*profile).tolist()))] label 'fracture' style points
-pcdc chart add 'fracture' values [line] label 'ellipse of the closed form'
-pcdc chart export 'fracture' 'fracture.png'
+pcdc chart create 'hydraulic-fracture' x-label 'distance from the well (m)' y-label 'opening (um)'
+pcdc chart add 'hydraulic-fracture' values [list(zip(x.tolist(), (1e6*profile).tolist()))] label 'model' style points
+pcdc chart add 'hydraulic-fracture' values [line] label 'ellipse of the closed form'
+pcdc chart export 'hydraulic-fracture' 'hydraulic-fracture.png'
 grow = [(t, p / 1e6) for t, l, o, p in curve]
 pcdc chart create 'injection' x-label 'time (s)' y-label 'net pressure at the well (MPa)'
 pcdc chart add 'injection' values [grow] label 'model' style points
