@@ -720,7 +720,7 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
         local.joint_table, joints, left,
     )  # fmt: skip
     behind = left < 0.0
-    past = int((behind & ~(softening & (local.slot_state[slots] == YIELDED))).sum())
+    past = int((behind & ~(softening & (local.slot_state[slots] >= YIELDED))).sum())
     if softening:
         soft = np.empty((int(behind.sum()), 8, 8))
         stiffness.yielded_joints(

@@ -144,9 +144,17 @@ class Coupled:
 
     def __exit__(self, *error: Any) -> None:
         if self.moves:
+            sim = self.sim
+            if sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
+                sim._renew_lists()
             self._rest.__exit__(None, None, None)
-            equilibrium.settle(self.sim, self.nodes, self.x, np.zeros_like(self.x))
-            equilibrium.refuse_touching(self.sim, equilibrium.touching(self.sim), "touch after an implicit step")
+            equilibrium.settle(sim, self.nodes, self.x, np.zeros_like(self.x))
+            if (pairs := equilibrium.touching(sim)) and sim.log is not None:
+                one, other = pairs[0]
+                sim.log.warn(
+                    f"{len(pairs)} pairs of surfaces touch, the first of elements {one} and {other}: steps go on from "
+                    "here, further implicit ones do not"
+                )
         self.solver.close()
 
     def _stress(self) -> float:
@@ -273,10 +281,8 @@ class Coupled:
             found.error = "more than one joint would pass its peak"
         if not found.error and self.moves:
             memory, past = equilibrium.Memory.of(sim), found.past
-            for _ in range(equilibrium.PASSES):
-                if not equilibrium.commit(sim, self.nodes, self.of_blocks, found.x, sim.clock.step, True):
-                    break
-                equilibrium.hold_still(sim)
+            while self._open_joints(found.x):
+                # Strength of all its points is gone, of those that had some left too.
                 found = self._newton(step, found.x, found.u)
                 if found.error:
                     sim.before_change()
@@ -294,6 +300,18 @@ class Coupled:
         self.x = found.x
         self.fluid.take(step, found.fluid, found.u)
         return found
+
+    def _open_joints(self, x: np.ndarray) -> bool:
+        """Joints remember these positions (nn, 2) of the nodes; whether some broke. Until the run is over they stay
+        joints that have no strength: pressed together, their penalty carries them. Leak-off begins."""
+        sim, local = self.sim, self.sim.local
+        equilibrium.place_corners(sim, x)
+        before = local.slot_state == equilibrium.BROKEN
+        local.open_joints()
+        mine = local.slot_face[(local.slot_state == equilibrium.BROKEN) & ~before]
+        faces = np.concatenate(sim.comm.allgather(mine)) if sim.comm.size > 1 else mine
+        self.flow.note_leaks(np.unique(np.minimum(faces, sim.partner[faces])))
+        return len(faces) > 0
 
     # ---- Newton's method -----------------------------------------------------------------------------------------
 

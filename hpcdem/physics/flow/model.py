@@ -503,7 +503,7 @@ class Flow(SurfaceLoad):
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
         self._lead = row * blocks.x.shape[1] + 2 * (leads % 4)
         self._q, self._lost_fluid = np.zeros(len(ends)), np.zeros(len(ends))
-        self._note_leaks()
+        self.note_leaks()
         self._bind_loads(loaded, local)
         self._sides, self._law, lost = self._sides_of(self._channels)
         self._law_table = self.laws()
@@ -583,9 +583,12 @@ class Flow(SurfaceLoad):
         self._push_corner = np.column_stack([8 * row + 2 * k, 8 * row + 2 * last])
         self._push_node = local[loaded]
 
-    def _note_leaks(self) -> None:
-        """Leak-off begins where a joint is open and has it."""
-        at = self.network.channels[self.blocks.open[self.network.channels]]
+    def note_leaks(self, broken: np.ndarray | None = None) -> None:
+        """Leak-off begins where a joint is open, or among these that broke, and has it. Not collective."""
+        channels = self.network.channels
+        at = channels[self.blocks.open[channels]]
+        if broken is not None:
+            at = np.union1d(at, channels[np.isin(channels, broken)])
         leaks = np.array([False, *(row[_PROPERTIES.index("leak_off")] > 0.0 for row in self.rows)])
         new = at[leaks[self.row[at]] & np.isinf(self.since[at])]
         self.since[new] = self.time
@@ -595,7 +598,7 @@ class Flow(SurfaceLoad):
     def joints_opened(self) -> None:
         """Joints broke: their faces are open now."""
         if len(self.network.channels) and self.blocks.closed:
-            self._note_leaks()
+            self.note_leaks()
 
     def elements_removed(self, elements: np.ndarray) -> None:
         """Channels beside these elements are gone, with their fluid."""
