@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.model import Flow
@@ -183,12 +182,6 @@ def test_excavation_takes_its_fluid_away() -> None:
     assert len(flow.network.channels) < channels and not np.isin(flow.network.channels // 4, gone).any()
     assert after["removed"] > 0.4 * before["stored"] and after["relative"] < 1e-13
     assert flow.values("flow-node", "pressure") == pytest.approx(1e5, rel=1e-6)  # what stays is as it was
-
-
-def test_a_solve_at_once_refuses_fluid() -> None:
-    sim, _ = split()
-    with pytest.raises(CommandError, match="fluid"):
-        equilibrium.solve_elastic(sim)
 
 
 def test_pressure_breaks_joints_and_lists_follow() -> None:
