@@ -22,7 +22,9 @@ _NAMES = {
     "couple": "hpcdem.api",
     "element_law": "hpcdem.physics.fdem.user_laws",
     "Property": "hpcdem.physics.fdem.properties",
-    "StateVariable": "hpcdem.physics.fdem.user_laws",
+    "StateVariable": "hpcdem.physics.user_files",
+    "pair_law": "hpcdem.physics.dem.user_laws",
+    "PairProperty": "hpcdem.physics.dem.user_laws",
     "HpcdemError": "hpcdem.core.errors",
     "version": "hpcdem.runtime.launch",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -328,11 +328,15 @@ class Simulation(BlockCommands):
         group: str | None = None,
         xp: float | None = None,
         yp: float | None = None,
+        law: str | None = None,
+        parameter: Mapping[str, float] | None = None,
     ) -> None:
-        """PROP: properties, velocities, colour and group of particles; what is left out stays."""
+        """PROP: properties, velocities, colour and group of particles; what is left out stays. law: 'file.py:function'
+        beside the program (docs/user_laws.md), or "linear"; parameter: properties that it declares."""
         dem.properties.prop(
             self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
             hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
+            law=law, parameter=parameter, folder=self.directory,
         )  # fmt: skip
 
     @_command

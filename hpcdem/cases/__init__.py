@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
-    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "creep": "Creep",
+    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar", "creep": "Creep",
     "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
+    "fracture": "HydraulicFracture",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]

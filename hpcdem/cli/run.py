@@ -191,6 +191,7 @@ def go_on(sim: Simulation, script: Script, log: Log) -> bool:
     from hpcdem.physics.dem import saved_state
 
     named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
+    execute.Interpreter(script).load_laws(sim)
     found = saved_state.restore_newest(sim, [sim.outdir, *named.values()])
     if found is None:
         return False

@@ -84,11 +84,15 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
         modes = blocks.supports(left, model)
         left.apply_aspect()
         box = left.get_position()
-        bar = figure.add_axes((box.x0 + 0.55 * box.width, box.y1 + 0.1 / page[1], 0.45 * box.width, 0.07 / page[1]))
+        begin = min(max(0.55, 1.75 / (box.width * page[0])), 0.75)  # between "(a)" and the bar stands its name
+        bar = figure.add_axes(
+            (box.x0 + begin * box.width, box.y1 + 0.1 / page[1], (1.0 - begin) * box.width, 0.07 / page[1])
+        )
         if filled is None:
             bar.set_axis_off()
         else:
-            ticks = filled.levels[::4] if panel in blocks.CONTOURS else MaxNLocator(3)
+            every = 4 if begin == 0.55 else 8
+            ticks = filled.levels[::every] if panel in blocks.CONTOURS else MaxNLocator(3)
             figure.colorbar(filled, cax=bar, orientation="horizontal", ticks=ticks)
         bar.tick_params(labelsize=0.8 * FONT, width=0.5, length=2.0, labelbottom=False, labeltop=True, bottom=False,
                         top=True, pad=1.0)  # fmt: skip

@@ -12,7 +12,7 @@ import pytest
 from hpcdem.physics.fdem import changes, diagnostics, user_laws
 from hpcdem.physics.fdem.properties import MODELS
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.user_files import executed, made_of
+from hpcdem.physics.user_files import executed, made_of
 from hpcdem.runtime import kept
 from tests.blocks.support import ROCK, rectangle
 

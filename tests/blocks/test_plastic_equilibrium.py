@@ -74,10 +74,10 @@ def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
     sim.initial_stress(None, xx=-1e6, yy=-7e6, xy=1e6, zz=-3e6)
     sim.option(large_strain=large)
     sim.close_model()
-    nodes = equilibrium._all_nodes(sim)
+    nodes = equilibrium.all_nodes(sim)
     x = nodes.x + rng.uniform(-4e-4, 4e-4, nodes.x.shape)
-    unknowns = equilibrium._unknowns(sim, nodes, 1)
-    equilibrium._place_corners(sim, x)
+    unknowns = equilibrium.unknowns_of(sim, nodes, 1)
+    equilibrium.place_corners(sim, x)
     pieces, _ = equilibrium.tangent(sim)
     elastic, _ = equilibrium.tangent(sim, flows=False)
     changed = [np.abs(a.stiffness - b.stiffness).max(axis=(1, 2)) > 0.0 for a, b in zip(pieces[:2], elastic)]
@@ -88,7 +88,7 @@ def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
         local = ways[one.node].reshape(*one.stiffness.shape[:2], 3)
         np.add.at(product, one.node, (one.stiffness @ local).reshape(*one.node.shape, 2, 3))
     for k in range(3):
-        ends = [equilibrium._unbalanced(sim, nodes, unknowns, x + h * ways[:, :, k])[0] for h in (1e-9, -1e-9)]
+        ends = [equilibrium.unbalanced(sim, nodes, unknowns, x + h * ways[:, :, k])[0] for h in (1e-9, -1e-9)]
         slope = (ends[1] - ends[0]) / 2e-9
         assert np.abs(product[:, :, k] - slope).max() < within * np.abs(slope).max()
 

@@ -76,7 +76,7 @@ def test_apertures_follow_fields_and_tables(tmp_path: Path) -> None:
 def test_leak_off_can_be_switched_on_later(tmp_path: Path) -> None:
     on = "pcdc face-joint property leak-off on matrix-permeability 1e-15 matrix-porosity 0.2 m-p-c 1e-9"
     flow = Flow.of(bench(tmp_path, on).project.blocks)
-    assert (flow._laws()[flow.row[flow.network.channels] - 1][:, kernels.LEAK] > 0.0).all()
+    assert (flow.laws()[flow.row[flow.network.channels] - 1][:, kernels.LEAK] > 0.0).all()
     for more, said in (("leak-off on", "leak_off needs matrix_permeability"),
                        ("leak-off on matrix-permeability 1e-15", "leak_off needs matrix_porosity"),
                        ("matrix-porosity 0.2", "matrix_porosity goes with leak_off, which is off")):  # fmt: skip

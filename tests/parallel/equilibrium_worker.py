@@ -2,8 +2,8 @@
 
 python equilibrium_worker.py RUN...
 
-RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens; one
-after the other. Files are RUN.npz.
+RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
+SOLVER-pumped: a joint that fluid opens by implicit steps; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
-from tests.blocks.support import JOINT, ROCK, rectangle, shaken
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.coupled import Coupled
+from hpcdem.physics.flow.model import Flow
+from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
+from tests.flow.support import WATER
 from tests.parallel.model import communicator
 
 NAMES = (
@@ -82,7 +86,33 @@ def stamp(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def pumped(sim: Blocks, solver: str, out: str) -> None:
+    sim.take_mesh(rectangle(24, 8, 2.4, 0.8, y0=-0.4, kind="mixed"))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    joints = np.unique(np.minimum(*(lambda faces: (faces, sim.partner[faces]))(near(sim.the_mesh(), 1, 0.0, True))))
+    law = {**JOINT, "friction": 30.0, "tensile_strength": 1e6, "gf1": 20.0, "penalty_normal": 100.0 * ROCK["young"]}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    sim.option(dynamic=False, large_strain=False, collision=False)
+    sim.initial_stress(None, yy=-1e6)
+    x, y = sim.the_mesh().points.T
+    sim.velocity_condition(np.flatnonzero(np.abs(np.abs(y) - 0.4) < 1e-9), vx=0.0, vy=0.0)
+    equilibrium.solve_elastic(sim)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "aperature_initial": 5e-6})
+    flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
+    with Coupled(sim, 0.05, solver) as run:
+        while flow.time < 1.0:
+            run.advance(1.0)
+    found = {name: diagnostics.values(sim, name) for name in NAMES}
+    for name in ("pressure", "saturation", "fluid"):
+        found[name] = flow.values("flow-node", name)
+    found["joints"] = np.array(diagnostics.joint_counts(sim))
+    found["account"] = np.array(list(flow.account().values())[:4])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
 if __name__ == "__main__":
     for run in sys.argv[1:]:
-        solver, _, yields = run.partition("-")
-        (stamp if yields else excavation)(Blocks(communicator()), solver, f"{run}.npz")
+        solver, _, kind = run.partition("-")
+        {"": excavation, "yields": stamp, "pumped": pumped}[kind](Blocks(communicator()), solver, f"{run}.npz")

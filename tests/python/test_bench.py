@@ -83,7 +83,7 @@ def test_tiny_bed_on_one_and_two_ranks(cache, tmp_path):
 def test_beds():
     """Copies share the height and the unit; every parameter is in the name of the file."""
     known = workloads()
-    assert [w.bed.particles for w in known.values()] == [12500] * 3 + [100000] * 4 + [1000000]
+    assert [w.bed.particles for w in known.values()] == [12500] * 3 + [100000] * 5 + [1000000]
     unit, eight = Bed(), Bed(copies=8)
     assert unit.rows == 50 and unit.unit_length == 25e3 and eight.length == 200e3 and eight.height == unit.height
     assert Bed(copies=8, law="linear").parent == eight and eight.parent == unit and unit.parent is None

@@ -41,9 +41,9 @@ KNOWN = {
     ("lang/pcdc/execute.py", "compile"),
     ("lang/pcdc/check.py", "compile"),
     ("lang/pcdc/console.py", "import codeop"),
-    # Laws in a Python file that the user's own script names; files of data never do (physics/fdem/user_files.py).
-    ("physics/fdem/user_files.py", "exec"),
-    ("physics/fdem/user_files.py", "compile"),
+    # Laws in a Python file that the user's own script names; files of data never do (physics/user_files.py).
+    ("physics/user_files.py", "exec"),
+    ("physics/user_files.py", "compile"),
     # Modules of this package, by names from its own tables.
     ("__init__.py", "importlib.import_module"),
     ("cases/__init__.py", "importlib.import_module"),

@@ -16,7 +16,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
 from hpcdem.physics.fdem.groups import Groups
-from hpcdem.physics.fdem.user_files import UnknownLaw
+from hpcdem.physics.user_files import UnknownLaw
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import checkpoints, run_folder
 

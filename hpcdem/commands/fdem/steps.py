@@ -16,6 +16,8 @@ from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, Sto
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
+from hpcdem.physics.flow.coupled import Coupled
+from hpcdem.physics.flow.model import Flow
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
 
@@ -30,6 +32,8 @@ CONTINUE = "continue"
 """What a script may do when a run towards a ratio has failed; else it stops."""
 FAILED = ("no progress", "limit")
 """Reasons of `blocks.Watch`; "runaway": a body moved too fast to go on."""
+STEADY_STEP = 1.0
+"""First step towards steady flow [s]."""
 QUIET_SECONDS = 10.0
 """Between two lines of the log."""
 
@@ -52,6 +56,8 @@ def resume(project: Project) -> None:
             solve(project, **given)
         case "solve elastic":
             solve_elastic(project, **given)
+        case "solve hydraulic":
+            solve_hydraulic(project, **given)
 
 
 def solve(
@@ -121,6 +127,67 @@ def solve_elastic(
     _write_due(project)
     histories.flush(project)
     frames.settle(project)
+
+
+def solve_hydraulic(
+    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
+) -> None:
+    """Flow by implicit steps, see `coupled.Coupled`: for so much flow time [s], with blocks in static equilibrium if
+    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given."""
+    project.refuse_inside("model solve hydraulic")
+    coupling.refuse(project, "model solve hydraulic")
+    if steady == (time is not None):
+        raise CommandError("flow is solved for some time or until it is steady: time or steady, one of them")
+    blocks = project.ready()
+    flow = Flow.there(blocks)
+    first, began = project.step, clocks.monotonic()
+    run = Coupled(blocks, dt or (STEADY_STEP if time is None else 0.01 * time), solver)
+    if time is None:
+        with run:
+            run.steady()
+        _write_due(project)
+    else:
+        assert flow is not None
+        if project.progress is None:
+            command = "solve hydraulic", {"time": time, "dt": dt, "solver": solver}
+            project.progress = {"first": project.step, "flow": flow.time + time, "command": command}
+        first = project.progress["first"]
+        try:
+            project.stepping = "solve hydraulic"
+            frames.write_due(project)
+            while request := _flow_on(project, run, flow, project.progress["flow"]):
+                _answer(project, request)
+        finally:
+            under_way.wait()
+            project.progress, project.stepping = None, ""
+    count = run.count
+    project.solved = {"reason": "steady" if steady else "time", "ratio": math.nan, "steps": project.step - first}
+    if project.log is not None:
+        project.log.info(
+            f"{_where(project)}solve hydraulic: {count.steps} implicit steps, {count.cut} cut, {count.iterations} "
+            f"iterations, {count.unknowns} unknowns, {count.solver}, {duration(clocks.monotonic() - began)}"
+        )
+    histories.flush(project)
+    frames.settle(project)
+
+
+def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> int:
+    """Implicit steps to this flow time [s], or until a checkpoint is asked for: then what, else 0."""
+    stop, told = project.blocks.stop, clocks.monotonic()
+    if flow.time >= end * (1.0 - 1e-12):
+        return 0
+    with run:
+        while flow.time < end * (1.0 - 1e-12):
+            run.advance(end)
+            _write_due(project)
+            if project.log is not None and clocks.monotonic() - told > QUIET_SECONDS:
+                told = clocks.monotonic()
+                project.log.info(f"flow time {flow.time:.6g} s of {end:.6g} s, time step {flow.implicit_dt:.3g} s")
+            if stop is not None and flow.time < end:
+                asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
+                if asked:
+                    return asked
+    return 0
 
 
 def _where(project: Project) -> str:

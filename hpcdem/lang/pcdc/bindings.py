@@ -281,6 +281,8 @@ def _history(call: Call) -> None:
 def _solve(call: Call) -> None:
     if "elastic" in call.arguments:
         fdem.steps.solve_elastic(call.project, **call.given("elastic"))
+    elif "hydraulic" in call.arguments:
+        fdem.steps.solve_hydraulic(call.project, **call.given("hydraulic"))
     else:
         fdem.steps.solve(call.project, **call.given())
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,11 @@ def refuse_escapes(script: Script, folder: Path) -> None:
     scripts that came with a checkpoint: whoever goes on with a run of others did not write them."""
     allowed = [path.resolve() for path in (script.directory, folder)]
     for statement in script.statements:
+        if statement.get("law"):
+            raise statement.error(
+                "a law of the user is executed, and this script was taken from a checkpoint; to run it, give the "
+                "script itself: hpcdem SCRIPT --resume"
+            )
         for word in ("file", "outdir"):
             name = statement.get(word)
             if name and not any((script.directory / name).resolve().is_relative_to(root) for root in allowed):
@@ -114,6 +120,7 @@ class Interpreter:
         """
         refuse_unexecuted(self.script.statements)
         self._refuse_lost_files(sim)
+        self.load_laws(sim)
         tell_warnings(self.script, sim)
         sim.script = self.script.text
         if resume is not None:
@@ -125,6 +132,13 @@ class Interpreter:
             self.carry_out(sim, index)
         if self.script.statements[-1].command != "STOP":
             dem.cycles.stop(sim)
+
+    def load_laws(self, sim: Any) -> None:
+        """Read, check and compile the laws of the user that lines name, before the first one is carried out."""
+        for statement in self.script.statements:
+            law = statement.get("law")
+            if law and law != dem.properties.LINEAR:
+                self._guarded(statement, partial(dem.properties.load_law, sim, law, self.script.directory))
 
     def _refuse_lost_files(self, sim: Any) -> None:
         """Rank 0 looks, so that all ranks agree."""
@@ -155,7 +169,7 @@ class Interpreter:
         self._guarded(statement, lambda: _COMMANDS[statement.command](_Call(self, sim, statement)))
 
     @staticmethod
-    def _guarded(statement: Statement, work: Callable[[], None]) -> None:
+    def _guarded(statement: Statement, work: Callable[[], object]) -> None:
         try:
             work()
         except CommandError as error:
@@ -285,11 +299,18 @@ def _prop(call: _Call) -> None:
         # Bonds are made with the new properties, but before the particles leave the group that RANGE may name.
         group = {"group": properties.pop("group")} if "group" in properties else {}
         if properties:
-            dem.properties.prop(call.sim, call.where, **properties)
+            _set_properties(call, properties)
         dem.bonds.bond(call.sim, call.where, **call.given(*BOND_KEYS))
         properties = group
     if properties:
-        dem.properties.prop(call.sim, call.where, **properties)
+        _set_properties(call, properties)
+
+
+def _set_properties(call: _Call, properties: dict[str, Any]) -> None:
+    """Laws of the user lie beside the script."""
+    if "law" in properties:
+        properties = {**properties, "folder": call.directory}
+    dem.properties.prop(call.sim, call.where, **properties)
 
 
 def _bond(call: _Call) -> None:

@@ -71,6 +71,7 @@ class _LineParser:
     def __init__(self, line: Line, file: str, table: t.Table, before: Statement | None = None) -> None:
         self.line, self.file, self.table, self.before = line, file, table, before
         self.at = 0
+        self.words: tuple[t.Option, ...] = ()
         self.unexecuted: list[str] = []
         self.warnings: list[str] = []
         self.context = line.tokens[0].text
@@ -167,6 +168,7 @@ class _LineParser:
 
     def options(self, command: t.Command, arguments: dict[str, Any]) -> sel.Selection | None:
         """Keywords in any order, then RANGE; returns the selection."""
+        self.words = command.options
         while (token := self.peek()) is not None:
             self.at += 1
             if t.find(token.word, command.options)[0] is None and self.table.range_row.accepts(token.word):
@@ -371,6 +373,20 @@ class _LineParser:
             )
         return token.text
 
+    def values(self, kind: t.Values, name: str) -> dict[str, float]:
+        found: dict[str, float] = {}
+        while True:
+            token = self.next(f"{kind.meaning} for {name}")
+            if not token.text.isidentifier():
+                self.unexpected(token, f"{kind.meaning} for {name}")
+            if token.text in found:
+                self.fail(f"{self.context}: {name} {token.text} stands twice")
+            what = f"a number for {name} {token.text}"
+            found[token.text] = self.plain_number(self.next(what), what)
+            after = self.line.tokens[self.at : self.at + 2]
+            if len(after) < 2 or lexer.number(after[1]) is None or any(row.named(after[0].word) for row in self.words):
+                return found
+
     def either(self, kind: t.Kind, name: str, number: int) -> list[Token]:
         """So many words with | between them, blanks around it or not; the tokens carry the words alone."""
         pieces: list[Token] = []
@@ -432,6 +448,7 @@ _READERS: dict[type, Callable[[_LineParser, Any, str], Any]] = {
     t.Color: _LineParser.color,
     t.Name: _LineParser.name,
     t.File: _LineParser.file_name,
+    t.Values: _LineParser.values,
     t.Choice: _LineParser.choice,
     t.Groups: _LineParser.groups,
     t.WallIds: _LineParser.wall_ids,

@@ -131,6 +131,11 @@ class File(Kind):
 
 
 @dataclass(frozen=True)
+class Values(Kind):
+    """Names, each with a number behind it; case is kept."""
+
+
+@dataclass(frozen=True)
 class Groups(Kind):
     """The word ``group``, which may be left out, and as many names as `number`, with | between them."""
 
@@ -182,6 +187,8 @@ OF_WALL = WallIds("[wall] [id] <int>", "the id of a wall")
 THIS_WALL = WallIds("[[wall] [id] <int>]", "the id of a wall", optional=True)
 OF_WALLS = WallIds("[wall] [id] <int>|<int>", "the ids of two walls with | between them", number=2)
 FILE = File("<file>", "a file name")
+LAW = File("<file.py:function>", "'file.py:function', or linear")
+VALUES = Values("<name> <float> ...", "names with a number each")
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
@@ -336,6 +343,9 @@ _PROPERTIES = (
     Option("hertz", "the particles take the Hertz-Mindlin contact; a later kn or ks without it takes that back"),
     Option("kn", "normal stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
     Option("ks", "shear stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
+    Option("law", "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a "
+           "built-in one again", kind=LAW, source="X"),
+    Option("parameter", "properties that this law declares", kind=VALUES, source="X"),
     Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
     Option("yv", "velocity in y", kind=FLOAT, unit="m/s"),
     Option("spin", "angular velocity, anticlockwise", kind=FLOAT, unit="rad/s"),
@@ -567,6 +577,7 @@ COMMANDS = (
             "PROP density 2.5e3, fric 0.0, shear 2.9e9, poiss 0.2, damp 0.4, hertz",
             "PROP ebmod 2e8 gbmod 2e8 tstrength 2e7 sstrength 4e7 fric 0.3 RANGE x (1.0 10.0) y (1.0 10.0)",
             "PROP tolerate rext 0.4 n_bond 1e4 s_bond 1e4 RANGE group base",
+            "PROP kn 1e7 ks 1e7 fric 0.5 law sticky.py:sticky parameter pull 2e3",
         ),
     ),
     Command("INIT", "The same as PROP.", options=_PROPERTIES, ranged=True, same_as="PROP",

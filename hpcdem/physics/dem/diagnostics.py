@@ -327,10 +327,10 @@ def fingerprint(sim: Simulation) -> dict[str, str]:
     rows = sim.clumps.rows(p)
     if rows is not None:
         columns |= {f"clump {k}": rows[:, k] for k in range(rows.shape[1])}
-    hist = sim.lists.histories(p.ihot) if sim.closed else sim.hist
+    hist = sim.lists.histories(p.ihot, float(sim.stamp)) if sim.closed else sim.hist
     owner = np.repeat(p["gid"], hist.counts())
     once = (hist.partner > owner) | (hist.partner < 0)  # the owner of the lower id tells of a pair
-    remembered = [column[once] for column in (owner, hist.partner, hist.fs, hist.extra, hist.bond)]
+    remembered = [column[once] for column in (owner, hist.partner, hist.fs, hist.extra, hist.bond, *hist.memory.T)]
     sums = np.array([of_rows(list(columns.values())), of_rows(remembered)], np.uint64)
     sim.comm.sum_into(sums)  # integers without sign go round, as they should
     walls = of_rows([w.ids_of_earlier_versions(), *w.p1.T, *w.p2.T, *w.v.T, w.kn, w.ks, w.fric])

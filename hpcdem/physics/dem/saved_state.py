@@ -35,6 +35,7 @@ from hpcdem.halo.migrate import Trail
 from hpcdem.io import checkpoint
 from hpcdem.io.frame import Table
 from hpcdem.io.slabs import ask, holders, order_of, to_slabs
+from hpcdem.physics.dem import user_laws
 from hpcdem.physics.dem.budget import Budget
 from hpcdem.physics.dem.clumps import Clumps
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
@@ -45,6 +46,7 @@ from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.simulation import ListState, Simulation
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.particle_physics import PHYSICS
+from hpcdem.physics.user_files import UnknownLaw
 from hpcdem.runtime.checkpoints import newest_first
 
 
@@ -85,6 +87,8 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "lost": sim.lost,
         "rows": sim.rows,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
+        "pair_law": sim.pair_law.name if sim.pair_law is not None else None,
+        "stamp": sim.stamp,
         "physics": [[physics.name, physics.parameters()] for physics in sim.physics],
         "rebuilds": sim.rebuilds,
         "history_wishes": {str(k): list(v) for k, v in sim.history_wishes.items()},
@@ -105,7 +109,7 @@ def tables_of(sim: Simulation) -> dict[str, Table]:
         force = sim.lists.owned_forces()
         for k, name in enumerate(("fx", "fy", "torque")):
             columns[name] = force[:, k].copy()
-        hist, origin = sim.lists.histories(p.ihot), sim.origin
+        hist, origin = sim.lists.histories(p.ihot, float(sim.stamp)), sim.origin
     else:
         hist, origin = sim.hist, p.positions()
     columns["x0"], columns["y0"] = origin[:, 0].copy(), origin[:, 1].copy()
@@ -114,6 +118,7 @@ def tables_of(sim: Simulation) -> dict[str, Table]:
     pairs = {
         "gid": owner[once], "partner": hist.partner[once], "fs": hist.fs[once], "extra": hist.extra[once],
         "bond": hist.bond[once].astype(np.int64),
+        **{f"{MEMORY}{k}": column.copy() for k, column in enumerate(hist.memory[once].T)},
     }  # fmt: skip
     wall_contacts = {
         "gid": owner[walls], "wall": -1 - hist.partner[walls], "fs": hist.fs[walls], "extra": hist.extra[walls],
@@ -140,6 +145,8 @@ def add_physics(sim: Simulation, name: str, parameters: dict[str, Any]) -> None:
     sim.add_physics(physics)
 
 
+MEMORY = "memory"
+"""Of the table of pairs: its columns of what contacts remember of a law of the user begin so."""
 CLUMP_STATE = {
     "x": CLUMP_X, "y": CLUMP_Y, "vx": CLUMP_VX, "vy": CLUMP_VY, "spin": CLUMP_SPIN, "angle": CLUMP_ANGLE, "area": AREA,
     "inertia": MOMENT,
@@ -208,6 +215,8 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
     for path in sim.comm.bcast(found):
         try:
             state = restore(sim, path)
+        except UnknownLaw:
+            raise
         except CommandError as error:
             if sim.log is not None:
                 sim.log.warn(f"{error}; trying the checkpoint before it")
@@ -222,8 +231,11 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
 
 
 def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:
-    """Take a state that was read; tables: this rank's slabs, which are let go of. Collective."""
+    """Take a state that was read; tables: this rank's slabs, which are let go of. UnknownLaw if it has a law of the
+    user that was not named. Collective."""
+    law = user_laws.restored(state.get("pair_law"))
     sim.clear()
+    sim.pair_law, sim.stamp = law, state.get("stamp", 1)
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
     sim.rebuild_state = ListState(**state["lattice"])
@@ -278,8 +290,13 @@ def histories(
 ) -> Histories:
     """What the particles of this rank remember, gid (n,) i8: ascending over all ranks. Collective.
 
-    pairs: each pair once, on any rank: gid < partner, fs, extra, bond; walls: gid, wall, fs, extra (see `Histories`).
+    pairs: each pair once, on any rank: gid < partner, fs, extra, bond, memory of a law of the user; walls: gid, wall,
+    fs, extra (see `Histories`).
     """
+    columns = sum(name.startswith(MEMORY) for name in pairs)
+    memory = np.empty((len(pairs["gid"]), columns))
+    for k in range(columns):
+        memory[:, k] = pairs[f"{MEMORY}{k}"]
     none = np.zeros(len(walls["gid"]), np.int64)
     owner = np.concatenate([pairs["gid"], pairs["partner"], walls["gid"]])
     entries = (
@@ -287,13 +304,14 @@ def histories(
         np.concatenate([pairs["fs"], pairs["fs"], walls["fs"]]),
         np.concatenate([pairs["extra"], pairs["extra"], walls["extra"]]),
         np.concatenate([pairs["bond"], pairs["bond"], none]),
+        np.concatenate([memory, memory, np.zeros((len(none), columns))]),
     )
-    _, owner, partner, fs, extra, bond = comm.to_ranks(holders(comm, gid, owner), owner, *entries)
+    _, owner, partner, fs, extra, bond, memory = comm.to_ranks(holders(comm, gid, owner), owner, *entries)
     # Of each particle: pairs with higher ids, pairs with lower ones, walls.
     kind = np.where(partner > owner, 0, np.where(partner < 0, 2, 1))
     order = order_of([owner, kind])
     ptr = np.searchsorted(owner[order], np.concatenate([gid, [np.iinfo(np.int64).max]])).astype(np.int64)
-    return Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order])
+    return Histories.of_columns(ptr, partner[order], fs[order], extra[order], bond[order], memory[order])
 
 
 def _close_as_it_was(sim: Simulation, state: dict[str, Any], origin: np.ndarray) -> None:

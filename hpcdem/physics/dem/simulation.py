@@ -34,6 +34,7 @@ from hpcdem.physics.dem.kernels.neighbours import NO_ROWS, Histories
 from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
+from hpcdem.physics.dem.user_laws import PairLaw
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.model import Model
 
@@ -150,6 +151,8 @@ class Simulation(Model):
         self.rows: list[tuple[int, int]] = []
         self._named: set[int] = set()
         self.energy: Any = None
+        self.pair_law: PairLaw | None = None  # of the user; materials say which discs have it
+        self.stamp = 1  # evaluations of forces, for the memory of that law
         self.history_wishes: dict[int, tuple[int, str]] = {}
         self.history_origins: dict[int, tuple[int, float]] = {}  # axis and distance of strains
         self.plots: list[tuple[int, int]] = []
@@ -225,7 +228,11 @@ class Simulation(Model):
     def _forces(self) -> None:
         """Contact, bond and wall forces at the present positions."""
         lists = self.lists
-        self._pair_forces(lists.n_blocks, *self._pair_args)
+        if self.pair_law is None:
+            self._pair_forces(lists.n_blocks, *self._pair_args)
+        else:
+            self.stamp += 1
+            self._pair_forces(lists.n_blocks, *self._pair_args, float(self.stamp))
         if len(lists.slot_row):
             self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
             self._wall_forces(lists.n_blocks, *self._wall_args)
@@ -348,7 +355,7 @@ class Simulation(Model):
         self._name_slipped()
         self._harvest()
         self._longest2 = self.lists.longest_bond2()
-        self._hist = self.lists.histories(p.ihot)
+        self._hist = self.lists.histories(p.ihot, float(self.stamp))
         self.halo.close()
         p.set_owned(p.hot[p.owned], p.cold, self.clumps.rows(p), p.more[p.owned])
         self.clumps.open()
@@ -411,6 +418,7 @@ class Simulation(Model):
             outside = self._choose_reach(frozen, least_skin, box)
             if outside and box is not None:
                 self._drop_outside(box)
+        self.hist = self.hist.resized(0 if self.pair_law is None else self.pair_law.memory)
         cell = self._share_out()
         p, rebuild_state, borders = self.particles, self.rebuild_state, self.ownership.borders
         with self.timers("neighbour"):
@@ -665,7 +673,8 @@ class Simulation(Model):
         )  # fmt: skip
         if self.clumps:
             self.clumps.fill(p, rows["density"].copy(), rows["damp"].copy(), dt, self.body)
-        self.pair_laws = contacts.pair_table(rows)
+        table, bounds = (None, None) if self.pair_law is None else self.pair_law.tables(rows)
+        self.pair_laws = contacts.pair_table(rows, bounds)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
         self.bond_laws = self.bond_types.as_floats()
         self._pushed, self._push = self._pressures()
@@ -673,15 +682,18 @@ class Simulation(Model):
         self._walls_move = bool(self.walls.v.any())
         threaded = lists.n_blocks > 1
         self._move: Any = motion.move_threaded if threaded else motion.move
-        self._pair_forces = pair_forces.forces_threaded if threaded else pair_forces.forces
+        self._pair_forces: Any = pair_forces.forces_threaded if threaded else pair_forces.forces
         self._wall_forces = wall_kernels.forces_threaded if threaded else wall_kernels.forces
         self._move_args = (
             p.hot, p.cold, p.n_left, b.cut, b.lo, b.foff, lists.force, self.body, s.gx, s.gy, s.lsm, dt,
         )  # fmt: skip
-        self._pair_args = (
+        self._pair_args: tuple[Any, ...] = (
             p.hot, p.ihot, *b, lists.ptr, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
             self.pair_laws, contacts.bond_table(self.bond_laws), n_mat, dt, mass.SPHERES[s.disk], lists.tally,
         )  # fmt: skip
+        if self.pair_law is not None:
+            self._pair_forces = self.pair_law.loop_threaded if threaded else self.pair_law.loop
+            self._pair_args += table, lists.memory, self.pair_law.initial
         self._wall_args = (
             p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, self._wall_table, lists.slot_row, lists.slot_wall,
             lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,

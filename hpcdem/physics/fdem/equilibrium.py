@@ -20,6 +20,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
+from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import plastic_stiffness, stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
@@ -41,8 +42,8 @@ WORST = 1e-3
 """Worst balance that is put down to rounding."""
 HALVINGS = 8
 """Of an iteration's way before it is given up."""
-CUTS = 6
-"""How often an increment of the loads is halved that finds no balance."""
+CUTS, FINE = 6, 10
+"""How often an increment of the loads is halved that finds no balance; where joints soften."""
 TRIES = 3
 """Elastic ways in an increment that need not bring forces nearer to balance."""
 STILL = 1e-6
@@ -69,7 +70,7 @@ class Balanced:
 @dataclass
 class _Balance:
     """What Newton's method came to: positions (nn, 2), unbalanced over all forces, iterations, factors, joints behind
-    their peak; error: why this is no balance, "" if it is; ratios: on the way."""
+    their peak; error: why this is no balance, "" if it is; ratios: on the way; total: sum of forces [N/m]."""
 
     x: np.ndarray
     ratio: float
@@ -78,10 +79,11 @@ class _Balance:
     past: int
     error: str
     ratios: list[float]
+    total: float
 
 
 @dataclass
-class _Nodes:
+class Nodes:
     """Of all nodes, on all ranks: the lowest corner (nn,), its point and rank; position and velocity (nn, 2). Nodes of
     which nothing is left have corner -1."""
 
@@ -90,22 +92,26 @@ class _Nodes:
     owner: np.ndarray
     x: np.ndarray
     v: np.ndarray
+    least: float = 0.0
+    """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none."""
 
 
 def solve_elastic(
-    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1
+    sim: Blocks, cycles: int = 1, ratio: float = ENOUGH, solver: str = "auto", steps: int = 1, softening: bool = False
 ) -> Balanced:
     """Put the model into static equilibrium with the loads of this moment, at once.
 
-    Elements are elastic or yield after Mohr and Coulomb, and joints must stay before their peak. Without elements that
-    yield the answer does not depend on the way, and is the one to which relaxation goes. Prescribed velocities act for
-    `cycles` units of time (static mode), what elements that were taken out left behind has died down, velocities are
-    zero afterwards. Counts as `cycles` steps.
+    Elements are elastic or yield after Mohr and Coulomb. Joints must stay before their peak, or, with `softening`, may
+    pass it and break, one after the other. Without either of these the answer does not depend on the way, and is the
+    one to which relaxation goes. Prescribed velocities act for `cycles` units of time (static mode), what elements that
+    were taken out left behind has died down, velocities are zero afterwards. Counts as `cycles` steps.
 
     ratio: unbalanced over contributing forces that must be reached; what rounding allows is aimed at. solver:
     "direct" (SciPy on rank 0: the same bits on any number of ranks), "petsc", "auto": PETSc, if it is there, from
     400 000 unknowns on, else direct. steps: what is out of balance, and prescribed movement, is brought on in so many
-    equal increments, in each of which elements flow once; one that finds no balance is halved, up to `CUTS` times.
+    equal increments, in each of which elements flow once; one that finds no balance, or in which more than one joint
+    would pass its peak, is halved, up to `CUTS` times (`FINE` with softening). A smallest increment may take several
+    joints past their peak, as where there is symmetry.
 
     CommandError, with the model as it was: a body that can move freely, conditions without equilibrium, surfaces
     that touch (before or in the answer), laws of users, joints behind their peak (before or in the answer), no
@@ -115,7 +121,7 @@ def solve_elastic(
         raise CommandError(f"cycles and ratio must be positive, solver one of {', '.join(SOLVERS)}")
     if steps < 1:
         raise CommandError(f"steps must be positive, got {steps}")
-    for load in sim.surface_loads:
+    for load in [load for load in sim.surface_loads if not load.stays]:
         raise CommandError(
             f"the static solve knows no {load.name}: model solve relaxes blocks with them to equilibrium"
         )
@@ -127,53 +133,83 @@ def solve_elastic(
     sim.close_model()
     if sim.comm.any(bool((sim.local.slot_state == BROKEN).any())):
         sim._renew_lists()
-    _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
-    nodes = _all_nodes(sim)
-    unknowns = _unknowns(sim, nodes, cycles)
-    _refuse_loose_bodies(sim, nodes, unknowns)
-    if sim.yielding().any():
-        sim.before_change()  # what flows is the doing of a command
+    if not softening:
+        _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
+    nodes = all_nodes(sim)
+    unknowns = unknowns_of(sim, nodes, cycles)
+    refuse_loose_bodies(sim, nodes, unknowns)
+    if softening or sim.yielding().any():
+        sim.before_change()  # what flows and breaks is the doing of a command
         sim.close_model()
-    relaxations, remembered = sim.relaxations, _remembered(sim)
+    relaxations, remembered = sim.relaxations, Memory.of(sim)
     try:
-        with _at_rest(sim, nodes):
+        with at_rest(sim, nodes):
             x, balanced = _follow(
-                sim, nodes, unknowns, ratio, _linear_solver(sim, solver, unknowns, nodes), steps, cycles
+                sim, nodes, unknowns, ratio, linear_solver(sim, solver, unknowns, nodes), steps, cycles, softening
             )
         sim.relaxations = []
-        _settle(sim, nodes, x, unknowns.given / cycles)
-        _refuse_touching(sim, _touching(sim), "touch in the equilibrium that was found")
-        if sim.comm.any(_inverted(sim)):
+        settle(sim, nodes, x, unknowns.given / cycles)
+        refuse_touching(sim, touching(sim), "touch in the equilibrium that was found")
+        if sim.comm.any(inverted(sim)):
             raise CommandError("an element is turned inside out in the equilibrium that was found: loads are too large")
     except CommandError:
         sim.relaxations = relaxations
         sim.before_change()
-        _put_back(sim, *remembered)
-        _settle(sim, nodes, nodes.x, nodes.v)
+        remembered.put_back(sim)
+        settle(sim, nodes, nodes.x, nodes.v)
         raise
+    for load in sim.surface_loads:
+        load.balanced()
     sim.clock.step += cycles
     return balanced
 
 
-def _remembered(sim: Blocks) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Numbers of the owned elements and what they remember of yielding."""
-    kept = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
-    return sim.number[sim.owned].copy(), kept
+@dataclass
+class Memory:
+    """What elements and joints remember, and which joints are broken: numbers of the owned elements, their columns, the
+    rows of their joints and contacts and whose they are; open faces, broken joints, number of cracks in the log."""
 
+    number: np.ndarray
+    cold: dict[str, np.ndarray]
+    owner: np.ndarray
+    rows: np.ndarray
+    open: np.ndarray
+    broken: np.ndarray
+    cracks: int
 
-def _put_back(sim: Blocks, number: np.ndarray, kept: dict[str, np.ndarray]) -> None:
-    """What elements remember is that of `_remembered` again, whoever owns them now; the model is open. Collective."""
-    parts = sim.comm.allgather((number, kept)) if sim.comm.size > 1 else [(number, kept)]
-    every = np.concatenate([part[0] for part in parts])
-    place = np.argsort(every)[np.searchsorted(np.sort(every), sim.number)]
-    for name in kept:
-        sim.cold[name][:] = np.concatenate([part[1][name] for part in parts])[place]
+    @staticmethod
+    def of(sim: Blocks) -> Memory:
+        """Of a closed model. Not collective."""
+        cold = {name: values.copy() for name, values in sim.cold.items() if name in ("plastic", "softening")}
+        number, histories = sim.number[sim.owned].copy(), sim.local.histories(transfer=False)
+        owner = number[histories.owners()]
+        return Memory(
+            number, cold, owner, histories.rows.copy(), sim.open.copy(), sim.broken.copy(), len(sim.event_rows)
+        )
+
+    def put_back(self, sim: Blocks) -> None:
+        """Elements and joints remember this again, whoever owns them now; the model is open. Collective."""
+        mine = self.number, self.cold, self.owner, self.rows
+        parts = sim.comm.allgather(mine) if sim.comm.size > 1 else [mine]
+        every = np.concatenate([part[0] for part in parts])
+        place = np.argsort(every)[np.searchsorted(np.sort(every), sim.number)]
+        for name in self.cold:
+            sim.cold[name][:] = np.concatenate([part[1][name] for part in parts])[place]
+        row_of = np.full(int(every.max(initial=0)) + 1, -1, np.int64)
+        row_of[sim.number] = np.arange(len(sim.number))
+        owner, rows = (np.concatenate([part[k] for part in parts]) for k in (2, 3))
+        here = row_of[owner] >= 0
+        sim.histories = Histories.of(len(sim.number), row_of[owner[here]], rows[here])
+        if not np.array_equal(sim.open, self.open):
+            sim.open[:], sim.broken[:] = self.open, self.broken
+            del sim.event_rows[self.cracks :]
+            sim.changed(topology=True)
 
 
 # ---- who can move --------------------------------------------------------------------------------------------
 
 
-def _all_nodes(sim: Blocks) -> _Nodes:
+def all_nodes(sim: Blocks) -> Nodes:
     cells = sim.the_mesh().cells
     node = sim.node.reshape(-1)
     corner = np.flatnonzero(node >= 0)[::-1]
@@ -187,10 +223,10 @@ def _all_nodes(sim: Blocks) -> _Nodes:
     owner = np.zeros(len(lead), np.int64)
     for rank, (numbers, values) in enumerate(sim.comm.allgather((mine, np.column_stack(columns)))):
         found[numbers], owner[numbers] = values, rank
-    return _Nodes(lead, cells.reshape(-1)[lead], owner, found[:, :2].copy(), found[:, 2:].copy())
+    return Nodes(lead, cells.reshape(-1)[lead], owner, found[:, :2].copy(), found[:, 2:].copy())
 
 
-def _unknowns(sim: Blocks, nodes: _Nodes, cycles: int) -> Unknowns:
+def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     """CommandError for conditions that have no equilibrium."""
     for row in np.unique(sim.point_row).tolist():
         for function in user_functions.used(sim.conditions[row]).values():
@@ -243,7 +279,7 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[list[float], np.
     return free, way, step
 
 
-def _refuse_loose_bodies(sim: Blocks, nodes: _Nodes, unknowns: Unknowns) -> None:
+def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
     """CommandError naming a body that can move as a whole: its three rigid movements are looked at where nodes are
     held (the smallest eigenvalue of the sum of squares of the movements there)."""
     hold = np.where((sim.closed_faces() & np.repeat(sim.alive, 4)), sim.partner, -1)
@@ -310,7 +346,7 @@ def _refuse_yielded(sim: Blocks, mine: int, what: str) -> None:
         )
 
 
-def _touching(sim: Blocks) -> list[tuple[int, int]]:
+def touching(sim: Blocks) -> list[tuple[int, int]]:
     """Pairs of elements whose surfaces press on each other, on all ranks. Collective."""
     seen = sim.evaluate()
     pairs = sim.local.pairs
@@ -321,7 +357,7 @@ def _touching(sim: Blocks) -> list[tuple[int, int]]:
     return sorted({pair for part in sim.comm.allgather(mine) for pair in part})
 
 
-def _refuse_touching(sim: Blocks, pairs: list[tuple[int, int]], what: str) -> None:
+def refuse_touching(sim: Blocks, pairs: list[tuple[int, int]], what: str) -> None:
     if pairs:
         a, b = pairs[0]
         raise CommandError(
@@ -330,7 +366,7 @@ def _refuse_touching(sim: Blocks, pairs: list[tuple[int, int]], what: str) -> No
         )
 
 
-def _inverted(sim: Blocks) -> bool:
+def inverted(sim: Blocks) -> bool:
     x = sim.x[sim.owned]
     cells = sim.the_mesh().cells[sim.number[sim.owned]]
 
@@ -347,23 +383,28 @@ def _inverted(sim: Blocks) -> bool:
 
 
 @contextmanager
-def _at_rest(sim: Blocks, nodes: _Nodes) -> Iterator[None]:
+def at_rest(sim: Blocks, nodes: Nodes) -> Iterator[None]:
     """Velocities are zero and nothing dies down; afterwards everything is as it was."""
     local = sim.local
     relaxations = local.relaxing_corner
     v = sim.v.copy()
     try:
-        sim.v[:] = 0.0
-        local.relaxing_corner = relaxations[:0]
-        _refuse_touching(sim, _touching(sim), "touch")
+        hold_still(sim)
+        refuse_touching(sim, touching(sim), "touch")
         yield
     finally:
-        _place_corners(sim, nodes.x)
-        sim.v[:] = v
-        local.relaxing_corner = relaxations
+        place_corners(sim, nodes.x)
+        if sim.local is local:  # else storage was made anew
+            sim.v[:] = v
+            local.relaxing_corner = relaxations
 
 
-def _place_corners(sim: Blocks, x: np.ndarray) -> None:
+def hold_still(sim: Blocks) -> None:
+    sim.v[:] = 0.0
+    sim.local.relaxing_corner = sim.local.relaxing_corner[:0]
+
+
+def place_corners(sim: Blocks, x: np.ndarray) -> None:
     """Place all corners held here, ghosts too, by the positions of their nodes (nn, 2)."""
     node = sim.node[sim.number]
     real = node >= 0
@@ -374,7 +415,7 @@ def _place_corners(sim: Blocks, x: np.ndarray) -> None:
     changes.repeat(sim, sim.x)
 
 
-def _settle(sim: Blocks, nodes: _Nodes, x: np.ndarray, v: np.ndarray) -> None:
+def settle(sim: Blocks, nodes: Nodes, x: np.ndarray, v: np.ndarray) -> None:
     """Positions and velocities (nn, 2) of all nodes, as a command sets them; the model is closed again."""
     sim.before_change()
     node = sim.node[sim.number]
@@ -388,7 +429,7 @@ def _settle(sim: Blocks, nodes: _Nodes, x: np.ndarray, v: np.ndarray) -> None:
     sim.close_model()
 
 
-def _linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: _Nodes) -> Direct | Petsc:
+def linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: Nodes) -> Direct | Petsc:
     many = unknowns.count >= MANY
     there = False
     if wanted == "petsc" or (wanted == "auto" and many):
@@ -405,33 +446,39 @@ def _linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: _Nodes) 
 
 
 def _follow(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int
-) -> tuple[np.ndarray, Balanced]:
+    sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int,
+    softening: bool,
+) -> tuple[np.ndarray, Balanced]:  # fmt: skip
     """Positions of the nodes in equilibrium (nn, 2), by increments: what is out of balance at the beginning grows
     smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
     yields, step = sim.local.yields, sim.clock.step + cycles - 1
-    solver.flows = yields
+    solver.flows = yields or softening
     x, iterations, factors, increments = nodes.x, 0, 0, 0
-    unit, done = 1 << CUTS if yields else 1, 0
+    unit, done = 1 << FINE if softening else 1 << CUTS if yields else 1, 0
     whole, size = steps * unit, unit
     missing = np.zeros(x.shape)
     try:
         if yields:
             _flow(sim, x, step)
         if whole > 1:
-            missing = _unbalanced(sim, nodes, unknowns, x)[0]
+            missing, _, total = unbalanced(sim, nodes, unknowns, x)
+            nodes.least = total if softening else 0.0
         while done < whole:
             size = min(size, whole - done)
             left = 1.0 - (done + size) / whole
-            found = _balance(sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step)
+            found = _balance(
+                sim, nodes, unknowns, enough, solver, x, left * missing, size / whole, step, softening, size == 1
+            )
             iterations, factors = iterations + found.iterations, factors + found.factors
             if found.error and size > 1:
                 size //= 2
                 continue
-            _refuse_yielded(sim, found.past, "would pass their peak")
+            if not softening:
+                _refuse_yielded(sim, found.past, "would pass their peak")
             if found.error:
-                raise CommandError(found.error + _reached(sim, done / whole))
+                raise CommandError(found.error + (_reached(done / whole) if unit > 1 else ""))
             x, done, increments = found.x, done + size, increments + 1
+            nodes.least = max(nodes.least, found.total) if softening else 0.0
             size = min(2 * size if done % (2 * size) == 0 else size, unit)
     finally:
         solver.close()
@@ -443,39 +490,62 @@ def _follow(
     return x, Balanced(found.ratio, iterations, factors, unknowns.count, solver.name, increments)
 
 
-def _reached(sim: Blocks, part: float) -> str:
-    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads" if sim.local.yields else ""
+def _reached(part: float) -> str:
+    return f"; balance was found with {100.0 * part:.3g} % of what is new in the loads"
 
 
 def _balance(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float, step: int,
+    sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
+    missing: np.ndarray, given: float, step: int, softening: bool, smallest: bool,
 ) -> _Balance:  # fmt: skip
-    """Balance of an increment, see `_newton`, where elements that can yield have flowed; as it was, if there is none.
+    """Balance of an increment, see `_newton`, where elements that can yield have flowed and joints have opened; as it
+    was, if there is none. smallest: more than one joint may pass its peak in it.
 
-    One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, and in
-    quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on."""
-    first = _newton(sim, nodes, unknowns, enough, solver, x, missing, given)
-    if not sim.local.yields or first.error:
-        return first
-    before = [part.copy() for part in sim.local.plastic_state()]
-    found, again = first, sim.wide or "softening" in sim.cold
+    One balance makes the next one necessary, as in steps, where strength follows tables and falls by the flow, in
+    quads, where the two triangles of an overlay share their pressure after the flow and one may then flow on, and where
+    a joint broke: the third of its points may have held."""
+    found = _newton(sim, nodes, unknowns, enough, solver, x, missing, given, softening)
+    if found.error or not (sim.local.yields or softening):
+        return found
+    if softening and not smallest and int(sim.comm.sum_into(np.array([found.past], np.int64))[0]) > 1:
+        found.error = "more than one joint would pass its peak"
+        return found
+    before, again = Memory.of(sim), sim.local.yields and (sim.wide or "softening" in sim.cold)
     for _ in range(PASSES):
-        _flow(sim, found.x, step)
-        if not again:
+        broke = commit(sim, nodes, unknowns, found.x, step, softening)
+        if not (again or broke):
             return found
-        found.ratio = _unbalanced(sim, nodes, unknowns, found.x, missing)[1]
-        if found.ratio <= enough and _still_to_flow(sim) <= STILL:
+        found.ratio = unbalanced(sim, nodes, unknowns, found.x, missing)[1]
+        if found.ratio <= enough and (not again or _still_to_flow(sim) <= STILL):
             return found
-        after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0)
+        after = _newton(sim, nodes, unknowns, enough, solver, found.x, missing, 0.0, softening)
         after.iterations, after.factors = after.iterations + found.iterations, after.factors + found.factors
         found = after
         if found.error:
             break
-    for part, values in zip(sim.local.plastic_state(), before):
-        part[:] = values
+    sim.before_change()
+    before.put_back(sim)
+    sim.close_model()
+    hold_still(sim)
     found.error = found.error or f"the static solve does not converge: elements still flow after {PASSES} balances"
     return found
+
+
+def commit(sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, step: int, softening: bool) -> bool:
+    """Elements flow and joints open at these positions of the nodes (nn, 2), for good. True if some joint broke: then
+    it is a free face. CommandError if a body came loose, or its surfaces touch."""
+    if sim.local.yields:
+        _flow(sim, x, step)
+    if not softening:
+        return False
+    place_corners(sim, x)
+    sim.local.open_joints()
+    broke = sim.comm.any(bool((sim.local.slot_state == BROKEN).any()))
+    if broke:
+        sim._renew_lists()
+        refuse_loose_bodies(sim, nodes, unknowns)
+        refuse_touching(sim, touching(sim), "touch after joints broke")
+    return broke
 
 
 def _still_to_flow(sim: Blocks) -> float:
@@ -490,13 +560,13 @@ def _still_to_flow(sim: Blocks) -> float:
 
 def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
     """Elements outside their yield surface flow at these positions of the nodes (nn, 2), for good."""
-    _place_corners(sim, x)
+    place_corners(sim, x)
     sim.local.flow(sim.local.plastic_state(), step)
 
 
 def _newton(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
-    missing: np.ndarray, given: float,
+    sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
+    missing: np.ndarray, given: float, softening: bool,
 ) -> _Balance:  # fmt: skip
     """Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
     prescribed on."""
@@ -504,15 +574,15 @@ def _newton(
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
     # is elastic, and so is one where those with flow lead nowhere. As the stress that cannot be borne goes to many
     # neighbours such a way may well bring more unbalanced forces.
-    elastic, tries = True, TRIES if yields else 0
+    elastic, tries = True, TRIES if yields or softening else 0
     iterations = factors = past = 0
     rounding = noise = 0.0
-    force, ratio, total = _unbalanced(sim, nodes, unknowns, x, missing)
+    force, ratio, total = unbalanced(sim, nodes, unknowns, x, missing)
     ratios, error = [ratio], ""
     while iterations < MOST and (left > 0.0 or ratio > max(AIM, 0.05 * noise)):
         if renew:
-            _place_corners(sim, x)
-            pieces, past = tangent(sim, flows=not elastic)
+            place_corners(sim, x)
+            pieces, past = tangent(sim, flows=not elastic, softening=softening)
             rounding = _rounding(sim, pieces, x)
             try:
                 solver.factor(pieces)
@@ -540,13 +610,13 @@ def _newton(
         slow = after > 0.5 * ratio and not bold
         done = left == 0.0 and slow and (after <= noise or (renew and after <= enough))
         elastic = not yields
-        renew = left > 0.0 or after > max(0.0 if yields else RENEW * ratio, noise)
+        renew = left > 0.0 or after > max(0.0 if yields or softening else RENEW * ratio, noise)
         ratio = after
         ratios.append(ratio)
         if done:
             break
-    _place_corners(sim, x)
-    _, past = tangent(sim, matrices=False)
+    place_corners(sim, x)
+    _, past = tangent(sim, matrices=False, softening=softening)
     if not error and (left > 0.0 or not ratio <= max(enough, min(noise, WORST))):
         noise = rounding / total if 0.0 < total < math.inf else noise
         why = (
@@ -559,12 +629,12 @@ def _newton(
             f"the static solve does not converge: unbalanced over all forces is {ratio:.3g} after {iterations} "
             f"iterations, {enough:g} is asked for; {why}"
         )
-    return _Balance(x, ratio, iterations, factors, past, error, ratios)
+    return _Balance(x, ratio, iterations, factors, past, error, ratios, total)
 
 
 def _along(
     sim: Blocks,
-    nodes: _Nodes,
+    nodes: Nodes,
     unknowns: Unknowns,
     x: np.ndarray,
     way: np.ndarray,
@@ -579,7 +649,7 @@ def _along(
     part = 1.0
     for _ in range(HALVINGS):
         trial = x + part * way
-        force, after, total = _unbalanced(sim, nodes, unknowns, trial, missing)
+        force, after, total = unbalanced(sim, nodes, unknowns, trial, missing)
         if after < ratio or (bold and after < 1.0):
             return part, trial, force, after, total
         if ratio <= enough and not bold:
@@ -597,18 +667,18 @@ def _rounding(sim: Blocks, pieces: list[Pieces], x: np.ndarray) -> float:
     return exact_sum(np.concatenate(parts), sim.comm) * float(np.finfo(np.float64).eps)
 
 
-def _unbalanced(
-    sim: Blocks, nodes: _Nodes, unknowns: Unknowns, x: np.ndarray, missing: np.ndarray | float = 0.0
+def unbalanced(
+    sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, missing: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, float, float]:
     """Forces (nn, 2) on nodes at these positions, conditions and `missing` left out, the ratio, and the sum of the
     sizes of all forces [N/m]; equal on all ranks. The ratio is infinite where forces are no numbers."""
     with np.errstate(invalid="ignore", over="ignore"):
-        _place_corners(sim, x)
+        place_corners(sim, x)
         seen = sim.local.evaluation(contact=False)
     force, sizes = _node_forces(sim, seen) - missing, diagnostics.contributing(sim, seen)
     if sim.comm.any(not np.isfinite(sizes).all()) or not np.isfinite(force).all():
         return force, math.inf, math.inf
-    total = exact_sum(sizes, sim.comm)
+    total = max(exact_sum(sizes, sim.comm), nodes.least)
     unbalanced = float(np.abs(unknowns.reduced(force)).sum())
     return force, unbalanced / total if total != 0.0 else 0.0, total
 
@@ -630,20 +700,46 @@ def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
     return out
 
 
-def tangent(sim: Blocks, matrices: bool = True, flows: bool = True) -> tuple[list[Pieces], int]:
-    """Stiffness of the owned elements and joints at the present positions, and joints behind their peak. flows: less
-    what the flow of elements takes from it."""
-    local, small = sim.local, not sim.options.large_strain
+def tangent(
+    sim: Blocks, matrices: bool = True, flows: bool = True, softening: bool = False
+) -> tuple[list[Pieces], int]:
+    """Stiffness of the owned elements and joints at the present positions, and how many joints are behind their peak,
+    see `of_joints`. flows: less what the flow of elements takes from it."""
+    joints, past = of_joints(sim, softening)
+    return ([*of_elements(sim, flows), joints] if matrices else []), past
+
+
+def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
+    """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
+    that pass it now."""
+    local, cells = sim.local, sim.the_mesh().cells
     slots = _lower_slots(sim)
     joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
-    cells, number = sim.the_mesh().cells, sim.number
     stiffness.intact_joints(
         slots, local.slot_face, local.slot_at, local.slot_kind, local.slot_state, sim.where, cells, sim.x,
         local.joint_table, joints, left,
     )  # fmt: skip
-    past = int((left < 0.0).sum())
-    if not matrices:
-        return [], past
+    behind = left < 0.0
+    past = int((behind & ~(softening & (local.slot_state[slots] == YIELDED))).sum())
+    if softening:
+        soft = np.empty((int(behind.sum()), 8, 8))
+        stiffness.yielded_joints(
+            slots[behind], local.slot_face, local.slot_at, local.slot_kind, local.slot_history, sim.where, cells, sim.x,
+            local.joint_table, local.joint_beyond, soft,
+        )  # fmt: skip
+        joints[behind] = soft
+    face = local.slot_face[slots]
+    ends = []
+    for f in (face, sim.partner[face]):
+        e, k = f // 4, f % 4
+        after = np.where(k + 1 < np.where(cells[e, 3] >= 0, 4, 3), k + 1, 0)
+        ends += [sim.node[e, k], sim.node[e, after]]
+    return Pieces(face, np.column_stack(ends), joints), past
+
+
+def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
+    """Stiffness of the owned triangles and quads at the present positions. flows: less what flow takes from it."""
+    local, small, number = sim.local, not sim.options.large_strain, sim.number
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
     triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
     (c, s0), quad_s0 = local.linear(), local.quad_s0
@@ -659,14 +755,6 @@ def tangent(sim: Blocks, matrices: bool = True, flows: bool = True) -> tuple[lis
         plastic_stiffness.triangles(rows, sim.x, local.c, local.s0, local.law, table, small, triangles)
         plastic_stiffness.quads(quad_rows, sim.x, local.q, local.quad_s0, local.quad_law, table, small, quads)
     of_triangles, of_quads = number[rows], number[local.quad_rows]
-    face = local.slot_face[slots]
-    ends = []
-    for f in (face, sim.partner[face]):
-        e, k = f // 4, f % 4
-        after = np.where(k + 1 < np.where(cells[e, 3] >= 0, 4, 3), k + 1, 0)
-        ends += [sim.node[e, k], sim.node[e, after]]
     return [
-        Pieces(of_triangles, sim.node[of_triangles, :3], triangles),
-        Pieces(of_quads, sim.node[of_quads], quads),
-        Pieces(face, np.column_stack(ends), joints),
-    ], past
+        Pieces(of_triangles, sim.node[of_triangles, :3], triangles), Pieces(of_quads, sim.node[of_quads], quads)
+    ]  # fmt: skip

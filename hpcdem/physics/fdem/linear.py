@@ -1,4 +1,4 @@
-"""Linear systems of the static solve: who is unknown, the matrix from pieces, and two solvers.
+"""Linear systems of the static solve: who is unknown, the matrix from pieces, and three solvers.
 
 A *piece* is the stiffness of an element or a joint. `Direct` brings all pieces to rank 0, puts them together in the
 order of their numbers and factorises there (SciPy's SuperLU): what comes out has the same bits on any number of ranks.
@@ -16,6 +16,8 @@ from hpcdem.core.errors import CommandError
 
 MANY = 400_000
 """Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
+CONDENSED = 2000
+"""Most unknowns of joints and fluid for dense matrices."""
 SINGULAR = (
     "the stiffness matrix is singular: something can move without resistance (a joint without tensile strength that is "
     "open, or properties that differ by more than 1e15)"
@@ -159,6 +161,109 @@ class Direct:
             q = self.unknowns.reduced(force) - share * self._coupling
             if len(q):
                 q = self._scale * self._factors.solve(self._scale * q)
+            moved = self.unknowns.moved(q, share)
+        return self.comm.bcast(moved)
+
+    def close(self) -> None:
+        """Nothing is held outside of Python."""
+
+
+class Condensed:
+    """Static condensation on rank 0: what the elements bring is eliminated once, down to the nodes of joints and fluid,
+    and only there is the matrix made again (Guyan 1965; exact here). For few such nodes between many elements."""
+
+    name = "direct (SciPy), condensed onto joints"
+    flows = True
+
+    def __init__(self, comm: Any, unknowns: Unknowns, nodes: np.ndarray) -> None:
+        """nodes: those of joints and fluid."""
+        self.comm, self.unknowns = comm, unknowns
+        number = unknowns.number[np.unique(nodes)].reshape(-1)
+        self._kept = number[number >= 0]
+        self._place = np.full(unknowns.count, -1, np.int64)
+        self._place[self._kept] = np.arange(len(self._kept))
+        self._ready = False
+        self._base: Any = None
+        self._factors: Any = None
+
+    @property
+    def ready(self) -> bool:
+        """Elements were eliminated. Equal on all ranks."""
+        return self._ready
+
+    @staticmethod
+    def suits(unknowns: Unknowns, nodes: np.ndarray) -> bool:
+        """Few enough of these nodes for dense matrices, and much fewer than all. Not collective."""
+        kept = int((unknowns.number[np.unique(nodes)] >= 0).sum())
+        return kept <= CONDENSED and 3 * kept <= unknowns.count
+
+    def eliminate(self, elements: list[Pieces]) -> None:
+        """Take the stiffness of this rank's elements. CommandError if it is singular. Collective."""
+        parts = self.comm.gather(elements) if self.comm.size > 1 else [elements]
+        error = None
+        if self.comm.rank == 0:
+            error = self._eliminate([Pieces.joined(list(of)) for of in zip(*parts)])
+        if (error := self.comm.bcast(error)) is not None:
+            raise CommandError(error)
+        self._ready = True
+
+    def _eliminate(self, pieces: list[Pieces]) -> str | None:
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.linalg import splu
+
+        n, kept = self.unknowns.count, self._kept
+        rows, columns, values, _, _ = self.unknowns.entries(pieces)
+        matrix = coo_matrix((values, (rows, columns)), (n, n)).tocsr()
+        self._gone = np.flatnonzero(self._place < 0)
+        inner = matrix[self._gone][:, self._gone].tocsc()
+        if not (np.isfinite(inner.data).all() and (inner.diagonal() > 0.0).all()):
+            return SINGULAR
+        try:
+            self._inner = splu(inner, "MMD_AT_PLUS_A", 0.0, options={"SymmetricMode": True})
+        except RuntimeError:
+            return SINGULAR
+        self._in, self._out = matrix[self._gone][:, kept].tocsc(), matrix[kept][:, self._gone].tocsr()
+        self._base = matrix[kept][:, kept].toarray()
+        for begin in range(0, len(kept), 64):
+            part = slice(begin, begin + 64)
+            self._base[:, part] -= self._out @ self._inner.solve(self._in[:, part].toarray())
+        return None
+
+    def factor(self, pieces: list[Pieces]) -> None:
+        """Take the pieces of this rank's joints and fluid. CommandError if the matrix is singular. Collective."""
+        parts = self.comm.gather(pieces) if self.comm.size > 1 else [pieces]
+        error = None
+        if self.comm.rank == 0:
+            error = self._factor([Pieces.joined(list(of)) for of in zip(*parts)])
+        if (error := self.comm.bcast(error)) is not None:
+            raise CommandError(error)
+
+    def _factor(self, pieces: list[Pieces]) -> str | None:
+        from scipy.linalg import lu_factor
+        from scipy.sparse import coo_matrix
+
+        rows, columns, values, _, _ = self.unknowns.entries(pieces)
+        size = len(self._kept)
+        matrix = self._base + coo_matrix((values, (self._place[rows], self._place[columns])), (size, size)).toarray()
+        diagonal = np.abs(np.diagonal(matrix))
+        if not (np.isfinite(matrix).all() and (diagonal > 0.0).all()):
+            return SINGULAR
+        self._scale = 1.0 / np.sqrt(diagonal)
+        self._factors = lu_factor(matrix * self._scale[:, None] * self._scale, overwrite_a=True, check_finite=False)
+        return None
+
+    def solve(self, force: np.ndarray, share: float) -> np.ndarray:
+        """As `Direct.solve`; nothing may be prescribed. Collective."""
+        from scipy.linalg import lu_solve
+
+        moved = None
+        if self.comm.rank == 0:
+            right = self.unknowns.reduced(force)
+            q = np.empty(len(right))
+            inner = self._inner.solve(right[self._gone])
+            short = self._scale * (right[self._kept] - self._out @ inner)
+            q[self._kept] = self._scale * lu_solve(self._factors, short, check_finite=False)
+            q[self._gone] = inner - self._inner.solve(self._in @ q[self._kept])
             moved = self.unknowns.moved(q, share)
         return self.comm.bcast(moved)
 

@@ -594,6 +594,17 @@ class Local:
             else:
                 self._quads(*args)
 
+    def open_joints(self) -> None:
+        """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""
+        total, every = len(self.sim.number), np.ones(self.count, bool)
+        scratch, of_joints = np.zeros((total, elements.FORCE)), np.zeros((total, elements.FORCE))
+        self.pairs.pushed[:] = 0.0
+        yields, self.yields = self.yields, False
+        try:
+            self._elements(every, np.ones(len(self.head), bool), scratch, of_joints, True)
+        finally:
+            self.yields = yields
+
     def plastic_state(self) -> tuple[np.ndarray, ...]:
         """What flow changes: what elements remember of yielding (n_own, 9 or 36), stresses without strain of triangles
         (count + 3, 4) and of quads (quads, 16) [Pa], yield surfaces (rows, 4), strains that strength follows."""

@@ -18,10 +18,12 @@ SHARED_OUT = ("flow_nodes",)
 
 
 class SurfaceLoad(ABC):
-    """What blocks ask of one; `name` is one of ORDER. of_mesh: it goes with the mesh that it was made for."""
+    """What blocks ask of one; `name` is one of ORDER; of_mesh: it goes with the mesh that it was made for."""
 
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False
+    stays: ClassVar[bool] = False
+    """Its forces stay as they are while the static solve looks for equilibrium."""
 
     @abstractmethod
     def corners(self, blocks: Any) -> np.ndarray:
@@ -76,6 +78,9 @@ class SurfaceLoad(ABC):
     def uses_table(self, name: str) -> bool:
         """Whether something of it follows this table of time. Not collective."""
         return False
+
+    def balanced(self) -> None:  # noqa: B027 - most have nothing to do here
+        """The static solve found equilibrium with the present forces. Collective."""
 
     def stop(self) -> None:  # noqa: B027 - most have nothing to do here
         """All velocities become zero. Not collective."""

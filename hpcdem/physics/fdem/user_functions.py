@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.user_files import MARK, UnknownLaw, Wrong, agreed, compiled, executed
+from hpcdem.physics.user_files import MARK, UnknownLaw, Wrong, agreed, compiled, executed
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

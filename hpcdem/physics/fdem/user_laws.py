@@ -28,7 +28,6 @@ checkpoints. What a checkpoint names is never looked for: the script names the f
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,15 +39,19 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import properties as known
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
-from hpcdem.physics.fdem.user_files import (
+from hpcdem.physics.user_files import (
     MARK,
+    Declared,
+    StateVariable,
     UnknownLaw,
     Wrong,
     agreed,
-    compiled,
-    executed,
+    check_what_returns,
+    checked,
+    law_of,
     made_of,
     numba_message,
+    stiffness_of,
 )
 from hpcdem.runtime import kept
 
@@ -68,22 +71,8 @@ OF_LAW = "law_"
 """How state variables are called as quantities."""
 
 
-@dataclass(frozen=True)
-class StateVariable:
-    """What an element remembers; initial: its value when the element gets the law."""
-
-    name: str
-    unit: str
-    doc: str = ""
-    initial: float = 0.0
-
-
-@dataclass(frozen=True)
-class _Declared:
-    function: Callable[..., Any]
-    properties: tuple[Property, ...]
-    state: tuple[StateVariable, ...]
-    stiffness: float | Callable[..., float] | None
+class _Declared(Declared):
+    """A law of elements."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +96,7 @@ def element_law(
     properties: Sequence[Property] = (),
     state: Sequence[StateVariable] = (),
     stiffness: float | Callable[..., float] | None = None,
-) -> Callable[[Callable[..., Any]], _Declared]:
+) -> Callable[[Callable[..., Any]], Declared]:
     """Declares a function as law of elements: properties of its own, state variables, and what its slope is never above
     [Pa], a number or a function of properties (by their names)."""
     return lambda function: _Declared(
@@ -131,58 +120,14 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
 
 def _made(text: str, path: str, name: str, function: str) -> UserLaw:
     """The law of a text. Wrong."""
-    names = executed(text, path, name)
-    if function not in names:
-        laws = [key for key, value in names.items() if isinstance(value, _Declared)]
-        raise Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
-    declared = names[function]
-    if not isinstance(declared, _Declared):
-        code = getattr(declared, "__code__", None)
-        line = code.co_firstlineno if code is not None and code.co_filename == path else 0
-        raise Wrong(line, f"'{function}' is not declared as a law: @element_law() stands before it, with brackets")
-    return _checked(declared, name, path)
-
-
-def _checked(declared: _Declared, name: str, path: str) -> UserLaw:
-    line = declared.function.__code__.co_firstlineno
-    base, own, states = USER.properties, declared.properties, declared.state
-    for kind, things, wanted in (("property", own, Property), ("state variable", states, StateVariable)):
-        strange = [thing for thing in things if not isinstance(thing, wanted)]
-        if strange:
-            raise Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {strange[0]!r}")
-    every = [*(p.name for p in base), *(p.name for p in own), *(s.name for s in states), *STRAIN, *INITIAL, STEP]
-    for name_ in (*(p.name for p in own), *(s.name for s in states)):
-        if not isinstance(name_, str) or not name_.isidentifier():
-            raise Wrong(line, f"{name_!r} cannot be the name of an argument")
-        if every.count(name_) > 1:
-            raise Wrong(line, f"'{name_}' stands for something already; a law may declare other names only")
-    for state in states:
-        if not math.isfinite(state.initial):
-            raise Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
-    arguments = inspect.signature(declared.function).parameters
-    for argument in arguments.values():
-        if argument.kind is not inspect.Parameter.POSITIONAL_OR_KEYWORD or argument.name not in every:
-            raise Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
-        if argument.default is not inspect.Parameter.empty:
-            raise Wrong(line, f"'{argument}': arguments of a law have no defaults; Property(..., default=) has")
-    lost = [one for one in (*STRAIN, *(s.name for s in states)) if one not in arguments]
-    if lost:
-        raise Wrong(line, f"the law does not take {', '.join(lost)}")
-    takes = set(arguments)
-    if callable(declared.stiffness):
-        of = inspect.signature(declared.stiffness).parameters
-        others = [n for n in of if n not in {p.name for p in (*base, *own)}]
-        if others:
-            raise Wrong(line, f"stiffness takes properties, '{others[0]}' is none")
-        takes |= set(of)
-    idle = [p.name for p in own if p.name not in takes]
-    if idle:
-        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
-    return _compiled(declared, name, path, tuple(arguments), line)
+    declared = law_of(text, path, name, function, _Declared, "element_law")
+    base = [p.name for p in USER.properties]
+    arguments = checked(declared, Property, base, (*STRAIN, *INITIAL, STEP), STRAIN)
+    return _compiled(declared, name, path, tuple(arguments), declared.line)
 
 
 def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...], line: int) -> UserLaw:
-    from numba import njit, types
+    from numba import njit
     from numba.core.errors import NumbaError
 
     kernel = njit(error_model="numpy", nogil=True)(declared.function)
@@ -200,13 +145,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
         for what, made in (("evaluate", evaluate), ("loop", one), ("loop_threaded", several)):
             kept.keep(made, place, what)
     if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
-        found: Any = compiled(kernel, (types.float64,) * len(names), path, line)
-        given = list(getattr(found, "types", [found]))
-        if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
-            raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
-        for what, type_ in zip(wanted, given):
-            if type_ != types.float64:
-                raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
+        check_what_returns(kernel, len(names), wanted, path, line)
     try:
         evaluate(np.zeros((0, len(columns))), np.zeros(3), np.zeros(len(states)), np.zeros((0, len(wanted))))
     except NumbaError as error:
@@ -233,19 +172,8 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     full = {name: np.broadcast_to(np.asarray(value, float), shape).reshape(-1) for name, value in values.items()}
     n = full["bulk"].size
     modulus = full["bulk"] + 4.0 / 3.0 * full["shear"]
-    if callable(declared.stiffness):
-        of = list(inspect.signature(declared.stiffness).parameters)
-        bound = np.empty(n)
-        for i in range(n):
-            try:
-                bound[i] = float(declared.stiffness(**{name: float(full[name][i]) for name in of}))
-            except Exception as error:  # the user's own code
-                raise CommandError(f"{law}: its stiffness fails: {type(error).__name__}: {error}") from None
-    else:
-        bound = modulus if declared.stiffness is None else np.full(n, float(declared.stiffness))
-    wrong = ~(np.isfinite(bound) & (bound > 0.0))
-    if wrong.any():
-        raise CommandError(f"{law}: its stiffness must be a number above 0 (Pa), got {bound[wrong][0]:g}")
+    said = stiffness_of(declared, law, full, "Pa")
+    bound = modulus if said is None else said
     table = np.ascontiguousarray(np.array([full[name] for name in columns]).T)
     begin = np.array([state.initial for state in declared.state])
     width = len(STRESS) + len(begin)

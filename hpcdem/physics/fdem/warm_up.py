@@ -41,7 +41,7 @@ def warm_up(threads: int = 1) -> None:
         diagnostics.account_energy(sim)
         changes.set_velocity(sim, [len(used) - 1], 0.0, -1e-3)
         sim.close_model()
-        equilibrium.tangent(sim)
+        equilibrium.tangent(sim, softening=True)
         connectivity.bodies(sim.partner)
         convergence.advance(sim, 3)
         diagnostics.energies(sim)

@@ -78,11 +78,12 @@ class Flow(SurfaceLoad):
 
     row (4 ne,): of the table of properties, by joint, 0: no channel; since (4 ne,): flow time at which leak-off began
     [s], inf: it has not; condition (np,): row of the conditions. number (n,): flow nodes owned here, ascending;
-    nodes (n, kernels.NODE): what they hold; state (n + copies, kernels.STATE).
+    nodes (n, kernels.NODE): what they hold; state (n + copies, kernels.STATE), held (n + copies,): numbers of its rows.
     """
 
     name: ClassVar[str] = "fluid"
     of_mesh: ClassVar[bool] = True
+    stays: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
@@ -101,11 +102,13 @@ class Flow(SurfaceLoad):
         """Accounts of nodes that are gone [m2]."""
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
-        self.dt = 0.0
+        self.dt = self.implicit_dt = 0.0
+        self.since_peak = 0
         self._network: Network | None = None
         self._reshaped = False
         self._found_for: list[float] = []
         self._copies: Copies | None = None
+        self.held = np.empty(0, np.int64)
         self._told: tuple[float, float] = (0.0, 0.0)
 
     @staticmethod
@@ -360,6 +363,11 @@ class Flow(SurfaceLoad):
         found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
         return found
 
+    @property
+    def owned(self) -> int:
+        """Flow nodes of this rank. Not collective."""
+        return len(self.number)
+
     # ---- tables of this rank -------------------------------------------------------------------------------------
 
     @property
@@ -367,10 +375,10 @@ class Flow(SurfaceLoad):
         return self.blocks.options.hydraulic and len(self.network.channels) > 0
 
     @property
-    def _pushes(self) -> bool:
+    def pushes(self) -> bool:
         return self._on and not self.blocks.options.one_way
 
-    def _wet(self) -> np.ndarray:
+    def wet(self) -> np.ndarray:
         """Faces of owned elements that fluid pushes on, ascending."""
         blocks, cells = self.blocks, self.blocks.the_mesh().cells
         number = np.sort(blocks.number[blocks.owned])
@@ -381,8 +389,8 @@ class Flow(SurfaceLoad):
 
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)
-        if self._pushes:
-            cells, faces = blocks.the_mesh().cells, self._wet()
+        if self.pushes:
+            cells, faces = blocks.the_mesh().cells, self.wet()
             row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
             out[row, k] = out[row, (k + 1) % corner_counts(cells[faces // 4])] = True
         return out
@@ -390,12 +398,12 @@ class Flow(SurfaceLoad):
     def springs(self, blocks: Any) -> np.ndarray | None:
         """A channel that cannot drain is as stiff as its fluid: K / aperture, in each step. By the aperture without
         opening and the length in the mesh: where things are must not count, as a restart finds masses again."""
-        if not self._pushes or blocks.options.flow_every > 1:
+        if not self.pushes or blocks.options.flow_every > 1:
             return None
-        faces, mesh = self._wet(), self.blocks.the_mesh()
+        faces, mesh = self.wet(), self.blocks.the_mesh()
         lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
         there = (self.row[lower] > 0) & blocks.joint_exists()[lower]
-        faces, laws = faces[there], self._laws()[self.row[lower[there]] - 1]
+        faces, laws = faces[there], self.laws()[self.row[lower[there]] - 1]
         way = np.diff(mesh.points[face_points(mesh.cells, faces)], axis=1)[:, 0]
         delta = np.clip(laws[:, kernels.INITIAL], laws[:, kernels.LEAST], laws[:, kernels.MOST])
         each = 0.5 * self.fluid("fluid_bulk") * np.hypot(way[:, 0], way[:, 1]) / delta
@@ -415,7 +423,7 @@ class Flow(SurfaceLoad):
         law = (self.row[np.minimum(faces, other)] - 1).astype(np.int64)
         return sides, law, int(lost[0]) if len(lost) else -1
 
-    def _laws(self) -> np.ndarray:
+    def laws(self) -> np.ndarray:
         """The table of channel laws (rows, kernels.LAW)."""
         of = {name: np.array([row[k] for row in self.rows]) for k, name in enumerate(_PROPERTIES)}
         inside = of["matrix_porosity"] * (1.0 / of["fluid_bulk"] + of["matrix_porosity_compressibility"])
@@ -473,7 +481,7 @@ class Flow(SurfaceLoad):
         beside = (at >= blocks.owned.start) & (at < blocks.owned.stop)
         self._channels = network.channels[np.isin(network.ends, mine).any(axis=1) | beside]
         ends = face_points(cells, self._channels)
-        self._pushed = self._wet() if self._pushes else np.empty(0, np.int64)
+        self._pushed = self.wet() if self.pushes else np.empty(0, np.int64)
         loaded = face_points(cells, self._pushed)
         wanted = np.setdiff1d(np.concatenate([ends.reshape(-1), loaded.reshape(-1)]), mine)
         self._forget_nodes(~network.there[self.number])
@@ -488,6 +496,7 @@ class Flow(SurfaceLoad):
         if self._copies is not None:
             self._copies.close()
         self._copies = Copies(comm, mine, wanted, owner, self.state)
+        self.held = np.concatenate([mine, wanted])
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
         self._ends = local[ends]
@@ -497,7 +506,7 @@ class Flow(SurfaceLoad):
         self._note_leaks()
         self._bind_loads(loaded, local)
         self._sides, self._law, lost = self._sides_of(self._channels)
-        self._law_table = self._laws()
+        self._law_table = self.laws()
         self._table = np.empty((len(ends), kernels.CHANNEL))
         self._find_geometry()
         lost = int(comm.max_into(np.array([lost], np.int64))[0])
@@ -701,7 +710,7 @@ class Flow(SurfaceLoad):
         kernel = kernels.fill if threads == 1 else kernels.fill_threaded
         kernel(
             threads, self._begin, self._channel, self._side, self._q, self._leaks, self._lost_fluid, self.dt,
-            self._condition, self._conditions_at(self.time), self.fluid("fluid_bulk"), self.nodes, self.state,
+            self._condition, self.conditions_at(self.time), self.fluid("fluid_bulk"), self.nodes, self.state,
         )  # fmt: skip
         if self.wells:
             self._pump(before)
@@ -740,7 +749,7 @@ class Flow(SurfaceLoad):
     def _condition(self) -> np.ndarray:
         return self.condition[self.number]
 
-    def _conditions_at(self, time: float) -> np.ndarray:
+    def conditions_at(self, time: float) -> np.ndarray:
         """The table of conditions (rows, 2) at a flow time: heights as potential energies."""
         o, tables = self.blocks.options, self.blocks.tables
         table = np.zeros((len(self.conditions), 2))
@@ -765,10 +774,19 @@ class Flow(SurfaceLoad):
     # ---- forces --------------------------------------------------------------------------------------------------
 
     def add_to(self, applied: np.ndarray) -> None:
-        if self._pushes:
+        if self.pushes:
             kernels.loads(
                 self._push_edge, self._push_corner, self._push_node, self.blocks.x, self.state, applied
             )  # fmt: skip
+
+    def balanced(self) -> None:
+        """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""
+        if not self.pushes:
+            return
+        p, s = self.state[: self.owned, kernels.P], self.state[: self.owned, kernels.S]
+        w = self.nodes[:, kernels.V] * (s + p / self.fluid("fluid_bulk"))
+        self.nodes[:, kernels.GIVEN] += w - self.nodes[:, kernels.W]
+        self.nodes[:, kernels.W] = w
 
     # ---- state on disk -------------------------------------------------------------------------------------------
 
@@ -778,6 +796,7 @@ class Flow(SurfaceLoad):
             "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
             "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
+            "implicit_dt": self.implicit_dt, "since_peak": self.since_peak,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
         }  # fmt: skip
 
@@ -805,7 +824,8 @@ class Flow(SurfaceLoad):
         made.conditions = [Condition(**one) for one in state["conditions"]]
         made.removed, made.time = dict(state["removed"]), state["time"]
         made.cycles, made.waited = state["cycles"], state["waited"]
-        made.sub_steps, made.dt = state["sub_steps"], state["dt"]
+        made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
+        made.since_peak = state.get("since_peak", 0)
         made._reshaped, made._found_for = state["reshaped"], state["found_for"]
         channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
         made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]

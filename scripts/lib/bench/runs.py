@@ -27,7 +27,14 @@ def one(workload: Workload, sav: Path, layout: Layout, repeat: int, steps: int, 
     """One run of ours as a line."""
     warm = warm_for(workload.bed, steps)
     found = launch.ours(
-        "run", layout, file=str(sav), pushed=workload.pushed, strays=workload.strays, warm=warm, steps=steps
+        "run",
+        layout,
+        file=str(sav),
+        pushed=workload.pushed,
+        strays=workload.strays,
+        own=workload.own,
+        warm=warm,
+        steps=steps,
     )
     found.pop("output")
     head = {

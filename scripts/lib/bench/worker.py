@@ -55,6 +55,8 @@ def run(job: dict[str, Any]) -> dict[str, Any]:
         sim.wall(beds.LEFT, xv=MATERIAL.speed)
     if job["strays"]:
         throw(sim)
+    if job["own"]:
+        sim.prop(law=f"{Path(__file__).with_name('linear.py')}:linear")
     window = measured(sim, job["warm"], job["steps"])
     return window | {"contacts_per_particle": contacts(sim) / sim.count, "digest": digest(sim)} | versions()
 

@@ -128,13 +128,15 @@ class Bed:
 
 @dataclass(frozen=True)
 class Workload:
-    """A bed, whether its left wall pushes, and whether there are particles much faster than all others."""
+    """A bed, whether its left wall pushes, whether there are particles much faster than all others, and whether a law
+    of the user takes the place of the built-in one."""
 
     name: str
     bed: Bed
     pushed: bool = False
     about: str = ""
     strays: bool = False
+    own: bool = False
 
 
 def workloads(unit: int = 12500) -> dict[str, Workload]:
@@ -146,6 +148,7 @@ def workloads(unit: int = 12500) -> dict[str, Workload]:
         Workload("bed-100k", Bed(unit, 8), about="eight units side by side, at rest"),
         Workload("push-100k", Bed(unit, 8), True, "the same, pushed by its left wall"),
         Workload("linear-100k", Bed(unit, 8, "linear"), about="linear springs, at rest"),
+        Workload("own-100k", Bed(unit, 8, "linear"), about="the same with the law in a file of the user", own=True),
         Workload("bonded-100k", Bed(unit, 8, "bonded"), about="Hertz, elastic bonds between all that touch, at rest"),
         Workload("bed-1m", Bed(unit, 80), about="eighty units, at rest"),
     )

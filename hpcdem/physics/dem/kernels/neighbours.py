@@ -23,6 +23,7 @@ from hpcdem.core.memory import aligned
 from hpcdem.physics.dem.kernels import fast, histories, wall_slots
 from hpcdem.physics.dem.kernels.contacts import LONGEST2
 from hpcdem.physics.dem.kernels.histories import BOND, EXTRA, PARTNER, SHEAR, Histories
+from hpcdem.physics.dem.kernels.histories import WIDTH as ENTRY
 
 __all__ = ["Blocks", "ContactLists", "Histories", "build", "make_blocks"]
 
@@ -118,7 +119,7 @@ def _drop_siblings(t, clump, cut, lo, poff, ptr, row, partner):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made):
+def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made, memory):
     """Give the slots begin : end what their pairs remember, which stands with both ends."""
     for k in range(U(begin), U(end)):
         i, j = np.int64(row[k]), np.int64(partner[k])
@@ -139,6 +140,8 @@ def _remember(begin, end, ihot, n_left, n_own, where, hptr, hrows, hbits, row, p
         fs[k] = hrows[at, SHEAR] if found >= 0 else 0.0
         bond[k] = hbits[at, BOND] if found >= 0 else 0
         u_made[k] = hrows[at, EXTRA] if found >= 0 else 0.0
+        for m in range(memory.shape[1]):
+            memory[k, m] = hrows[at, ENTRY + m] if found >= 0 else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -170,7 +173,7 @@ def _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill(
     t, begin, room, more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
 ):  # fmt: skip
     """List of block t into slots begin : begin + room; nothing past the room is written.
 
@@ -179,20 +182,24 @@ def _fill(
     """
     n, placed, longest2 = _fill_near(
         t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-        where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+        where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
     )  # fmt: skip
     if len(more) == 0 or n + len(more) > room:
         return n + len(more), placed, longest2
     n = fast.merge(t, begin, n, more, cut, lo, poff, ptr, row, partner, fs, bond, u_made)
     if len(hrows) > 0:  # of a restart, where lists are those of earlier places, fast ones may touch by now
-        _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made)
+        _remember(
+            begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made, memory
+        )
+    else:
+        memory[begin : begin + n] = 0.0
     return n, placed, longest2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill_near(
     t, begin, room, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
 ):  # fmt: skip
     """The pairs that are nearer than contact plus skin, or bonded; as `_fill`."""
     n = _find_pairs(t, begin, room, hot, cell, cut, lo, hi, poff, skin, bond2, ptr, row, partner)
@@ -202,8 +209,9 @@ def _fill_near(
         n = _drop_siblings(t, clump, cut, lo, poff, ptr, row, partner)
     if len(hrows) == 0:
         fs[begin : begin + n], bond[begin : begin + n], u_made[begin : begin + n] = 0.0, 0, 0.0
+        memory[begin : begin + n] = 0.0
         return n, 0, 0.0
-    _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made)
+    _remember(begin, begin + n, ihot, n_left, n_own, where, hptr, hrows, hbits, row, partner, fs, bond, u_made, memory)
     if bond2 < 0.0:
         return n, 0, 0.0
     return _drop_far(t, hot, cut, lo, poff, skin, ptr, row, partner, fs, bond, u_made)
@@ -219,12 +227,12 @@ def _fill_blocks(n_blocks, need, placed, longest2, begin, room, *args):
 def _fill_blocks_threaded(
     n_blocks, need, placed, longest2, begin, room,
     more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+    where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
 ):  # fmt: skip
     for t in prange(n_blocks):
         need[t], placed[t], longest2[t] = _fill(
             t, begin[t], room[t], more, hot, ihot, cell, clump, n_left, n_own, cut, lo, hi, poff, skin, bond2,
-            where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made,
+            where, hptr, hrows, hbits, ptr, row, partner, fs, bond, u_made, memory,
         )  # fmt: skip
 
 
@@ -233,9 +241,10 @@ class ContactLists:
 
     Built by `build`; `histories` hands back what the slots remember. All arrays are plain numpy for the kernels.
 
-    Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m]; row i of block t has the
-    slots ptr[poff[t] + i - lo[t]] up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall,
-    slot_fs [N], slot_side, sorted by row, then wall; block t has wptr[t] : wptr[t+1].
+    Pair slots: row and partner (storage rows, row < partner), fs [N], bond (type), u_made [m] (of a law of the user its
+    normal force [N]) and memory of that law (slots, columns); row i of block t has the slots ptr[poff[t] + i - lo[t]]
+    up to the next; slots of a block follow each other. Wall slots: slot_row, slot_wall, slot_fs [N], slot_side, sorted
+    by row, then wall; block t has wptr[t] : wptr[t+1].
     """
 
     ptr: np.ndarray
@@ -244,6 +253,7 @@ class ContactLists:
     fs: np.ndarray
     bond: np.ndarray
     u_made: np.ndarray
+    memory: np.ndarray
     wptr: np.ndarray
     slot_row: np.ndarray
     slot_wall: np.ndarray
@@ -269,9 +279,9 @@ class ContactLists:
         self.tally = np.zeros((self.n_blocks, WIDTH))
         self.bonds_placed = 0
 
-    def histories(self, ihot: np.ndarray) -> Histories:
-        """What the contacts of the owned particles remember now."""
-        return histories.taken_out(self, ihot)
+    def histories(self, ihot: np.ndarray, stamp: float = 0.0) -> Histories:
+        """What the contacts of the owned particles remember now; stamp: see `histories.taken_out`."""
+        return histories.taken_out(self, ihot, stamp)
 
     def force_rows(self) -> np.ndarray:
         """Rows (n_own,) of `force` in which the owned particles have their sums."""
@@ -377,6 +387,7 @@ def build(
         m = int(room.sum()) + 1  # a candidate is written before it is known to be near
         slots = (
             lists.ptr, np.empty(m, np.int32), np.empty(m, np.int32), np.empty(m), np.empty(m, np.int32), np.empty(m),
+            np.empty((m, hist.memory.shape[1])),
         )  # fmt: skip
         fill(
             n_blocks, need, placed, longest2, begin, room, more, hot, ihot, cell, siblings, n_left, n_own,
@@ -386,7 +397,7 @@ def build(
         if (need <= room).all():
             break
         room = np.maximum(room, need)  # candidates come and go within what the first round found
-    _, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made = slots
+    _, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made, lists.memory = slots
     lists.bonds_placed = int(placed.sum())
     lists.tally[:, LONGEST2] = longest2
     lists.n_pairs = int(need.sum())

@@ -8,10 +8,10 @@ same order whatever the number of blocks and ranks, and no result depends on the
 A block goes through its slots in four passes over a hundred or so pairs at a time, which stay in the first-level
 cache:
 
-1. `_collect`: which slots are contacts (they touch) or bonds; no jumps, since nobody can guess who touches;
-2. `_gather`: rows of the two particles and of their laws into lanes (numerics/lanes.py);
-3. `_contact_lanes` or, where there are bonds, `_bond_lanes`: geometry and laws, in vector instructions;
-4. `_scatter`: forces to the two particles, in the order of the slots; histories back to the slots.
+1. `collect`: which slots are contacts (they touch) or bonds; no jumps, since nobody can guess who touches;
+2. `gather`: rows of the two particles and of their laws into lanes (numerics/lanes.py);
+3. `contact_lanes` or, where there are bonds, `_bond_lanes`: geometry and laws, in vector instructions;
+4. `scatter`: forces to the two particles, in the order of the slots; histories back to the slots.
 """
 
 from __future__ import annotations
@@ -55,11 +55,12 @@ _X, _Y, _SPIN, _RADIUS, _MATERIAL = (U(c) for c in (fields.X, fields.Y, fields.S
 _ONE, _TWO, _THREE, _FOUR = U(1), U(2), U(3), U(4)
 _ROW = fields.WIDTH
 _LAW = 4
-_FORCE = 4
+FORCE = 4
+"""Width of a row of forces."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _collect(a, b, hot, row, partner, bond, ibits, slots, n, tied, far):
+def collect(a, b, hot, row, partner, bond, ibits, slots, n, tied, far):
     """Append the slots among a : b that touch or are bonded to slots[:n]; the others forget their shear force.
 
     hot: flat rows; ibits: shear forces as int64 bits. Returns (n, whether there is a bond among the collected, largest
@@ -82,7 +83,7 @@ def _collect(a, b, hot, row, partner, bond, ibits, slots, n, tied, far):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gather(n, tied, slots, hot, ihot, row, partner, ibits, bond, u_made, pairs, bonds, springs, n_mat, lanes):
+def gather(n, tied, slots, hot, ihot, row, partner, ibits, bond, u_made, pairs, bonds, springs, n_mat, lanes):
     """The rows of the first n pairs into lanes, in groups of four."""
     bits = lanes.view(np.int64)
     for e in range(U(0), U(n), _FOUR):
@@ -111,7 +112,7 @@ def _gather(n, tied, slots, hot, ihot, row, partner, ibits, bond, u_made, pairs,
 
 
 @njit(cache=True, error_model="numpy")
-def _geometry(lanes, e):
+def geometry(lanes, e):
     """laws.pair_geometry of pair e, arms of i and j, sliding speed."""
     ri, rj = lanes[RADIUS_I + e], lanes[RADIUS_J + e]
     d2, nx, ny, u, two_rt = laws.pair_geometry(lanes[DX + e], lanes[DY + e], ri, rj)
@@ -123,7 +124,7 @@ def _geometry(lanes, e):
 
 
 @njit(cache=True, error_model="numpy")
-def _put(lanes, e, fn, fs, nx, ny, arm_i, arm_j):
+def put(lanes, e, fn, fs, nx, ny, arm_i, arm_j):
     """Forces and torques of pair e from its normal and shear force."""
     lanes[FS + e] = fs
     lanes[FX + e] = fs * -ny - fn * nx
@@ -133,13 +134,13 @@ def _put(lanes, e, fn, fs, nx, ny, arm_i, arm_j):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _contact_lanes(n, lanes, dt):
+def contact_lanes(n, lanes, dt):
     """Contact law of n touching pairs."""
     for e in range(U(n)):
-        _, nx, ny, u, two_rt, arm_i, arm_j, sliding = _geometry(lanes, e)
+        _, nx, ny, u, two_rt, arm_i, arm_j, sliding = geometry(lanes, e)
         fn, ks = laws.contact(lanes[MODEL + e], lanes[A + e], lanes[B + e], two_rt, u)
         fs = laws.coulomb(lanes[FS + e] + ks * sliding * dt, lanes[MU + e] * fn)
-        _put(lanes, e, fn, fs, nx, ny, arm_i, arm_j)
+        put(lanes, e, fn, fs, nx, ny, arm_i, arm_j)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -152,7 +153,7 @@ def _bond_lanes(n, lanes, dt, spheres, springs, longest):
     bits = lanes.view(np.int64)
     some = np.int64(0)
     for e in range(U(n)):
-        d2, nx, ny, u, two_rt, arm_i, arm_j, sliding = _geometry(lanes, e)
+        d2, nx, ny, u, two_rt, arm_i, arm_j, sliding = geometry(lanes, e)
         model, a, b, mu = lanes[MODEL + e], lanes[A + e], lanes[B + e], lanes[MU + e]
         bonded, elastic = lanes[TENSILE + e] >= 0.0, lanes[E + e] >= 0.0
         area = laws.bond_area(two_rt, spheres)
@@ -168,7 +169,7 @@ def _bond_lanes(n, lanes, dt, spheres, springs, longest):
         free = (failure != laws.HOLDS) | (not bonded)
         fn = 0.0 if free and fn < 0.0 else fn
         slips = laws.coulomb(fs, mu * fn)
-        _put(lanes, e, fn, slips if free else fs + 0.0, nx, ny, arm_i, arm_j)
+        put(lanes, e, fn, slips if free else fs + 0.0, nx, ny, arm_i, arm_j)
         bits[FAILURE + e] = failure
         some |= failure
         longest = max(longest, as_bits(d2) if bonded else 0)
@@ -195,22 +196,22 @@ def _break_bonds(n, lanes, slots, row, bond, begin):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _scatter(n, slots, row, partner, ibits, lanes, force, shift):
+def scatter(n, slots, row, partner, ibits, lanes, force, shift):
     """Add the lanes of forces to the rows of a flat force table, pair after pair; put the histories back."""
     bits = lanes.view(np.int64)
     whole = n // GROUP * GROUP
     for e in range(U(0), U(whole), _FOUR):
         k0, k1, k2, k3 = U(slots[e]), U(slots[e + _ONE]), U(slots[e + _TWO]), U(slots[e + _THREE])
-        i0, i1 = offset(row[k0] + shift, _FORCE), offset(row[k1] + shift, _FORCE)
-        i2, i3 = offset(row[k2] + shift, _FORCE), offset(row[k3] + shift, _FORCE)
-        j0, j1 = offset(partner[k0] + shift, _FORCE), offset(partner[k1] + shift, _FORCE)
-        j2, j3 = offset(partner[k2] + shift, _FORCE), offset(partner[k3] + shift, _FORCE)
+        i0, i1 = offset(row[k0] + shift, FORCE), offset(row[k1] + shift, FORCE)
+        i2, i3 = offset(row[k2] + shift, FORCE), offset(row[k3] + shift, FORCE)
+        j0, j1 = offset(partner[k0] + shift, FORCE), offset(partner[k1] + shift, FORCE)
+        j2, j3 = offset(partner[k2] + shift, FORCE), offset(partner[k3] + shift, FORCE)
         add_in_turn(force, (i0, i1, i2, i3), (j0, j1, j2, j3), lanes, FX + e)
         ibits[k0], ibits[k1] = bits[FS + e], bits[FS + e + _ONE]
         ibits[k2], ibits[k3] = bits[FS + e + _TWO], bits[FS + e + _THREE]
     for e in range(U(whole), U(n)):
         k = slots[e]
-        i, j = offset(row[k] + shift, _FORCE), offset(partner[k] + shift, _FORCE)
+        i, j = offset(row[k] + shift, FORCE), offset(partner[k] + shift, FORCE)
         force[i] += lanes[FX + e]
         force[i + _ONE] += lanes[FY + e]
         force[i + _TWO] += lanes[TORQUE_I + e]
@@ -241,14 +242,14 @@ def _block(
     n, tied, far = 0, np.int64(0), first - 1
     while at < stop or n > 0:
         upto = min(at + SLOTS, stop)
-        n, tied, far = _collect(at, upto, table, row, partner, bond, ibits, slots, n, tied, far)
+        n, tied, far = collect(at, upto, table, row, partner, bond, ibits, slots, n, tied, far)
         at = upto
         if n < ENOUGH and at < stop:
             continue
         ready = n // WHOLE * WHOLE if at < stop else n
         for e in range(n, n + GROUP):
             slots[e] = slots[max(n - 1, 0)]  # the last group is filled up with a pair that is there
-        _gather(
+        gather(
             ready,
             tied,
             slots,
@@ -266,23 +267,23 @@ def _block(
             lanes,
         )
         if tied == 0:
-            _contact_lanes(ready, lanes, dt)
+            contact_lanes(ready, lanes, dt)
         else:
             longest, some = _bond_lanes(ready, lanes, dt, spheres, springs, longest)
             if some != 0:
                 broken = _break_bonds(ready, lanes, slots, row, bond, begin)
                 in_tension += broken[0]
                 in_shear += broken[1]
-        for r in range((cleared + shift) * _FORCE, (far + 1 + shift) * _FORCE):
+        for r in range((cleared + shift) * FORCE, (far + 1 + shift) * FORCE):
             flat[r] = 0.0
         cleared = max(cleared, far + 1)
-        _scatter(ready, slots, row, partner, ibits, lanes, flat, shift)
+        scatter(ready, slots, row, partner, ibits, lanes, flat, shift)
         for e in range(ready, n):
             slots[e - ready] = slots[e]
         n -= ready
         if n == 0:
             tied = np.int64(0)
-    for r in range((cleared + shift) * _FORCE, (hi[t] + shift) * _FORCE):
+    for r in range((cleared + shift) * FORCE, (hi[t] + shift) * FORCE):
         flat[r] = 0.0
     bits = tally.view(np.int64)
     bits[t, LONGEST2] = longest

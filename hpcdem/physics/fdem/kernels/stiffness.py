@@ -1,4 +1,4 @@
-"""Tangent stiffness of elements and of joints before their peak: what the forces of elements.py and joints.py change by
+"""Tangent stiffness of elements and of joints: what the forces of elements.py and joints.py change by
 when corners move, per element and per joint.
 
 An element, with B the operator that makes strains of the movements of its corners (t = e11 + e22, d = e11 - e22,
@@ -12,7 +12,9 @@ turns with the element) is left out: then K is the exact derivative of the force
 gradients and areas are the present ones, and K the derivative up to terms of the order of the strain.
 
 A joint: K = sum over its three points of W [o; s]^T C [o; s], C: derivative of (sigma, tau) by opening and slip over
-the length. Friction makes tau depend on the opening, so C is not symmetric; that the mid-line turns is left out.
+the length. Friction makes tau depend on the opening, so C is not symmetric; that the mid-line turns is left out. Behind
+the peak C is the derivative of `laws.yielded_point` from what the point remembers of the last balance: along the curve,
+which falls, where damage grows, else along the line through the origin.
 """
 
 from __future__ import annotations
@@ -182,4 +184,102 @@ def intact_joints(slots, face, at, kind, state, where, cells, x, table, out, lef
                 for n in range(8):
                     out[i, m, n] += weight * (
                         row[0, m] * normal * row[0, n] + row[1, m] * (rub * row[0, n] + shear * row[1, n])
+                    )
+
+
+@njit(cache=True, error_model="numpy")
+def softening_slope(d):
+    """Derivative of laws.softening by the damage d, 0 beyond its ends."""
+    if d <= 0.0 or d >= 1.0:
+        return 0.0
+    k, power, rest = (laws.A + laws.B - 1.0) / (laws.A + laws.B), laws.RISE / laws.FALL, 1.0 - d
+    e = math.exp(d * power)
+    fifth = rest**5
+    return -k * power * e * (laws.A * rest + laws.B * fifth * rest) - (1.0 - k * e) * (laws.A + 6.0 * laws.B * fifth)
+
+
+@njit(cache=True, error_model="numpy")
+def yielded_slopes(
+    o, s, h, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t, per_kop, per_half_shear, o_u, s_u, damage
+):
+    """Derivatives [Pa/m] of sigma and tau of laws.yielded_point by o and s: sigma by o, by s, tau by o, by s."""
+    per_h, size, sign = 1.0 / h, abs(s), 1.0 if s >= 0.0 else -1.0
+    now_o, now_s, now_d, _, _ = laws.damaged_point(
+        o, s, h, per_h, kop, tensile, overlay, tan_phi, cohesion, per_o_t, per_s_t, per_kop, per_half_shear, o_u, s_u,
+        damage,
+    )  # fmt: skip
+    s_p = laws.slip_at_peak(o, h, per_h, overlay, tan_phi, cohesion, per_half_shear)
+    rise = -overlay * tan_phi * per_half_shear if o < 0.0 else 0.0  # of s_p by o
+    d_o = d_s = 0.0
+    if now_d > damage and now_d < 1.0:
+        first = max(o - h * per_kop, 0.0) * per_o_t if tensile > 0.0 else 0.0
+        second = max(size - s_p, 0.0) * per_s_t
+        d_o = (first * per_o_t - second * per_s_t * rise) / now_d
+        d_s = second * per_s_t * sign / now_d
+    f, fall = laws.softening(now_d), softening_slope(now_d)
+    r = o * per_h * kop
+    sigma, _ = laws.softened_point(
+        o, s, h, per_h, kop, tensile, overlay, tan_phi, cohesion, per_half_shear, now_o, now_s, f
+    )
+    if o < 0.0:
+        sigma_o, sigma_s = overlay * per_h, 0.0
+    else:
+        if now_o > 0.0:
+            share, slope = (o / now_o, 1.0 / now_o) if o < now_o else (1.0, 0.0)
+        else:
+            share, slope = r * (2.0 - r), 2.0 * (1.0 - r) * kop * per_h
+        sigma_o, sigma_s = tensile * (fall * d_o * share + f * slope), tensile * fall * d_s * share
+    limit = f * cohesion - sigma * tan_phi
+    limit_o, limit_s = cohesion * fall * d_o - tan_phi * sigma_o, cohesion * fall * d_s - tan_phi * sigma_s
+    if limit <= 0.0:
+        limit = limit_o = limit_s = 0.0
+    share_o = 0.0
+    if now_s > 0.0:
+        share, share_s = (size / now_s, 1.0 / now_s) if size < now_s else (1.0, 0.0)
+    else:
+        q, per = size / max(s_p, laws.TINY), 1.0 / max(s_p, laws.TINY)
+        share, share_s, share_o = q * (2.0 - q), 2.0 * (1.0 - q) * per, -2.0 * (1.0 - q) * q * per * rise
+    return (
+        sigma_o, sigma_s, sign * (limit_o * share + limit * share_o), sign * limit_s * share + limit * share_s,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def yielded_joints(slots, face, at, kind, history, where, cells, x, table, beyond, out):
+    """`intact_joints` for joints that are, or come, behind their peak: K (n, 8, 8), from their histories (slots, 14),
+    zero for those that have not passed it."""
+    flat = x.reshape(x.size)
+    row = np.empty((2, 8))
+    for i in range(len(slots)):
+        slot = slots[i]
+        f, p = face[slot], at[slot]
+        r, k = where[f // 4], f % 4
+        k2 = (k + 1) % (4 if cells[f // 4, 3] >= 0 else 3)
+        tx, ty, h2, oa, sa, ob, sb = joints.openings(
+            x[r, 2 * k], x[r, 2 * k + 1], x[r, 2 * k2], x[r, 2 * k2 + 1], flat[p], flat[p + 1], flat[p + 2], flat[p + 3]
+        )
+        h = math.sqrt(h2)
+        inverse = 1.0 / h
+        oa, sa, ob, sb = oa * inverse, sa * inverse, ob * inverse, sb * inverse
+        tx, ty = tx * inverse, ty * inverse
+        law, more, past = table[kind[slot]], beyond[kind[slot]], history[slot]
+        out[i] = 0.0
+        for point in range(3):
+            near = joints.NEAR if point == 0 else (0.5 if point == 1 else joints.FAR)
+            far = 1.0 - near
+            weight = h * (8.0 / 18.0 if point == 1 else 5.0 / 18.0)
+            sigma_o, sigma_s, tau_o, tau_s = yielded_slopes(
+                near * oa + far * ob, near * sa + far * sb, h, law[joints.KOP], law[joints.TENSILE],
+                law[joints.OVERLAY], law[joints.TAN_PHI], law[joints.COHESION], more[joints.PER_O_T],
+                more[joints.PER_S_T], more[joints.PER_KOP], more[joints.PER_HALF_SHEAR], past[joints.OPENED + point],
+                past[joints.SLIPPED + point], past[joints.DAMAGE + point],
+            )  # fmt: skip
+            for end, share in enumerate((-near, -far, far, near)):
+                row[0, 2 * end], row[0, 2 * end + 1] = share * ty, -share * tx
+                row[1, 2 * end], row[1, 2 * end + 1] = share * tx, share * ty
+            for m in range(8):
+                for n in range(8):
+                    out[i, m, n] += weight * (
+                        row[0, m] * (sigma_o * row[0, n] + sigma_s * row[1, n])
+                        + row[1, m] * (tau_o * row[0, n] + tau_s * row[1, n])
                     )

@@ -14,74 +14,20 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.numerics.lane_arguments import arguments, storing
 from hpcdem.numerics.lanes import CAPACITY, U, four_columns, lane, put_four_columns, two_columns
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.elements import BLOCK
 
-STRAIN = ("e11", "e22", "e12")
-"""Arguments of a law: strain in the frame that turns with the element."""
+GIVEN = ("e11", "e22", "e12", "dt")
+"""Arguments of a law: strain in the frame that turns with the element, time step [s], 0 in static runs."""
 INITIAL = ("i11", "i22", "i12", "i33")
 """Stress at zero strain there [Pa]."""
-STEP = "dt"
-"""Time step [s], 0 in static runs."""
 
 X1, Y1, X2, Y2, X3, Y3, CA, CB, CC, CD, I11, I22, I12, I33, S11, S22, S12, S33 = (lane(k) for k in range(18))
 _STATES = 18
 """First lane of the states, then those of the properties."""
 _1, _2, _3, _FOUR, _EIGHT, _TWELVE = U(1), U(2), U(3), U(4), U(8), U(12)
-
-
-def _arguments(names: Sequence[str], places: dict[str, Any]) -> Any:
-    """A kernel that returns the arguments of a law at place e of the lanes, in their order."""
-    if not names:
-
-        @njit(error_model="numpy")
-        def nothing(lanes, e, strain, dt):
-            return ()
-
-        return nothing
-    before, name = _arguments(names[:-1], places), names[-1]
-    if name in STRAIN:
-        k = STRAIN.index(name)
-
-        @njit(error_model="numpy")
-        def with_strain(lanes, e, strain, dt):
-            return (*before(lanes, e, strain, dt), strain[k])
-
-        return with_strain
-    if name == STEP:
-
-        @njit(error_model="numpy")
-        def with_step(lanes, e, strain, dt):
-            return (*before(lanes, e, strain, dt), dt)
-
-        return with_step
-    at = places[name]
-
-    @njit(error_model="numpy")
-    def with_lane(lanes, e, strain, dt):
-        return (*before(lanes, e, strain, dt), lanes[at + e])
-
-    return with_lane
-
-
-def _storing(count: int) -> Any:
-    """A kernel that puts the states that a law returns into their lanes."""
-    if not count:
-
-        @njit(error_model="numpy")
-        def nothing(lanes, e, found):
-            return
-
-        return nothing
-    before, k, at = _storing(count - 1), 3 + count, lane(_STATES + count - 1)
-
-    @njit(error_model="numpy")
-    def store(lanes, e, found):
-        before(lanes, e, found)
-        lanes[at + e] = found[k]
-
-    return store
 
 
 def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequence[str]) -> tuple[Any, Any]:
@@ -100,7 +46,7 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
     places = dict(zip(INITIAL, (I11, I22, I12, I33)))
     places |= {name: lane(first_column + k) for k, name in enumerate(columns)}
     places |= {name: lane(_STATES + k) for k, name in enumerate(states)}
-    arguments, store = _arguments(names, places), _storing(n_states)
+    given, store = arguments(names, GIVEN, places), storing(n_states, 4, _STATES)
 
     @njit(nogil=True, error_model="numpy")
     def gather(n, which, rows, wide, x, c, base, row, table, lanes):
@@ -127,7 +73,8 @@ def loops(law: Any, names: Sequence[str], states: Sequence[str], columns: Sequen
             f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
             cs, sn = laws.rotation(f11, f12, f21, f22)
             cs, sn = (1.0 if small else cs), (0.0 if small else sn)
-            found = law(*arguments(lanes, e, laws.stretch(f11, f12, f21, f22, cs, sn), dt))
+            e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+            found = law(*given(lanes, e, (e11, e22, e12, dt)))
             lanes[S11 + e], lanes[S22 + e] = lanes[I11 + e] + found[0], lanes[I22 + e] + found[1]
             lanes[S12 + e], lanes[S33 + e] = lanes[I12 + e] + found[2], lanes[I33 + e] + found[3]
             store(lanes, e, found)
@@ -177,7 +124,7 @@ def at_strain(law: Any, names: Sequence[str], states: Sequence[str], columns: Se
     places = {name: lane(len(states) + k) for k, name in enumerate(columns)}
     places |= {name: lane(k) for k, name in enumerate(states)}
     places |= dict.fromkeys(INITIAL, lane(len(states) + len(columns)))
-    arguments = _arguments(names, places)
+    given = arguments(names, GIVEN, places)
     n_states, n_columns = len(states), len(columns)
     size = (n_states + n_columns + 1) * CAPACITY
 
@@ -189,7 +136,7 @@ def at_strain(law: Any, names: Sequence[str], states: Sequence[str], columns: Se
                 lanes[k * CAPACITY] = initial[k]
             for k in range(n_columns):
                 lanes[(n_states + k) * CAPACITY] = table[i, k]
-            found = law(*arguments(lanes, U(0), (strain[0], strain[1], strain[2]), 0.0))
+            found = law(*given(lanes, U(0), (strain[0], strain[1], strain[2], 0.0)))
             for k in range(4 + n_states):
                 out[i, k] = found[k]
 

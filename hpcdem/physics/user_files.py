@@ -1,4 +1,5 @@
-"""Python files of users: laws of elements, conditions. Rank 0 reads them, and all ranks execute that text.
+"""Python files of users: laws of elements and of pairs of discs, conditions. Rank 0 reads them, and all ranks execute
+that text.
 
 Only the file is known by its text: what it defines has the name FILE:FUNCTION and a digest of the text, which stands in
 checkpoints. What a checkpoint names is never looked for: the script names the file.
@@ -8,13 +9,15 @@ from __future__ import annotations
 
 import builtins
 import hashlib
+import inspect
 import math
 import re
 import socket
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -33,6 +36,33 @@ TOLD = 0.1
 MARK = "#"
 """Between the name of a law and the digest of its text."""
 Made = TypeVar("Made")
+LawKind = TypeVar("LawKind", bound="Declared")
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """What an element or a contact remembers; initial: its value when the element gets the law, or discs touch."""
+
+    name: str
+    unit: str
+    doc: str = ""
+    initial: float = 0.0
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A function that is declared as a law, with properties and state variables of its own; stiffness: what it is never
+    stiffer than, a number or a function of properties."""
+
+    function: Callable[..., Any]
+    properties: tuple[Any, ...]
+    state: tuple[StateVariable, ...]
+    stiffness: float | Callable[..., float] | None
+
+    @property
+    def line(self) -> int:
+        """Where its function begins in its file."""
+        return self.function.__code__.co_firstlineno
 
 
 class Wrong(Exception):
@@ -140,6 +170,98 @@ def executed(text: str, path: str, name: str) -> dict[str, Any]:
         raise Wrong(_last_line(error, path), f"{type(error).__name__}: {error}") from None
     sys.modules[module.__name__] = module  # where numba looks for the modules of kernels that were kept
     return vars(module)
+
+
+def law_of(text: str, path: str, name: str, function: str, kind: type[LawKind], decorator: str) -> LawKind:
+    """The law of this kind of a text, declared by a decorator of this name. Wrong."""
+    names = executed(text, path, name)
+    if function not in names:
+        laws = [key for key, value in names.items() if isinstance(value, kind)]
+        raise Wrong(0, f"there is no law '{function}' in it; there is {', '.join(laws) or 'none'}")
+    declared = names[function]
+    if isinstance(declared, kind):
+        return declared
+    code = getattr(getattr(declared, "function", declared), "__code__", None)
+    line = code.co_firstlineno if code is not None and code.co_filename == path else 0
+    raise Wrong(line, f"'{function}' is not declared as a law: @{decorator}() stands before it, with brackets")
+
+
+def checked(
+    declared: Declared, of: type, base: Sequence[str], given: Sequence[str], needed: Sequence[str]
+) -> list[str]:
+    """The names of the arguments of a law, in their order. Wrong.
+
+    of: class of properties; base: properties that there are anyway; given: other arguments, of which it must take those
+    of `needed`."""
+    line, own, states = declared.line, declared.properties, declared.state
+    for kind, things, wanted in (("property", own, of), ("state variable", states, StateVariable)):
+        strange = [thing for thing in things if not isinstance(thing, wanted)]
+        if strange:
+            raise Wrong(line, f"a {kind} is declared by {wanted.__name__}(...), got {strange[0]!r}")
+    every = [*base, *(p.name for p in own), *(s.name for s in states), *given]
+    for name in (*(p.name for p in own), *(s.name for s in states)):
+        if not isinstance(name, str) or not name.isidentifier():
+            raise Wrong(line, f"{name!r} cannot be the name of an argument")
+        if every.count(name) > 1:
+            raise Wrong(line, f"'{name}' stands for something already; a law may declare other names only")
+    for state in states:
+        if not math.isfinite(state.initial):
+            raise Wrong(line, f"state variable '{state.name}' begins with {state.initial}")
+    arguments = inspect.signature(declared.function).parameters
+    for argument in arguments.values():
+        if argument.kind is not inspect.Parameter.POSITIONAL_OR_KEYWORD or argument.name not in every:
+            raise Wrong(line, f"'{argument}' is no argument of a law; there is {', '.join(every)}")
+        if argument.default is not inspect.Parameter.empty:
+            raise Wrong(line, f"'{argument}': arguments of a law have no defaults; {of.__name__}(..., default=) has")
+    lost = [one for one in (*needed, *(s.name for s in states)) if one not in arguments]
+    if lost:
+        raise Wrong(line, f"the law does not take {', '.join(lost)}")
+    takes = set(arguments)
+    if callable(declared.stiffness):
+        takes_too = inspect.signature(declared.stiffness).parameters
+        others = [n for n in takes_too if n not in {*base, *(p.name for p in own)}]
+        if others:
+            raise Wrong(line, f"stiffness takes properties, '{others[0]}' is none")
+        takes |= set(takes_too)
+    idle = [p.name for p in own if p.name not in takes]
+    if idle:
+        raise Wrong(line, f"property '{idle[0]}' is declared, but neither the law nor its stiffness takes it")
+    return list(arguments)
+
+
+def check_what_returns(kernel: Any, count: int, wanted: Sequence[str], path: str, line: int) -> None:
+    """Wrong unless a kernel of `count` floats returns as many as wanted."""
+    from numba import types
+
+    found: Any = compiled(kernel, (types.float64,) * count, path, line)
+    given = list(getattr(found, "types", [found]))
+    if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
+        raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
+    for what, type_ in zip(wanted, given):
+        if type_ != types.float64:
+            raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
+
+
+def stiffness_of(declared: Declared, law: str, values: Mapping[str, np.ndarray], unit: str) -> np.ndarray | None:
+    """What a law is never stiffer than (n,), of properties (n,) by name; None if it does not say. law: its place and
+    name. CommandError."""
+    if declared.stiffness is None:
+        return None
+    if callable(declared.stiffness):
+        of = list(inspect.signature(declared.stiffness).parameters)
+        n = len(next(iter(values.values())))
+        bound = np.empty(n)
+        for i in range(n):
+            try:
+                bound[i] = float(declared.stiffness(**{name: float(values[name][i]) for name in of}))
+            except Exception as error:  # the user's own code
+                raise CommandError(f"{law}: its stiffness fails: {type(error).__name__}: {error}") from None
+    else:
+        bound = np.full(len(next(iter(values.values()))), float(declared.stiffness))
+    wrong = ~(np.isfinite(bound) & (bound > 0.0))
+    if wrong.any():
+        raise CommandError(f"{law}: its stiffness must be a number above 0 ({unit}), got {bound[wrong][0]:g}")
+    return bound
 
 
 def compiled(kernel: Any, types: Any, path: str, line: int) -> Any:

@@ -1,0 +1,371 @@
+"""Flow by implicit steps, with blocks in static equilibrium at the end of each: fluid and rock by one Newton method.
+
+Joints may pass their peak and break on the way; time steps are cut where none of them finds balance, or where more than
+one joint would pass its peak. No step without balance is ever kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import equilibrium, user_laws
+from hpcdem.physics.fdem.connectivity import corner_counts
+from hpcdem.physics.fdem.linear import MANY, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.implicit import Balance, Fluid, Step, reference_pressure
+from hpcdem.physics.flow.model import Flow
+
+AIM, ENOUGH = 1e-10, 1e-7
+"""What is lacking of forces and fluid over what contributes: aimed at, and enough where rounding allows no more."""
+MOST, HALVINGS = 25, 6
+"""Iterations of a step, and halvings of the way of one."""
+CUTS = 1e-9
+"""Least part of the longest time step."""
+EASY, HARD = 6, 12
+"""Iterations of a step after which the next one may be longer, must be shorter."""
+GROWTH, MOST_GROWTH = 1.4, 4.0
+"""Of the time step from one to the next where that is due, and the largest power of it."""
+FEW, PLENTY = 6, 10
+"""Time steps between the peak of a joint and that of the next: fewer make time steps shorter, more make them longer."""
+TOGETHER = 1e-3
+"""Part of the longest time step below which several joints may pass their peak in one, as where there is symmetry."""
+MOST_STEADY = 100
+"""Time steps towards steady flow."""
+STEADY = 1e-9
+"""Storage over what flows, below which a flow is steady."""
+
+
+@dataclass
+class _Found:
+    """What Newton's method came to: positions (nn, 2), variables (nf,), the balance of the fluid, what is lacking,
+    iterations, joints that pass their peak; error: why this is no balance, "" if it is; storing: fluid that is stored
+    over what flows."""
+
+    x: np.ndarray
+    u: np.ndarray
+    fluid: Balance
+    lack: float
+    iterations: int
+    past: int
+    error: str
+    storing: float = 0.0
+
+
+@dataclass
+class Count:
+    """Of a run: time steps, those that were cut, iterations, factors."""
+
+    steps: int = 0
+    cut: int = 0
+    iterations: int = 0
+    factors: int = 0
+    unknowns: int = 0
+    solver: str = ""
+
+
+class Coupled:
+    """Blocks and their fluid, or fluid alone, while time passes by implicit steps. A context: the model is settled when
+    it is left. Methods are collective; CommandError with the model as it was after the last step that found balance.
+
+    longest: time step [s]. The next one that is tried is `Flow.implicit_dt`.
+    """
+
+    def __init__(self, sim: Blocks, longest: float, solver: str = "auto") -> None:
+        flow = Flow.there(sim)
+        if flow is None or not len(flow.network.channels):
+            raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+        if not longest > 0.0 or solver not in equilibrium.SOLVERS:
+            raise CommandError(
+                f"the time step must be positive, solver one of {', '.join(equilibrium.SOLVERS)}, got {longest:g}, "
+                f"{solver}"
+            )
+        self.sim, self.flow, self.longest, self.wanted = sim, flow, longest, solver
+        self.moves = bool(sim.options.mechanical)
+        self.count = Count()
+        self._refuse()
+
+    def _refuse(self) -> None:
+        """CommandError for what implicit steps cannot do."""
+        sim = self.sim
+        for load in sim.surface_loads:
+            if load.name != "fluid" and self.moves:
+                raise CommandError(
+                    f"implicit steps of flow know no {load.name}: model step and model solve step blocks with them"
+                )
+        if not sim.options.hydraulic:
+            raise CommandError("the hydraulic part is switched off: model option hydraulic on comes first")
+        if self.flow.wells:
+            raise CommandError(
+                "implicit steps of flow know no wells: prescribe rates and pressures of nodes, or step the flow"
+            )
+        if not self.moves:
+            return
+        if sim.options.dynamic:
+            raise CommandError(
+                "implicit steps keep blocks in static equilibrium: model option dynamic off comes first, or mechanical "
+                "off for flow alone"
+            )
+        if laws := user_laws.in_use(sim):
+            raise CommandError(
+                f"{user_laws.some(sim)} has the law {laws[0].title}: implicit steps have no tangent of it"
+            )
+        if sim.yielding().any():
+            raise CommandError("implicit steps of flow take elastic elements: elements that yield are stepped")
+
+    def __enter__(self) -> Coupled:
+        sim, flow = self.sim, self.flow
+        sim.close_model()
+        if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
+            sim._renew_lists()
+        self.nodes = equilibrium.all_nodes(sim)
+        self.x = self.nodes.x
+        self.of_blocks = self._of_blocks()
+        if self.moves:
+            equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)
+            sim.before_change()
+            sim.close_model()
+        self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
+        self.unknowns = self._unknowns()
+        self.solver = self._solver()
+        if self.moves:
+            self._rest = equilibrium.at_rest(sim, self.nodes)
+            try:
+                self._rest.__enter__()
+            except CommandError:
+                self.solver.close()
+                raise
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        if self.moves:
+            self._rest.__exit__(None, None, None)
+            equilibrium.settle(self.sim, self.nodes, self.x, np.zeros_like(self.x))
+            equilibrium.refuse_touching(self.sim, equilibrium.touching(self.sim), "touch after an implicit step")
+        self.solver.close()
+
+    def _stress(self) -> float:
+        """Mean size of the stress of elements [Pa], 0 if they stand still."""
+        if not self.moves:
+            return 0.0
+        stress = np.abs(self.sim.local.stresses(energies=False)[0])
+        return exact_sum(stress.mean(axis=1), self.sim.comm) / len(self.sim.the_mesh().cells)
+
+    def _of_blocks(self) -> Unknowns:
+        sim, count = self.sim, len(self.x)
+        if not self.moves:
+            return Unknowns(
+                np.full((count, 2), -1), np.tile(np.eye(2), (count, 1, 1)), np.zeros((count, 2)), np.zeros(count, bool)
+            )
+        found = equilibrium.unknowns_of(sim, self.nodes, 1)
+        if found.given.any():
+            raise CommandError("implicit steps of flow hold nodes or leave them free: other velocities are for steps")
+        return found
+
+    def _unknowns(self) -> Unknowns:
+        """Those of the blocks, then the variable of each flow node."""
+        of, n, blocks = self.of_blocks, self.fluid.n, len(self.x)
+        number = np.full((blocks + n, 2), -1, np.int64)
+        number[:blocks] = of.number
+        number[blocks:, 0] = of.count + np.arange(n)
+        way = np.concatenate([of.way, np.tile(np.eye(2), (n, 1, 1))])
+        found = Unknowns(number, way, np.zeros((blocks + n, 2)), np.concatenate([of.oblique, np.zeros(n, bool)]))
+        self.count.unknowns = found.count
+        return found
+
+    def _solver(self) -> Direct | Petsc | Condensed:
+        sim, unknowns = self.sim, self.unknowns
+        made: Direct | Petsc | Condensed
+        if self.wanted == "petsc" or (self.wanted == "auto" and unknowns.count >= MANY):
+            there = not sim.comm.any(not petsc_there())
+            if self.wanted == "petsc" and not there:
+                raise CommandError("petsc4py is not installed, or PETSc cannot be loaded: use solver direct")
+        else:
+            there = False
+        if there:
+            made = Petsc(sim.comm, unknowns, np.concatenate([self.nodes.owner, self.nodes.owner[self.fluid.lead]]))
+        elif self.moves and Condensed.suits(unknowns, kept := self._of_joints()):
+            made = Condensed(sim.comm, unknowns, kept)
+        else:
+            made = Direct(sim.comm, unknowns, self.nodes.owner)
+            made.flows = True
+        self.count.solver = made.name
+        return made
+
+    def _of_joints(self) -> np.ndarray:
+        """Nodes of joints and fluid."""
+        sim, cells = self.sim, self.sim.the_mesh().cells
+        lower = np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0))
+        faces = np.concatenate([lower, sim.partner[lower]])
+        e, k = faces // 4, faces % 4
+        ends = np.concatenate([sim.node[e, k], sim.node[e, (k + 1) % corner_counts(cells[e])]])
+        return np.concatenate([ends, self.fluid.at.reshape(-1), len(self.x) + np.arange(self.fluid.n)])
+
+    # ---- time steps ----------------------------------------------------------------------------------------------
+
+    def advance(self, end: float) -> None:
+        """One time step, at most to this flow time [s]."""
+        flow = self.flow
+        left = end - flow.time
+        dt = min(flow.implicit_dt or self.longest, self.longest)
+        while True:
+            parts = max(1, math.ceil(left / dt - 1e-9))
+            now = left / parts if parts < 3 else dt
+            found = self._tried(now)
+            if not found.error:
+                break
+            self.count.cut += 1
+            dt = 0.5 * now
+            if dt < CUTS * self.longest:
+                raise CommandError(f"flow time {flow.time:.6g} s: {found.error}")
+        self.count.steps += 1
+        flow.implicit_dt = min(self._next(now, found), self.longest)
+        self.sim.clock.step += 1
+
+    def _next(self, dt: float, found: _Found) -> float:
+        """The time step after one of dt [s]: joints pass their peak every few steps, and Newton's method is quick."""
+        flow = self.flow
+        flow.since_peak += 1
+        since = flow.since_peak
+        longer = dt * GROWTH ** min(since / PLENTY, MOST_GROWTH)
+        if found.past:
+            flow.since_peak = 0
+            return dt / GROWTH if since < FEW else longer if since > PLENTY else dt
+        if found.iterations > HARD:
+            return dt / GROWTH
+        return longer if found.iterations <= EASY and since > PLENTY else dt
+
+    def steady(self) -> None:
+        """Flow alone until as much comes as goes; flow time does not pass."""
+        flow = self.flow
+        if self.moves:
+            raise CommandError("steady flow is that in blocks that stand still: model option mechanical off first")
+        if bool(np.isfinite(flow.since).any()):
+            raise CommandError("leak-off goes on for ever: there is no steady flow with it")
+        time, dt, growth = flow.time, self.longest, 10.0
+        for _ in range(MOST_STEADY):
+            found = self._tried(dt)
+            flow.time = time
+            if found.error:
+                self.count.cut += 1
+                dt, growth = 0.3 * dt, 1.5
+                if dt < CUTS * self.longest:
+                    raise CommandError(f"steady flow: {found.error}")
+                continue
+            self.count.steps += 1
+            if found.storing <= STEADY:
+                return
+            dt, growth = growth * dt, min(1.5 * growth, 10.0)
+        raise CommandError(
+            "steady flow was not found: some node needs a pressure or a level, or rates must add up to zero"
+        )
+
+    def _tried(self, dt: float) -> _Found:
+        """This time step [s], taken if it finds balance."""
+        sim, (step, u) = self.sim, self.fluid.begin(dt, self.x)
+        found = self._newton(step, self.x, u)
+        if not found.error and found.past > 1 and dt > TOGETHER * self.longest:
+            found.error = "more than one joint would pass its peak"
+        if not found.error and self.moves:
+            memory, past = equilibrium.Memory.of(sim), found.past
+            for _ in range(equilibrium.PASSES):
+                if not equilibrium.commit(sim, self.nodes, self.of_blocks, found.x, sim.clock.step, True):
+                    break
+                equilibrium.hold_still(sim)
+                found = self._newton(step, found.x, found.u)
+                if found.error:
+                    sim.before_change()
+                    memory.put_back(sim)
+                    sim.close_model()
+                    equilibrium.hold_still(sim)
+                    break
+            found.past = past
+        if found.error:
+            equilibrium.place_corners(sim, self.x)
+            self.fluid.show(self.fluid.state_of(self.fluid.u, self.x))
+            return found
+        total = float(found.fluid.sizes.sum())
+        found.storing = float(np.abs(found.fluid.fluid - step.fluid).sum()) / total if total > 0.0 else 0.0
+        self.x = found.x
+        self.fluid.take(step, found.fluid, found.u)
+        return found
+
+    # ---- Newton's method -----------------------------------------------------------------------------------------
+
+    def _newton(self, step: Step, x: np.ndarray, u: np.ndarray) -> _Found:
+        lack, force, fluid = self._lacking(step, x, u)
+        iterations, error, past = 0, "", 0
+        while lack > AIM and iterations < MOST:
+            pieces = self._pieces(step, fluid, u, x)
+            try:
+                self.solver.factor(pieces)
+                way = self.solver.solve(force, 0.0)
+            except CommandError as singular:
+                error = str(singular)
+                break
+            self.count.factors += 1
+            iterations += 1
+            part, best = 1.0, (math.inf, 1.0)
+            blocks = len(x)
+            for _ in range(HALVINGS):
+                trial = self._lacking(step, x + part * way[:blocks], u + part * way[blocks:, 0])
+                if trial[0] < lack or (iterations == 1 and lack > ENOUGH and trial[0] < math.inf):
+                    break
+                best = min(best, (trial[0], part))
+                part *= 0.5
+            else:
+                if lack <= ENOUGH:
+                    break
+                part = best[1]
+                trial = self._lacking(step, x + part * way[:blocks], u + part * way[blocks:, 0])
+                if not trial[0] < math.inf:
+                    break
+            x, u = x + part * way[:blocks], u + part * way[blocks:, 0]
+            stalled = lack <= ENOUGH and trial[0] > 0.5 * lack
+            lack, force, fluid = trial
+            if stalled:
+                break
+        self.count.iterations += iterations
+        if not error and lack > ENOUGH:
+            error = (
+                f"flow and equilibrium do not converge: what is lacking, over what contributes, is {lack:.3g} after "
+                f"{iterations} iterations, {ENOUGH:g} is asked for"
+            )
+        if self.moves:
+            equilibrium.place_corners(self.sim, x)
+            past = int(self.sim.comm.sum_into(np.array([equilibrium.of_joints(self.sim, True)[1]], np.int64))[0])
+        return _Found(x, u, fluid, lack, iterations, past, error)
+
+    def _pieces(self, step: Step, fluid: Balance, u: np.ndarray, x: np.ndarray) -> list[Pieces]:
+        first = len(x)
+        of_fluid = self.fluid.pieces(step, fluid, u, x, first)
+        if not self.moves:
+            return of_fluid
+        equilibrium.place_corners(self.sim, x)
+        joints, _ = equilibrium.of_joints(self.sim, True)
+        if isinstance(self.solver, Condensed):
+            if not self.solver.ready:
+                self.solver.eliminate(equilibrium.of_elements(self.sim))
+            return [joints, *of_fluid]
+        return [*equilibrium.of_elements(self.sim), joints, *of_fluid]
+
+    def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
+        """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, 2); the fluid."""
+        now = self.fluid.balance(step, u, x)
+        right = np.zeros((len(x) + self.fluid.n, 2))
+        right[len(x) :, 0] = -now.residual
+        sizes = float(now.sizes.sum())
+        lack = float(np.abs(now.residual).sum()) / sizes if sizes > 0.0 else 0.0
+        if not math.isfinite(lack):
+            return math.inf, right, now
+        if self.moves:
+            self.fluid.show(now.state)
+            force, ratio, _ = equilibrium.unbalanced(self.sim, self.nodes, self.of_blocks, x)
+            right[: len(x)] = force
+            lack += ratio
+        return lack, right, now

@@ -1,0 +1,303 @@
+"""Implicit steps of flow, alone or with blocks in static equilibrium: backward Euler, all unknowns at once.
+
+One variable u per flow node says how its fluid is: u > 0 is a pressure u p0 in a full node, u < 0 a saturation 1 + u
+without pressure. The residual of a node is the fluid that its balance lacks,
+
+    R = V (s + p / K) - W_before - dt sum(q) + leak-off - given,
+
+with flows q, volumes V and leak-off of the explicit steps (kernels.py), all at the end of the step. Volumes and cubic
+law follow the opening of joints, pressures push on their faces; Newton's method takes all four derivatives, so fluid of
+any bulk modulus in channels of any width converges. At u = 0 the derivative has a jump (semi-smooth Newton method, Qi &
+Sun 1993). Seepage faces, and rates that take more than there is, are complementarities: max(u, R) = 0 and
+min(u + 1, R) = 0.
+
+Everything here is known to all ranks and is the same on all: the numbers of a solve are few beside its factors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hpcdem.physics.fdem.connectivity import corner_counts, face_points
+from hpcdem.physics.fdem.linear import Pieces
+from hpcdem.physics.flow import kernels
+
+if TYPE_CHECKING:
+    from hpcdem.physics.flow.model import Flow
+
+LEAST_PRESSURE = 1e4
+"""p0 is at least this [Pa]."""
+
+
+@dataclass
+class Balance:
+    """A state of the fluid at trial positions and variables.
+
+    residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; fluid, volume
+    (n,) [m2]; state (n, kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a
+    complementarity; table (m, kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
+    """
+
+    residual: np.ndarray
+    plain: np.ndarray
+    sizes: np.ndarray
+    fluid: np.ndarray
+    volume: np.ndarray
+    state: np.ndarray
+    held: np.ndarray
+    table: np.ndarray
+    q: np.ndarray
+    lost: np.ndarray
+
+
+@dataclass
+class Step:
+    """One implicit step: before, after [s]; fluid (n,) [m2]: at its beginning; conditions (rows, 2): at its end;
+    known (n,) bool: nodes of which they say the pressure."""
+
+    before: float
+    after: float
+    fluid: np.ndarray
+    conditions: np.ndarray
+    known: np.ndarray
+
+    @property
+    def dt(self) -> float:
+        return self.after - self.before
+
+
+@dataclass
+class Fluid:
+    """The network of a model, as arrays. u (n,): variable of each flow node; at (m, 4): nodes of the blocks at the
+    corners a, b of the lower face and p, q of the other (p faces b); face_at (k, 2), face_node (k, 2): nodes of
+    the blocks and flow nodes at the ends of faces of this rank that fluid pushes on, face_key (k,): their numbers."""
+
+    flow: Flow
+    p0: float
+    u: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        flow, blocks = self.flow, self.flow.blocks
+        network, cells = flow.network, blocks.the_mesh().cells
+        self.numbers, self.channels = network.nodes, network.channels
+        self.n, self.m = len(network.nodes), len(network.channels)
+        row_of = np.full(len(network.there), -1, np.int64)
+        row_of[network.nodes] = np.arange(self.n)
+        self.ends = row_of[network.ends]
+        lower, other = self.channels, blocks.partner[self.channels]
+        self.at = np.column_stack([self._corners(faces) for faces in (lower, other)])
+        self.law = (flow.row[self.channels] - 1).astype(np.int64)
+        self.laws, self.bulk = flow.laws(), flow.fluid("fluid_bulk")
+        faces = flow.wet() if flow.pushes else np.empty(0, np.int64)
+        self.face_key = faces
+        self.face_at, self.face_node = self._corners(faces), row_of[face_points(cells, faces)]
+        self.condition = flow.condition[self.numbers]
+        self.held_rows = row_of[flow.held]
+        leads = blocks.local.leads[self.numbers]
+        self.lead = blocks.node.reshape(-1)[leads]
+        self.side = np.concatenate([-np.ones(self.m), np.ones(self.m)])
+        self.end = self.ends.T.reshape(-1)
+        self.both = np.tile(np.arange(self.m), 2)
+        self.fluid = self._gathered(flow.nodes[:, kernels.W])
+        p, s = self._gathered(flow.state[: flow.owned, kernels.P]), self._gathered(flow.state[: flow.owned, kernels.S])
+        self.u = np.where(p > 0.0, p / self.p0, s - 1.0)
+
+    def _corners(self, faces: np.ndarray) -> np.ndarray:
+        """(k, 2) nodes of the blocks at both ends of faces."""
+        blocks = self.flow.blocks
+        e, k = faces // 4, faces % 4
+        return np.column_stack([blocks.node[e, k], blocks.node[e, (k + 1) % corner_counts(blocks.the_mesh().cells[e])]])
+
+    def _gathered(self, mine: np.ndarray) -> np.ndarray:
+        """Values (n,) of all flow nodes from those of this rank."""
+        comm, numbers = self.flow.blocks.comm, self.flow.number
+        out = np.zeros(self.n)
+        for number, values in comm.allgather((numbers, mine)) if comm.size > 1 else [(numbers, mine)]:
+            out[np.searchsorted(self.numbers, number)] = values
+        return out
+
+    # ---- a state -------------------------------------------------------------------------------------------------
+
+    def state_of(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, 2)."""
+        options = self.flow.blocks.options
+        state = np.empty((self.n, kernels.STATE))
+        state[:, kernels.P] = np.maximum(u, 0.0) * self.p0
+        state[:, kernels.S] = np.minimum(1.0 + u, 1.0)
+        at = x[self.lead]
+        state[:, kernels.E] = -self.flow.fluid("fluid_density") * (options.gx * at[:, 0] + options.gy * at[:, 1])
+        return state
+
+    def begin(self, dt: float, x: np.ndarray) -> tuple[Step, np.ndarray]:
+        """A step of dt [s] from here, and the variables (n,) to begin with."""
+        after = self.flow.time + dt
+        conditions = self.flow.conditions_at(after)
+        does, value = conditions[self.condition].T
+        energy = self.state_of(self.u, x)[:, kernels.E]
+        level = (does == kernels.SURFACE) & (value > energy)
+        known = level | (does == kernels.PRESSURE)
+        u = np.where(known, np.where(level, value - energy, value) / self.p0, self.u)
+        return Step(self.flow.time, after, self.fluid, conditions, known), u
+
+    def show(self, state: np.ndarray) -> None:
+        """Loads are those of this state from now on."""
+        self.flow.state[:] = state[self.held_rows]
+
+    def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
+        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, 2)."""
+        corners = np.ascontiguousarray(x[self.at].reshape(self.m, 8))
+        begin, table = 8 * np.arange(self.m), np.empty((self.m, kernels.CHANNEL))
+        kernels.geometry(1, begin, begin + 4, self.law, self.laws, corners, self.flow.viscosity, table)
+        does, value = step.conditions[self.condition].T
+        state = self.state_of(u, x)
+        q, lost = np.empty(self.m), np.zeros(self.m)
+        since = self.flow.since[self.channels]
+        leaks = bool(np.isfinite(since).any())
+        kernels.flows(
+            1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, state, q, lost
+        )  # fmt: skip
+        volume = np.bincount(self.end, table[self.both, kernels.HALF], self.n)
+        fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
+        dt, stored = step.dt, fluid - step.fluid
+        into = np.bincount(self.end, self.side * q[self.both], self.n) * dt
+        passing = np.bincount(self.end, np.abs(q)[self.both], self.n) * dt
+        gone = np.bincount(self.end, lost[self.both], self.n)
+        rate = np.where(does == kernels.RATE, value, 0.0) * dt
+        plain = stored - into + gone
+        residual = plain - rate
+        seeps = (does == kernels.SURFACE) & ~step.known
+        scale = np.maximum(volume, 1e-300)
+        out = seeps & (u * scale >= residual)
+        dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
+        held = step.known | out | dry
+        residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
+        sizes = np.abs(stored) + passing + gone + np.abs(rate)
+        return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
+
+    # ---- derivatives ---------------------------------------------------------------------------------------------
+
+    def pieces(self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int) -> list[Pieces]:
+        """Derivatives for Newton's method, as pieces of a matrix (see linear.py) whose "nodes" from `first` on are flow
+        nodes: of channels, on rank 0, of faces of this rank, and of nodes, on rank 0."""
+        rank = self.flow.blocks.comm.rank
+        mine = slice(None) if rank == 0 else slice(0, 0)
+        own = self._own_pieces(now, u, first)
+        return [
+            self._channel_pieces(step, now, u, x, first, mine),
+            Pieces(own.key[mine], own.node[mine], own.stiffness[mine]),
+            self._face_pieces(u, x, first),
+        ]
+
+    def _rises(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of pressure and saturation by u."""
+        return np.where(u > 0.0, self.p0, 0.0), np.where(u > 0.0, 0.0, 1.0)
+
+    def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> Pieces:
+        p_u, s_u = self._rises(u)
+        diagonal = np.where(now.held, np.maximum(now.volume, 1e-300), now.volume * (s_u + p_u / self.bulk))
+        stiffness = np.zeros((self.n, 2, 2))
+        stiffness[:, 0, 0] = diagonal
+        return Pieces(np.arange(self.n), first + np.arange(self.n)[:, None], stiffness)
+
+    def _channel_pieces(
+        self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int, mine: slice
+    ) -> Pieces:
+        """Of flow, leak-off and volume of channels by the variables at their ends and the corners of their faces."""
+        ends, state = self.ends[mine], now.state
+        delta, conduct, half = now.table[mine].T
+        m, dt = len(ends), step.dt
+        p_u, s_u = self._rises(u)
+        p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
+        head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1])
+        mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
+        up = np.where(down, s[:, 0], s[:, 1])
+        wet = np.minimum(mean, up)
+        part, slope = wet * wet * (3.0 - 2.0 * wet), 6.0 * wet * (1.0 - wet)
+        of_mean = mean <= up
+        by_s = np.column_stack([np.where(of_mean, 0.5, down), np.where(of_mean, 0.5, ~down)])
+        sign = np.array([1.0, -1.0])
+        by_u = conduct[:, None] * (
+            part[:, None] * sign * p_u[ends] + (head * slope)[:, None] * by_s * s_u[ends]
+        )  # of q
+        leak_u = np.zeros((m, 2))
+        at = np.flatnonzero(now.lost[mine] > 0.0)
+        if len(at):
+            over = 0.5 * p[at].sum(axis=1) - self.laws[self.law[mine][at], kernels.PORE]
+            of_mean_s = mean[at]
+            leak_u[at] = now.lost[mine][at][:, None] * 0.5 * (
+                p_u[ends[at]] / over[:, None]
+                + (6.0 * (1.0 - of_mean_s) / np.maximum(of_mean_s * (3.0 - 2.0 * of_mean_s), 1e-300))[:, None]
+                * s_u[ends[at]]
+            )  # fmt: skip
+        a, b, c, d = (x[self.at[mine, k]] for k in range(4))
+        way = 0.5 * ((b + c) - (a + d))
+        h = np.hypot(way[:, 0], way[:, 1])
+        across = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None]
+        law = self.laws[self.law[mine]]
+        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
+        along = way / h[:, None]
+        slip = 0.5 * ((((d - a) + (c - b)) * along).sum(axis=1))
+        gains = law[:, kernels.DILATE] * np.abs(slip) < law[:, kernels.GAIN]
+        opens = across + np.where(gains, law[:, kernels.DILATE] * np.sign(slip), 0.0)[:, None] * along
+        by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * opens[:, None, :]
+        by_x = by_x.reshape(m, 8)  # of the aperture
+        fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
+        out = np.zeros((m, 12, 12))
+        for end in range(2):
+            row = 8 + 2 * end
+            out[:, row, 8:12:2] = sign[end] * dt * by_u + leak_u
+            stored = half / delta * fill[ends[:, end]]
+            out[:, row, :8] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
+            out[now.held[ends[:, end]], row, :] = 0.0
+        nodes = np.column_stack([self.at[mine], first + ends])
+        return Pieces(self.channels[mine], nodes, out)
+
+    def _face_pieces(self, u: np.ndarray, x: np.ndarray, first: int) -> Pieces:
+        """Of the forces on faces by the variables at their ends: kernels.loads."""
+        k = len(self.face_key)
+        p_u = np.where(u > 0.0, self.p0, 0.0)[self.face_node]
+        one, two = x[self.face_at[:, 0]], x[self.face_at[:, 1]]
+        normal = np.column_stack([two[:, 1] - one[:, 1], one[:, 0] - two[:, 0]])
+        out = np.zeros((k, 8, 8))
+        for end in range(2):
+            for by in range(2):
+                weight = (2.0 if end == by else 1.0) / 6.0 * p_u[:, by]
+                out[:, 2 * end : 2 * end + 2, 4 + 2 * by] = weight[:, None] * normal
+        return Pieces(self.face_key, np.column_stack([self.face_at, first + self.face_node]), out)
+
+    # ---- the end of a step ---------------------------------------------------------------------------------------
+
+    def take(self, step: Step, now: Balance, u: np.ndarray) -> None:
+        """The fluid is that of this balance: what flows out of one node has flowed into another, to rounding."""
+        flow = self.flow
+        does, value = step.conditions[self.condition].T
+        rate = np.where(does == kernels.RATE, value, 0.0) * step.dt
+        given = np.where(now.held, now.plain, rate)
+        fluid = np.where(now.held, now.fluid, now.fluid - now.plain + rate)
+        gone = np.bincount(self.end, now.lost[self.both], self.n)
+        mine = np.searchsorted(self.numbers, flow.number)
+        nodes = flow.nodes
+        nodes[:, kernels.W], nodes[:, kernels.V] = fluid[mine], now.volume[mine]
+        nodes[:, kernels.GIVEN] += given[mine]
+        nodes[:, kernels.LEAKED] += gone[mine]
+        nodes[:, kernels.INFLOW] = given[mine] / step.dt
+        self.show(now.state)
+        self.fluid, self.u = fluid, np.where(now.state[:, kernels.P] > 0.0, now.state[:, kernels.P] / self.p0,
+                                             now.state[:, kernels.S] - 1.0)  # fmt: skip
+        flow.time = step.after
+
+
+def reference_pressure(flow: Flow, stress: float) -> float:
+    """p0 [Pa]: about the largest pressure that there is or will be; stress: of the rock, 0 if it stands still."""
+    table = flow.conditions_at(flow.time)
+    used = table[np.unique(flow.condition)]
+    pressures = used[used[:, 0] == kernels.PRESSURE, 1]
+    own = flow.state[: flow.owned, kernels.P].max(initial=0.0)
+    o = flow.blocks.options
+    points = flow.blocks.the_mesh().points[flow.network.nodes]
+    energy = flow.fluid("fluid_density") * np.ptp(points @ np.array([o.gx, o.gy])) if len(points) else 0.0
+    largest = float(flow.blocks.comm.max_into(np.array([own]))[0])
+    return max(largest, float(pressures.max(initial=0.0)), float(energy), stress, LEAST_PRESSURE)

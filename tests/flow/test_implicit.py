@@ -1,0 +1,370 @@
+"""Implicit steps of flow: derivatives against differences, closed forms, equilibrium with blocks, refusals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.coupled import Coupled
+from hpcdem.physics.flow.model import Flow
+from hpcdem.pre.mesh import structured
+from tests.blocks.support import JOINT, ROCK, jointed, model, near, rectangle, shaken
+from tests.flow import exact
+from tests.flow.support import WATER, at, hold, inner, line, standing
+
+
+def over(sim: Blocks, time: float, steps: int) -> Coupled:
+    """So much time [s] in so many equal steps at most."""
+    flow = Flow.of(sim)
+    end = flow.time + time
+    flow.implicit_dt = 0.0
+    with Coupled(sim, time / steps) as run:
+        while flow.time < end * (1.0 - 1e-12):
+            run.advance(end)
+    return run
+
+
+# ---- flow alone ---------------------------------------------------------------------------------------------------
+
+
+def test_derivatives_are_those_of_differences() -> None:
+    """The residual of nodes that are full, half full and nearly dry, with gravity and leak-off, by all variables and
+    positions; and forces on faces by the variables."""
+    mesh = shaken(rectangle(4, 3, 0.4, 0.3), 0.2)
+    sim = jointed(model(mesh))
+    sim.option(dynamic=False, large_strain=False, collision=False)
+    sim.gravity(2.0, -9.81)
+    flow, joints = Flow.of(sim), inner(mesh)
+    matrix = {"matrix_permeability": 1e-13, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}
+    flow.assign(
+        joints,
+        {**WATER, "fluid_bulk": 1e7, "aperature_initial": 1e-4, "shear_dilation": 30.0, "leak_off": 1.0, **matrix},
+    )
+    changes.crack(sim, joints[:4])
+    flow.prescribe(at(sim, 0.0), kernels.SURFACE, 0.1)
+    flow.prescribe(np.array([7]), kernels.RATE, -1e-6)
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    rng = np.random.default_rng(3)
+    with Coupled(sim, 1.0) as run:
+        flow.since[flow.network.channels[:9]] = -1e-4
+        fluid, count = run.fluid, len(run.x)
+        fluid.fluid = rng.uniform(0.0, 1e-5, fluid.n)
+        step, _ = fluid.begin(1e-3, run.x)
+        u = rng.choice([0.4, 0.05, -0.3, -0.9], fluid.n) * rng.uniform(0.8, 1.2, fluid.n)
+        x = run.x + rng.uniform(-1e-6, 1e-6, run.x.shape)
+        now = fluid.balance(step, u, x)
+        matrix_of = np.zeros((2 * (count + fluid.n),) * 2)
+        for piece in fluid.pieces(step, now, u, x, count):
+            for node, part in zip(piece.node, piece.stiffness):
+                rows = np.column_stack([2 * node, 2 * node + 1]).reshape(-1)
+                matrix_of[np.ix_(rows, rows)] += part
+        residual = slice(2 * count, None, 2)
+        assert now.held.any() and not now.held.all() and (now.lost > 0.0).any()
+        for i in range(fluid.n):
+            h = 1e-6
+            ends = [fluid.balance(step, u + s * h * np.eye(fluid.n)[i], x) for s in (1.0, -1.0)]
+            wanted = (ends[0].residual - ends[1].residual) / (2.0 * h)
+            found = np.where(step.known, 0.0, matrix_of[residual, 2 * (count + i)])
+            assert found == pytest.approx(wanted, abs=2e-6 * np.abs(wanted).max())
+        for i in rng.choice(count, 20, replace=False):
+            for axis in range(2):
+                way = np.zeros_like(x)
+                way[i, axis] = 1e-9
+                ends = [fluid.balance(step, u, x + s * way) for s in (1.0, -1.0)]
+                wanted = (ends[0].residual - ends[1].residual) / 2e-9
+                found = matrix_of[residual, 2 * i + axis]
+                assert found == pytest.approx(wanted, abs=2e-2 * np.abs(matrix_of[residual]).max())
+        forces = []
+        for s in (1.0, -1.0):
+            fluid.show(fluid.state_of(u + s * 1e-3 * (u > 0.0), x))
+            forces.append(equilibrium.unbalanced(sim, run.nodes, run.of_blocks, x)[0])
+        wanted = -(forces[0] - forces[1]).reshape(-1) / 2e-3
+        found = matrix_of[: 2 * count, residual] @ (u > 0.0)
+        assert found == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max()) and np.abs(wanted).max() > 0.0
+
+
+def test_a_pulse_runs_into_a_closed_channel() -> None:
+    """9.11 by steps 60 times as long as the explicit ones: of first order in the time step."""
+    rate = 2.2e9 * 1e-8 / (12.0 * 1e-3) / 100.0
+    wanted = [exact.transient(0.5, 0.25), exact.transient(0.0, 0.25)]
+    errors = []
+    for steps in (50, 100):
+        sim, flow = line(100, 10.0, aperature_initial=1e-4)
+        flow.fill(None, saturation=1.0)
+        hold(flow, at(sim, 0.0, 0.0), 1e6)
+        over(sim, 0.25 / rate, steps)
+        ends = np.array([at(sim, 5.0, 0.0)[0], at(sim, 10.0, 0.0)[0]])
+        errors.append(np.abs(flow.values("flow-node", "pressure", ends) / 1e6 - wanted).max())
+        assert flow.account()["relative"] < 1e-12
+    assert errors[1] < 0.003 and errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)
+
+
+def test_long_steps_do_not_mind_an_incompressible_fluid() -> None:
+    """A rate into a line with an outlet: what comes in goes out, at any bulk modulus."""
+    sim, flow = line(10, 1.0, fluid_bulk=1e15)
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-9)
+    hold(flow, at(sim, 1.0, 0.0), 2e5)
+    run = over(sim, 10.0, 3)
+    pressure = flow.values("flow-node", "pressure")
+    x = sim.mesh.points[flow.numbers("flow-node"), 0]
+    drop = 12.0 * 1e-3 * 1e-9 / 1e-15
+    assert pressure == pytest.approx(2e5 + drop * (1.0 - x), rel=1e-6)
+    assert np.abs(flow.values("flow-channel", "flow_rate")) == pytest.approx(1e-9, rel=1e-6)
+    assert run.count.steps == 3
+
+
+def test_steady_flow_around_a_line_of_wells() -> None:
+    """Between two walls of a lattice: equal gradients, and the permeability of the lattice without the half channels
+    that are missing on two surfaces; no time passes."""
+    mesh = structured.equilateral((0.0, 0.0), 4.0, 4.0 * math.sqrt(0.75), 0.25)
+    sim, flow = standing(mesh, fluid_bulk=1e9)
+    flow.fill(None, saturation=1.0)
+    first, last = at(sim, 0.0), at(sim, 4.0)
+    hold(flow, first, 1e6)
+    hold(flow, last, 0.0)
+    with Coupled(sim, 1.0) as run:
+        run.steady()
+    nodes, inflow = flow.numbers("flow-node"), flow.values("flow-node", "inflow")
+    into, out = inflow[np.isin(nodes, first)].sum(), inflow[np.isin(nodes, last)].sum()
+    assert into == pytest.approx(-out, rel=1e-8) and flow.time == 0.0
+    found = into * 1e-3 * 4.0 / (1e6 * np.ptp(mesh.points[:, 1])) / exact.lattice(1e-5, 0.25)
+    assert found == pytest.approx(1.0 - 2.0 / 3.0 / 16.0, rel=1e-6)
+
+
+def test_water_finds_its_level_in_a_dam_at_once() -> None:
+    """9.11, Dupuit, as by explicit steps (test_channels.py): levels 4 %, discharge 3 %; a seepage face."""
+    size = 0.5
+    mesh = structured.equilateral((0.0, 0.0), 16.0, 9.0, size)
+    sim, flow = standing(mesh, fluid_bulk=2.2e9)
+    sim.gravity(0.0, -9.81)
+    points = mesh.points
+    left, right = np.flatnonzero(points[:, 0] < 1e-9), np.flatnonzero(points[:, 0] > 16.0 - 1e-9)
+    flow.prescribe(left, kernels.SURFACE, 8.0)
+    flow.prescribe(right, kernels.SURFACE, 4.0)
+    flow.fill(np.flatnonzero(points[:, 1] < 8.0 - 0.25 * points[:, 0]), pressure=2e4)
+    with Coupled(sim, 10.0) as run:
+        run.steady()
+    nodes = flow.numbers("flow-node")
+    pressure, inflow = flow.values("flow-node", "pressure"), flow.values("flow-node", "inflow")
+    head = points[nodes, 1] + pressure / 9810.0
+    for x in (4.0, 8.0, 12.0):
+        close = (np.abs(points[nodes, 0] - x) < 0.51 * size) & (pressure > 0.0)
+        assert head[close].max() == pytest.approx(exact.dupuit(x, 8.0, 4.0, 16.0), rel=0.04)
+    wanted = exact.charny(exact.lattice(1e-5, size) * 1000.0 * 9.81 / 1e-3, 8.0, 4.0, 16.0)
+    into, out = inflow[np.isin(nodes, left)].sum(), inflow[np.isin(nodes, right)].sum()
+    assert into == pytest.approx(wanted, rel=0.03) and into == pytest.approx(-out, rel=1e-6)
+    assert (inflow[np.isin(nodes, right)] <= 0.0).all()  # no water comes in above the level
+
+
+def test_a_rate_takes_no_more_than_there_is() -> None:
+    sim, flow = line(4, 1.0)
+    node = at(sim, 0.0, 0.0)
+    flow.fill(None, saturation=0.5)
+    flow.prescribe(node, kernels.RATE, -1.0)
+    over(sim, 1.0, 4)
+    saturation = flow.values("flow-node", "saturation", node)[0]
+    assert saturation == pytest.approx(0.0, abs=1e-9) and flow.nodes[:, kernels.W].min() > -1e-18
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_leak_off_is_that_of_carter() -> None:
+    """A held crack, exact in any step."""
+    mesh = rectangle(4, 2, 0.4, 0.2)
+    sim = model(mesh)
+    edges = mesh.edges()
+    on = edges.inner & (np.abs(mesh.points[edges.points][:, :, 1] - 0.1) < 1e-9).all(axis=1)
+    joints = edges.faces[on, 0]
+    matrix = {"matrix_permeability": 1e-15, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "leak_off": 1.0, "matrix_pore_pressure": 2e5, **matrix})
+    sim.parts(mechanical=False)
+    changes.crack(sim, joints)
+    flow.fill(None, pressure=1e6)
+    hold(flow, flow.numbers("flow-node"), 1e6)
+    over(sim, 40.0, 3)
+    wanted = exact.carter(8e5, 40.0, 0.4, (1e-15, 0.2, 1e-9), 2.2e9, 1e-3)
+    assert flow.account()["leaked"] == pytest.approx(wanted, rel=1e-9)
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_tables_are_followed() -> None:
+    """A linear table to the end of each step."""
+    sim, flow = line(4, 1.0)
+    flow.fill(None, saturation=1.0)
+    sim.table("p", [(0.0, 0.0), (10.0, 1e6)])
+    hold(flow, at(sim, 0.0, 0.0), "p")
+    over(sim, 5.0, 5)
+    assert flow.values("flow-node", "pressure", at(sim, 0.0, 0.0))[0] == pytest.approx(5e5, rel=1e-12)
+
+
+# ---- flow and equilibrium ------------------------------------------------------------------------------------------
+
+LENGTH, HEIGHT = 4.0, 2.0
+
+
+def plate(cells: int = 20, pressed: float = 1e6) -> tuple[Blocks, Flow]:
+    """Two halves of a block, pressed together, with an open crack between them all along; held above and below."""
+    mesh = rectangle(cells, cells // 2, LENGTH, HEIGHT, y0=-0.5 * HEIGHT, kind="quad")
+    sim = model(mesh)
+    joints = near(mesh, 1, 0.0, inner=True)
+    joints = np.unique(np.minimum(joints, sim.partner[joints]))
+    law = {**JOINT, "friction": 30.0, "tensile_strength": 2e6, "penalty_normal": 100.0 * ROCK["young"]}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    sim.option(dynamic=False, large_strain=False, collision=False)
+    sim.initial_stress(None, yy=-pressed)
+    sim.velocity_condition(np.flatnonzero(np.abs(np.abs(mesh.points[:, 1]) - 0.5 * HEIGHT) < 1e-9), vx=0.0, vy=0.0)
+    for x in (0.0, LENGTH):
+        sim.velocity_condition(near_points(mesh.points, x), vx=0.0)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "aperature_initial": 1e-5, "aperature_minumum": 1e-6})
+    return sim, flow
+
+
+def near_points(points: np.ndarray, x: float) -> np.ndarray:
+    """Inner points of a side."""
+    return np.flatnonzero((np.abs(points[:, 0] - x) < 1e-9) & (np.abs(np.abs(points[:, 1]) - 0.5 * HEIGHT) > 1e-9))
+
+
+def test_fluid_that_is_pumped_in_lifts_the_block() -> None:
+    """Uniaxial strain: both halves, of the height H / 2 each, and the joint with P; the volume that was pumped in is
+    stored in apertures and in the compressed fluid."""
+    sim, flow = plate()
+    changes.crack(sim, flow.network.channels)
+    flow.fill(None, saturation=1.0)
+    nodes, ends = flow.numbers("flow-node"), at(sim, y=0.0)
+    assert np.array_equal(nodes, ends)
+    filled = flow.account()["given"]
+    flow.prescribe(None, kernels.RATE, 1e-6)
+    sim.initial_stress(None, yy=0.0)
+    over(sim, 10.0, 5)
+    given = flow.account()["given"] - filled
+    assert given == pytest.approx(10.0 * 1e-6 * len(nodes), rel=1e-12)
+    pressure = flow.values("flow-node", "pressure")
+    young, nu = ROCK["young"], ROCK["poisson_ratio"]
+    stiff = young * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu)) / HEIGHT
+    opening = pressure.mean() / stiff
+    wanted = LENGTH * (opening + (1e-5 + opening) * pressure.mean() / 2.2e9)
+    assert given == pytest.approx(wanted, rel=0.02)  # ends of the line get as much as the others
+    assert diagnostics.values(sim, "stress_yy").mean() == pytest.approx(-pressure.mean(), rel=0.02)
+
+
+def test_a_joint_is_pumped_open() -> None:
+    """From one end into a whole joint under pressure: joints break one after the other, nothing is lost, and fluid and
+    crack go together."""
+    sim, flow = plate()
+    equilibrium.solve_elastic(sim)
+    source = at(sim, 0.0, 0.0)
+    flow.prescribe(source, kernels.RATE, 1e-5)
+    run = over(sim, 20.0, 40)
+    counts = diagnostics.joint_counts(sim)
+    assert counts[2] >= 2 and sum(counts) == 20
+    account = flow.account()
+    assert account["given"] == pytest.approx(20.0 * 1e-5, rel=1e-12) and account["relative"] < 1e-12
+    wet = flow.values("flow-node", "saturation") > 0.999
+    x = sim.mesh.points[flow.numbers("flow-node"), 0]
+    broken = diagnostics.values(sim, "state", flow.numbers("flow-channel")) == 3
+    ends = sim.mesh.points[flow.network.ends[broken]][:, :, 0].max()
+    assert x[wet].max() >= ends - 1e-9
+    assert diagnostics.unbalanced_ratio(sim) < 1e-6 and run.count.steps >= 40
+
+
+def test_one_way_fluid_does_not_push() -> None:
+    sim, flow = plate()
+    equilibrium.solve_elastic(sim)
+    before = diagnostics.values(sim, "stress_yy")
+    sim.parts(one_way=True)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.PRESSURE, 5e6)
+    over(sim, 1.0, 4)
+    assert diagnostics.values(sim, "stress_yy") == pytest.approx(before, rel=1e-6)
+    assert flow.values("flow-node", "pressure").max() == pytest.approx(5e6)
+
+
+def test_the_static_solve_keeps_pressures() -> None:
+    """A crack full of fluid of 3 MPa under a block: it is lifted, its pressure stays, and the fluid that it takes is
+    given."""
+    sim, flow = plate(pressed=0.0)
+    changes.crack(sim, flow.network.channels)
+    flow.fill(None, pressure=3e6)
+    stored = flow.account()["stored"]
+    equilibrium.solve_elastic(sim)
+    assert diagnostics.values(sim, "stress_yy").mean() == pytest.approx(-3e6, rel=1e-3)
+    assert flow.values("flow-node", "pressure") == pytest.approx(3e6)
+    account = flow.account()
+    opened = diagnostics.values(sim, "displacement_y")
+    room = (opened[at(sim, y=0.0)].size and account["stored"] - stored) / LENGTH
+    young, nu = ROCK["young"], ROCK["poisson_ratio"]
+    assert room == pytest.approx(3e6 * HEIGHT / (young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))), rel=5e-3)
+    assert account["relative"] < 1e-12
+
+
+def test_a_file_in_mid_injection(tmp_path) -> None:
+    """The rest of the way from a checkpoint ends where the whole way ends."""
+    whole, flow = plate()
+    equilibrium.solve_elastic(whole)
+    flow.prescribe(at(whole, 0.0, 0.0), kernels.RATE, 1e-5)
+    over(whole, 10.0, 20)
+    saved_state.save(whole, tmp_path / "middle.sav")
+    again = Blocks()
+    saved_state.restore(again, tmp_path / "middle.sav")
+    for sim in (whole, again):
+        fluid = Flow.of(sim)
+        with Coupled(sim, 0.5) as run:
+            while fluid.time < 18.0:
+                run.advance(18.0)
+    assert diagnostics.joint_counts(whole) == diagnostics.joint_counts(again) and diagnostics.joint_counts(again)[2] > 0
+    for name in ("pressure", "saturation", "fluid"):
+        one, other = (Flow.of(sim).values("flow-node", name) for sim in (whole, again))
+        assert other == pytest.approx(one, rel=1e-9, abs=1e-12 * np.abs(one).max())
+    assert Flow.of(again).implicit_dt == Flow.of(whole).implicit_dt
+
+
+SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}
+
+
+# ---- refusals -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "spoil, words",
+    [(lambda sim: sim.option(dynamic=True), "dynamic off"),
+     (lambda sim: sim.parts(hydraulic=False), "hydraulic on"),
+     (lambda sim: sim.velocity_condition(np.array([0]), vx=1e-3), "velocities"),
+     (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", SOIL), "yield"),
+     (lambda sim: Bolts.of(sim), "bolts"),
+     (lambda sim: Flow.of(sim).drill("w", at(sim, 0.0, 0.0)), "wells")],
+)  # fmt: skip
+def test_what_implicit_steps_cannot_do_is_refused(spoil, words) -> None:
+    sim, _ = plate(4)
+    spoil(sim)
+    with pytest.raises(CommandError, match=words), Coupled(sim, 1.0):
+        pass
+
+
+def test_without_channels_there_is_nothing_to_solve() -> None:
+    with pytest.raises(CommandError, match="no channels"):
+        Coupled(model(rectangle(2, 2, 1.0, 1.0)), 1.0)
+
+
+def test_a_steady_flow_without_outlet_is_refused_and_nothing_has_changed() -> None:
+    sim, flow = line(4, 1.0)
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-9)
+    with pytest.raises(CommandError, match="steady"), Coupled(sim, 1.0) as run:
+        run.steady()
+    assert flow.time == 0.0
+
+
+def test_a_body_that_hangs_on_nothing_is_refused() -> None:
+    sim, flow = plate(4)
+    sim.remove_conditions(np.flatnonzero(sim.mesh.points[:, 1] > 0.9))
+    changes.crack(sim, flow.network.channels)
+    with pytest.raises(CommandError, match="can move"), Coupled(sim, 1.0):
+        pass
