@@ -33,7 +33,6 @@ from hpcdem.io.disk import explain
 from hpcdem.io.files import write_sections
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.parts import read_lines
-from hpcdem.io.slabs import by_ranges
 from hpcdem.io.textnum import INT, WORD, Column, TextTable, format_floats, sci
 from hpcdem.io.transport import Section
 
@@ -304,9 +303,12 @@ def read_dat(
         raise HpcdemError(f"cannot read {path}: it has no line current_step, so it is no frame of ZDEM or hpcdem")
     raw = _tables(comm, path, places, in_place)
     balls = raw.get("ball data", [])
-    for k, table in enumerate(balls):
-        if comm.size > 1 and "id" in table:
-            balls[k] = by_ranges(comm, "id", table | {"id": table["id"].astype(np.int64)})
+    if comm.size > 1:
+        from hpcdem.io.slabs import by_ranges  # brings kernels, which a script that is read must not
+
+        for k, table in enumerate(balls):
+            if "id" in table:
+                balls[k] = by_ranges(comm, "id", table | {"id": table["id"].astype(np.int64)})
     error = None
     try:
         walls = _walls(raw.get("wall data", []))

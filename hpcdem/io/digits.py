@@ -17,8 +17,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-SCI, INT, FIXED, WORD = range(4)
-MAX_DIGITS = 15
+from hpcdem.io.layout import FIXED, INT, SCI
+
 _BLANK, _NEWLINE, _MINUS, _POINT, _ZERO, _E, _PLUS = 32, 10, 45, 46, 48, 101, 43
 
 

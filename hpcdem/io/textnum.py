@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.io import digits as kernels
-from hpcdem.io.digits import FIXED as FIXED
-from hpcdem.io.digits import INT as INT
-from hpcdem.io.digits import MAX_DIGITS
-from hpcdem.io.digits import SCI as SCI
-from hpcdem.io.digits import WORD as WORD
+from hpcdem.io.layout import FIXED as FIXED
+from hpcdem.io.layout import INT as INT
+from hpcdem.io.layout import MAX_DIGITS
+from hpcdem.io.layout import SCI as SCI
+from hpcdem.io.layout import WORD as WORD
 
 
 @dataclass(frozen=True)
@@ -82,6 +81,8 @@ class TextTable:
 
     def write_rows(self, first: int, count: int, out: np.ndarray) -> None:
         """Rows first : first + count as text into out (count * width,) u1."""
+        from hpcdem.io import digits as kernels  # after their cache is settled (runtime/kernels.py)
+
         step = max(1, _BLOCK // self.width)
         floats = np.empty((len(self._floats), min(step, count)))
         ints = np.empty((len(self._ints), min(step, count)), dtype=np.int64)

@@ -17,11 +17,11 @@ from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.post.meshes import draw
 from hpcdem.pre.mesh import geometry, structured
 from hpcdem.pre.mesh.cracks import follow
-from hpcdem.pre.mesh.fractures import FractureSet, Length, Orientation, network, of_curves
+from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
+from hpcdem.pre.mesh.fractures import network, of_curves
 from hpcdem.pre.mesh.quality import quality
 from hpcdem.pre.mesh.regions import polygon_of
-from hpcdem.pre.mesh.sizes import Refinement
-from hpcdem.pre.mesh.structured import spaced
+from hpcdem.pre.mesh.sizes import Refinement, spaced
 from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate
 
 

@@ -11,7 +11,7 @@ from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows, edge_rows
 from hpcdem.pre.mesh import structured
 from hpcdem.pre.mesh.cracks import edges_on, with_cracks
 from hpcdem.pre.mesh.geometry import polyline
-from hpcdem.pre.mesh.structured import spaced
+from hpcdem.pre.mesh.sizes import spaced
 
 
 def grid(nx: int, ny: int, kind: str = "quad", diagonal: str = "alternate") -> Mesh:

@@ -15,17 +15,8 @@ from scipy import stats
 
 from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import geometry
-from hpcdem.pre.mesh.fractures import (
-    Fractures,
-    FractureSet,
-    Length,
-    Orientation,
-    clipped,
-    crossings,
-    network,
-    of_curves,
-    poisson,
-)
+from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
+from hpcdem.pre.mesh.fractures import Fractures, clipped, crossings, network, of_curves, poisson
 from hpcdem.pre.mesh.regions import polygon_of
 
 CONFIDENCE = 3.29

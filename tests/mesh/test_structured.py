@@ -13,7 +13,8 @@ from hpcdem.pre.mesh import geometry, structured
 from hpcdem.pre.mesh.cracks import edges_on, follow, with_layer
 from hpcdem.pre.mesh.fractures import Fractures, of_curves
 from hpcdem.pre.mesh.quality import corner_angles, quality
-from hpcdem.pre.mesh.structured import DIAGONALS, equilateral, rectangle, spaced
+from hpcdem.pre.mesh.sizes import spaced
+from hpcdem.pre.mesh.structured import DIAGONALS, equilateral, rectangle
 
 
 @pytest.mark.parametrize("diagonal", DIAGONALS)

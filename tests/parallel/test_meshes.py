@@ -17,7 +17,8 @@ from mpi4py import MPI
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.halo.comm import MpiComm, SerialComm
 from hpcdem.pre.mesh import geometry, once
-from hpcdem.pre.mesh.fractures import FractureSet, Length, Orientation, network
+from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
+from hpcdem.pre.mesh.fractures import network
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
 from hpcdem.pre.mesh.triangulate import Region, Wishes, triangulate

@@ -138,6 +138,46 @@ def test_processes_know_what_to_compile(tmp_path, kinds):
     assert int(compiled) <= 6
 
 
+READ_PCDC = """
+from hpcdem.lang.pcdc import check, trial
+text = '''
+pcdc geometry create polyline (0,0) (1,1) as-layer 'line'
+pcdc geometry create polygon (0,0) (1,0) (1,1) as-layer 'polygon'
+pcdc geometry create rectangle (0,0) (1,1) as-layer 'rectangle'
+pcdc geometry create circle (0,0) 1 as-layer 'circle'
+pcdc geometry create arc (0,0) 1 0 90 as-layer 'arc'
+pcdc geometry create point (0,0) as-layer 'point'
+pcdc geometry create fractures orientation fixed 0 length fixed 1 p21 1 inside 'circle' seed 1 as-layer 'cracks'
+pcdc mesh structured (0,0) (2,1) cells 2 1
+pcdc mesh equilateral (0,0) (2,1) size 0.5
+pcdc bolt create polyline (0,0) (1,1) length 0.1
+pcdc table create 'times' values (0,0) (1,1)
+pcdc history create 'time' model value time
+pcdc chart export 'chart' 'chart.svg'
+pcdc output vtk 'frames'
+'''
+assert trial._TRIALS.keys() == {statement.command.name for statement in check.read(text, "script.sc").statements}
+"""
+READ_ZDEM = """
+from hpcdem.lang.zdem import execute, parser, plan
+script = parser.parse_text(b"LOAD io_zdem_2.2.dat\\nCYC 3\\nSTOP\\n", "script.py")
+execute.refuse_unexecuted(script.statements)
+assert plan.expected_steps(script.statements) == 3
+"""
+
+
+@pytest.mark.parametrize(
+    "program",
+    [READ_PCDC, READ_ZDEM, "from hpcdem import Simulation, couple, element_law\nimport hpcdem.cases"],
+    ids=["pcdc", "zdem", "python"],
+)
+def test_what_comes_before_the_kernels_does_not_bring_them(program):
+    """A script is read, a program imports: numba settles the folder of a kernel when its module is imported."""
+    command = [sys.executable, "-c", f"{program}\nimport sys\nassert 'numba' not in sys.modules"]
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 FACTORY = """
 import sys
 import numba

@@ -12,14 +12,13 @@ from hpcdem.commands.fdem.choices import everything
 from hpcdem.commands.fdem.histories import find
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve
+from hpcdem.commands.fdem.values import figure_name
 from hpcdem.core.errors import CommandError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import path as path_of
-
-FIGURES = (".png", ".pdf", ".svg")
 
 
 def create(project: Project, name: str, title: str = "", x_label: str = "", y_label: str = "") -> None:
@@ -77,12 +76,6 @@ def _profile(project: Project, name: str, where: Range | None) -> list[tuple[flo
 def _by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     """Values in ascending order of these numbers, in their order."""
     return values[np.argsort(np.argsort(numbers))]
-
-
-def figure_name(path: str) -> None:
-    """CommandError if figures are not written to files of this kind."""
-    if Path(path).suffix.lower() not in FIGURES:
-        raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
 
 
 def export(

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from hpcdem.commands.fdem.project import Project
+from hpcdem.commands.fdem.values import frames_name
 from hpcdem.core.errors import CommandError
 from hpcdem.io import vtkhdf_mesh
 from hpcdem.io.behind import Deliveries, under_way
@@ -29,18 +30,12 @@ from hpcdem.physics.flow.model import Flow
 
 def vtk(project: Project, name: str, every: int | None = None) -> None:
     """Write `<name>_<step>.vtkhdf` into the folder of the results: now, or every so many steps. Collective."""
-    file_name(name)
+    frames_name(name)
     if every is None:
         project.ready(use=False)
         _write(project, name)
     else:
         project.frames[name] = every
-
-
-def file_name(name: str) -> None:
-    """CommandError if it cannot be the first part of names of files."""
-    if "/" in name:
-        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
 
 
 def stop(project: Project, name: str) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.pre.mesh import dxf
 from hpcdem.pre.mesh import geometry as shapes
 from hpcdem.pre.mesh.once import made_once
+
+if TYPE_CHECKING:  # brings kernels, and shapes are made when a script is read
+    from hpcdem.commands.fdem.project import Project
 
 Vector = tuple[float, float]
 

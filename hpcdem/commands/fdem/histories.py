@@ -9,6 +9,7 @@ import numpy as np
 from hpcdem.commands.fdem.choices import chosen, everything, places
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
+from hpcdem.commands.fdem.values import history_name
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
@@ -37,7 +38,7 @@ def create(
     """Record a number every so many steps: of one object (by number, or the one nearest to a point [m]) or of those of
     a range or of all (how: sum, mean, minimum, maximum), of a well, by its name, or of the model. variable: with the
     value law_state, a state variable of laws of the user that elements have."""
-    file_name(name)
+    history_name(name)
     if name in project.histories:
         raise CommandError(f"there is a history '{name}' already")
     if value not in UNITS.get(kind, {}):
@@ -136,7 +137,7 @@ def _write(project: Project) -> None:
         new = history.rows[history.filed :]
         if not new:
             continue
-        path = project.folder() / f"history_{file_name(name)}.csv"
+        path = project.folder() / f"history_{history_name(name)}.csv"
         header = f"step,time [s],{history.value} [{history.unit}]"
         if not history.filed:  # a new model, or a restored one: the file holds what is in memory, no more
             append_rows(path, header, [_line(row) for row in history.rows], 0, project.comm)
@@ -147,13 +148,6 @@ def _write(project: Project) -> None:
 
 def _line(row: Sequence[float]) -> str:
     return ",".join(repr(number) for number in row)
-
-
-def file_name(name: str) -> str:
-    """A name that can be part of a file name. CommandError if it cannot."""
-    if any(char in '/\\:*?"<>|' for char in name) or len(name.encode()) > 200:
-        raise CommandError(f"'{name}' cannot be part of a file name; a history has a file of its name")
-    return name
 
 
 def export(project: Project, path: str, names: Sequence[str] = ()) -> None:

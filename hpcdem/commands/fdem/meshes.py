@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from hpcdem.commands.fdem import values
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes
@@ -79,15 +79,8 @@ def rectangle(
 ) -> None:
     """A regular mesh of the rectangle between two corners [m]; cells along x and y; ratio: each is so many times as
     large as the one before. Its sides are the layers left, right, bottom and top."""
-    _add(project, structured.rectangle(*grid_lines(first, second, cells, ratio), kind, diagonal, (set_name, group)))
-
-
-def grid_lines(
-    first: tuple[float, float], second: tuple[float, float], cells: tuple[int, int], ratio: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates along x and along y [m] of such a mesh."""
-    x, y = (structured.spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
-    return x, y
+    x, y = values.grid_lines(first, second, cells, ratio)
+    _add(project, structured.rectangle(x, y, kind, diagonal, (set_name, group)))
 
 
 def equilateral(
@@ -178,23 +171,6 @@ def tell_quality(project: Project) -> None:
         _say(project, line)
 
 
-def fracture_set(
-    orientation: tuple[str, float, float],
-    length: tuple[str, float, float, float, float | None],
-    density: tuple[str, float],
-    scanline: float,
-    ends_at: float,
-    reached: bool,
-) -> fractures.FractureSet:
-    """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
-    greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see pre.mesh.fractures."""
-    longest = math.inf if length[4] is None else length[4]
-    return fractures.FractureSet(
-        fractures.Orientation(*orientation), fractures.Length(*length[:4], longest), *density, scanline,
-        "reached" if reached else "random", ends_at,
-    )  # fmt: skip
-
-
 def fracture_network(
     project: Project,
     layer: str,
@@ -209,7 +185,7 @@ def fracture_network(
     reached: bool = False,
     least: float = 0.0,
 ) -> None:
-    """A set of fractures with given statistics (see `fracture_set`) inside of a layer becomes lines of another one;
+    """A set of fractures with given statistics (see `values.fracture_set`) inside of a layer becomes lines of another;
     least: shorter pieces at the rim are left out [m]. Collective."""
     outline = project.layers[inside]
     for hole in holes:
@@ -217,7 +193,7 @@ def fracture_network(
     size = max(curve.length() for curve in outline) / ARC_STEPS
     if size <= 0.0:
         raise CommandError(f"layer '{inside}' has no closed line")
-    one = fracture_set(orientation, length, density, scanline, ends_at, reached)
+    one = values.fracture_set(orientation, length, density, scanline, ends_at, reached)
     number, project.networks = project.networks, project.networks + 1
 
     def make() -> fractures.Fractures:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from hpcdem.commands.fdem import geometry, values
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc.kinds import FunctionName, Pending, TableName
 from hpcdem.lang.pcdc.table import (
@@ -140,23 +141,17 @@ def _shape(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 def _make_shape(command: str) -> Callable[[Mapping[str, Any]], None]:
     def make(arguments: Mapping[str, Any]) -> None:
-        from hpcdem.commands.fdem import geometry
-
         geometry.shape(command, *_shape(arguments).values())
 
     return make
 
 
 def _rectangle(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshes
-
-    meshes.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
+    values.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
 
 
 def _equilateral(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshes
-
-    meshes.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
+    values.grid_lines(arguments["first"], arguments["second"], (1, 1), (1.0, 1.0))
 
 
 def _table(arguments: Mapping[str, Any]) -> None:
@@ -164,21 +159,15 @@ def _table(arguments: Mapping[str, Any]) -> None:
 
 
 def _history(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import histories
-
-    histories.file_name(arguments["name"])
+    values.history_name(arguments["name"])
 
 
 def _export(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import charts
-
-    charts.figure_name(arguments["file"])
+    values.figure_name(arguments["file"])
 
 
 def _frames(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import frames
-
-    frames.file_name(arguments["file"])
+    values.frames_name(arguments["file"])
 
 
 def _bolt(arguments: Mapping[str, Any]) -> None:
@@ -186,13 +175,11 @@ def _bolt(arguments: Mapping[str, Any]) -> None:
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
-    from hpcdem.commands.fdem import meshes
-
-    meshes.fracture_set(**fracture_words(arguments)).check("fractures")
+    values.fracture_set(**fracture_words(arguments)).check("fractures")
 
 
 def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The statistics of `geometry create fractures` as `meshing.fracture_set` takes them."""
+    """The statistics of `geometry create fractures` as `values.fracture_set` takes them."""
     densities = [name for name in ("p10", "p20", "p21") if name in arguments]
     if len(densities) != 1:
         raise CommandError("fractures need one density: p10, p20 or p21")

@@ -1,4 +1,4 @@
-"""How long edges are to be, as a function of place: a base size, and smaller ones near layers."""
+"""How long edges are to be, as a function of place: a base size, and smaller ones near layers; or along a line."""
 
 from __future__ import annotations
 
@@ -116,3 +116,24 @@ def not_too_many(elements: float, what: str) -> None:
     """CommandError if so many elements are more than can be made; what: makes them, in words."""
     if not elements <= MOST_ELEMENTS:
         raise CommandError(f"{what} would make some {elements:.2g} elements, more than {MOST_ELEMENTS:.0g}")
+
+
+def spaced(start: float, end: float, n: int, ratio: float = 1.0) -> np.ndarray:
+    """(n + 1,) coordinates from start to end [m]; each of the n intervals is `ratio` times the one before."""
+    if not (math.isfinite(start) and math.isfinite(end) and end > start):
+        raise CommandError(f"a structured mesh needs an upper bound above the lower one, not {start:g} to {end:g}")
+    if n < 1:
+        raise CommandError(f"a structured mesh needs at least one element in each direction, not {n}")
+    if not (math.isfinite(ratio) and ratio > 0.0):
+        raise CommandError(f"the ratio of neighbouring elements must be positive, not {ratio:g}")
+    not_too_many(n, f"{n} intervals in one direction")
+    k = np.arange(n + 1)
+    if ratio == 1.0:
+        part = k / n
+    elif abs(n * math.log(ratio)) > 600.0:
+        raise CommandError(f"with the ratio {ratio:g}, {n} elements differ too much in size")
+    else:
+        part = np.expm1(k * math.log(ratio)) / math.expm1(n * math.log(ratio))
+    out = start + (end - start) * part
+    out[-1] = end
+    return out

@@ -97,7 +97,7 @@ def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     from hpcdem.physics.coupling.model import Coupled
     from hpcdem.physics.dem.simulation import Simulation
     from hpcdem.physics.fdem.simulation import Blocks
-    from hpcdem.pre.mesh import structured
+    from hpcdem.pre.mesh import sizes, structured
 
     width = 2.0 * RADIUS * across
     sim = Simulation(comm, threads)
@@ -111,7 +111,7 @@ def make(comm: Any, threads: int, across: int = ACROSS) -> Any:
     top = width - 1e-5
     blocks = Blocks(comm, threads)
     ends = (0.0, width, across - 1), (top, top + 20.0 * RADIUS, 10)
-    blocks.take_mesh(structured.rectangle(*(structured.spaced(*each) for each in ends), "tri"))
+    blocks.take_mesh(structured.rectangle(*(sizes.spaced(*each) for each in ends), "tri"))
     changes.element_model(blocks, None, "mech_iso_elastic", {**ROCK, "young": 1e9})
     blocks.joint_model(None, "classic_intrinsic_cohesive_interface", {**JOINT, "penalty_normal": 1e10})
     blocks.gravity(0.0, -9.81)

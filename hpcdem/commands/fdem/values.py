@@ -1,0 +1,62 @@
+"""What commands make of their values alone, without a model: also when a line is read (lang/pcdc/trial.py).
+
+Nothing here brings kernels: scripts are read before the cache of these is settled (runtime/kernels.py).
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
+from hpcdem.pre.mesh.sizes import spaced
+
+FIGURES = (".png", ".pdf", ".svg")
+
+
+def grid_lines(
+    first: tuple[float, float], second: tuple[float, float], cells: tuple[int, int], ratio: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates along x and along y [m] of a regular mesh between two corners [m], with so many cells along each;
+    ratio: see `spaced`."""
+    x, y = (spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
+    return x, y
+
+
+def fracture_set(
+    orientation: tuple[str, float, float],
+    length: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    scanline: float,
+    ends_at: float,
+    reached: bool,
+) -> FractureSet:
+    """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
+    greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see FractureSet."""
+    longest = math.inf if length[4] is None else length[4]
+    return FractureSet(
+        Orientation(*orientation), Length(*length[:4], longest), *density, scanline,
+        "reached" if reached else "random", ends_at,
+    )  # fmt: skip
+
+
+def history_name(name: str) -> str:
+    """A name that can be part of a file name. CommandError if it cannot."""
+    if any(char in '/\\:*?"<>|' for char in name) or len(name.encode()) > 200:
+        raise CommandError(f"'{name}' cannot be part of a file name; a history has a file of its name")
+    return name
+
+
+def frames_name(name: str) -> None:
+    """CommandError if it cannot be the first part of names of files."""
+    if "/" in name:
+        raise CommandError(f"'{name}' is the first part of the names of files, in the folder of the results: no folder")
+
+
+def figure_name(path: str) -> None:
+    """CommandError if figures are not written to files of this kind."""
+    if Path(path).suffix.lower() not in FIGURES:
+        raise CommandError(f"'{path}': a figure is a file *.png, *.pdf or *.svg")
