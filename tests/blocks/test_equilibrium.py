@@ -57,10 +57,10 @@ def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
     sim.initial_stress(None, xx=5e6, yy=-3e6, xy=2e6)
     sim.option(**QUIET, large_strain=large)
     sim.close_model()
-    nodes = equilibrium_._all_nodes(sim)
+    nodes = equilibrium_.all_nodes(sim)
     x = nodes.x + rng.uniform(-2e-5, 2e-5, nodes.x.shape)
-    unknowns = equilibrium_._unknowns(sim, nodes, 1)
-    equilibrium_._place_corners(sim, x)
+    unknowns = equilibrium_.unknowns_of(sim, nodes, 1)
+    equilibrium_.place_corners(sim, x)
     pieces, past = equilibrium_.tangent(sim)
     assert past == 0
     product = np.zeros((*nodes.x.shape, 3))
@@ -69,8 +69,8 @@ def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
         local = ways[one.node].reshape(*one.stiffness.shape[:2], 3)
         np.add.at(product, one.node, (one.stiffness @ local).reshape(*one.node.shape, 2, 3))
     for k in range(3):
-        ahead, _, _ = equilibrium_._unbalanced(sim, nodes, unknowns, x + 1e-8 * ways[:, :, k])
-        behind, _, _ = equilibrium_._unbalanced(sim, nodes, unknowns, x - 1e-8 * ways[:, :, k])
+        ahead, _, _ = equilibrium_.unbalanced(sim, nodes, unknowns, x + 1e-8 * ways[:, :, k])
+        behind, _, _ = equilibrium_.unbalanced(sim, nodes, unknowns, x - 1e-8 * ways[:, :, k])
         slope = (behind - ahead) / 2e-8
         # Joints: the turn of the mid-line, of the order of stress over stiffness, is left out in both cases.
         assert np.abs(product[:, :, k] - slope).max() < max(within, 1e-3) * np.abs(slope).max()
@@ -79,15 +79,15 @@ def test_the_matrix_is_the_derivative_of_the_forces(kind, large, within):
         plain.initial_stress(None, xx=5e6, yy=-3e6, xy=2e6)
         plain.option(**QUIET, large_strain=False)
         plain.close_model()
-        nodes = equilibrium_._all_nodes(plain)
-        unknowns, (pieces, _) = equilibrium_._unknowns(plain, nodes, 1), equilibrium_.tangent(plain)
+        nodes = equilibrium_.all_nodes(plain)
+        unknowns, (pieces, _) = equilibrium_.unknowns_of(plain, nodes, 1), equilibrium_.tangent(plain)
         way = rng.uniform(-1.0, 1.0, nodes.x.shape)
         product = np.zeros(nodes.x.shape)
         for one in pieces:
             local = way[one.node].reshape(*one.stiffness.shape[:2], 1)
             np.add.at(product, one.node, (one.stiffness @ local).reshape(*one.node.shape, 2))
-        ahead, _, _ = equilibrium_._unbalanced(plain, nodes, unknowns, nodes.x + 1e-4 * way)
-        behind, _, _ = equilibrium_._unbalanced(plain, nodes, unknowns, nodes.x - 1e-4 * way)
+        ahead, _, _ = equilibrium_.unbalanced(plain, nodes, unknowns, nodes.x + 1e-4 * way)
+        behind, _, _ = equilibrium_.unbalanced(plain, nodes, unknowns, nodes.x - 1e-4 * way)
         assert np.abs(product - (behind - ahead) / 2e-4).max() < 1e-10 * np.abs(product).max()
 
 
@@ -100,11 +100,11 @@ def test_the_matrix_of_a_joint_is_the_derivative_of_its_law(opening, slip):
     jointed(sim, penalty_overlay=900e9, penalty_shear=300e9)
     sim.option(**QUIET)
     sim.close_model()
-    nodes = equilibrium_._all_nodes(sim)
-    unknowns = equilibrium_._unknowns(sim, nodes, 1)
+    nodes = equilibrium_.all_nodes(sim)
+    unknowns = equilibrium_.unknowns_of(sim, nodes, 1)
     right = nodes.lead // 4 == 1
     x = nodes.x + right[:, None] * np.array([opening, slip])
-    equilibrium_._place_corners(sim, x)
+    equilibrium_.place_corners(sim, x)
     (_, _, joint), past = equilibrium_.tangent(sim)
     assert past == 0
     k = np.zeros((16, 16))
@@ -113,7 +113,7 @@ def test_the_matrix_of_a_joint_is_the_derivative_of_its_law(opening, slip):
     for axis in range(2):
         way = np.zeros(nodes.x.shape)
         way[right, axis] = 1.0
-        forces = [equilibrium_._unbalanced(sim, nodes, unknowns, x + sign * 1e-9 * way)[0] for sign in (1.0, -1.0)]
+        forces = [equilibrium_.unbalanced(sim, nodes, unknowns, x + sign * 1e-9 * way)[0] for sign in (1.0, -1.0)]
         slope = (forces[1] - forces[0]) / 2e-9
         assert np.abs(k @ way.reshape(-1) - slope.reshape(-1)).max() < 1e-4 * np.abs(k).max()
 
