@@ -59,7 +59,7 @@ def test_tiny_bed_on_one_and_two_ranks(cache, tmp_path):
     done = run(
         command(
             "--unit", str(TINY), "--workload", "push-12k", "--layout", "1x1", "--layout", "2x1", "--repeats", "1",
-            "--seconds", "0.001", "--json", "lines.json",
+            "--seconds", "0.2", "--json", "lines.json",
         ),
         tmp_path, env=cache,
     )  # fmt: skip
