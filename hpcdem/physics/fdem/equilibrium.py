@@ -394,7 +394,7 @@ def at_rest(sim: Blocks, nodes: Nodes) -> Iterator[None]:
         yield
     finally:
         place_corners(sim, nodes.x)
-        if sim.local is local:  # else storage was made anew
+        if sim.local is local:  # else rows have other places now
             sim.v[:] = v
             local.relaxing_corner = relaxations
 

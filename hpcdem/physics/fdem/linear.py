@@ -7,6 +7,7 @@ order of their numbers and factorises there (SciPy's SuperLU): what comes out ha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,6 +108,14 @@ class Unknowns:
         )
 
 
+def _on_first(comm: Any, pieces: list[Pieces], take: Callable[[list[Pieces]], str | None]) -> None:
+    """Rank 0 takes all pieces, in the order of their numbers. CommandError on all ranks with what it says is wrong."""
+    parts = comm.gather(pieces) if comm.size > 1 else [pieces]
+    error = take([Pieces.joined(list(of)) for of in zip(*parts)]) if comm.rank == 0 else None
+    if (error := comm.bcast(error)) is not None:
+        raise CommandError(error)
+
+
 class Direct:
     """Factors on rank 0, by SciPy. flows: of a matrix with plastic flow, which need not be nearly symmetric: rows are
     exchanged where the diagonal is small."""
@@ -121,12 +130,7 @@ class Direct:
 
     def factor(self, pieces: list[Pieces]) -> None:
         """Take the pieces of this rank. CommandError if the matrix is singular. Collective."""
-        parts = self.comm.gather(pieces) if self.comm.size > 1 else [pieces]
-        error = None
-        if self.comm.rank == 0:
-            error = self._factor([Pieces.joined(list(of)) for of in zip(*parts)])
-        if (error := self.comm.bcast(error)) is not None:
-            raise CommandError(error)
+        _on_first(self.comm, pieces, self._factor)
 
     def _factor(self, pieces: list[Pieces]) -> str | None:
         from scipy.sparse import coo_matrix
@@ -199,12 +203,7 @@ class Condensed:
 
     def eliminate(self, elements: list[Pieces]) -> None:
         """Take the stiffness of this rank's elements. CommandError if it is singular. Collective."""
-        parts = self.comm.gather(elements) if self.comm.size > 1 else [elements]
-        error = None
-        if self.comm.rank == 0:
-            error = self._eliminate([Pieces.joined(list(of)) for of in zip(*parts)])
-        if (error := self.comm.bcast(error)) is not None:
-            raise CommandError(error)
+        _on_first(self.comm, elements, self._eliminate)
         self._ready = True
 
     def _eliminate(self, pieces: list[Pieces]) -> str | None:
@@ -231,12 +230,7 @@ class Condensed:
 
     def factor(self, pieces: list[Pieces]) -> None:
         """Take the pieces of this rank's joints and fluid. CommandError if the matrix is singular. Collective."""
-        parts = self.comm.gather(pieces) if self.comm.size > 1 else [pieces]
-        error = None
-        if self.comm.rank == 0:
-            error = self._factor([Pieces.joined(list(of)) for of in zip(*parts)])
-        if (error := self.comm.bcast(error)) is not None:
-            raise CommandError(error)
+        _on_first(self.comm, pieces, self._factor)
 
     def _factor(self, pieces: list[Pieces]) -> str | None:
         from scipy.linalg import lu_factor
