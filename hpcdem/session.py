@@ -8,13 +8,14 @@ also sees to it that an error on one rank ends all of them, with its message and
 from __future__ import annotations
 
 import atexit
+import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
 from hpcdem.physics.particle_physics import PHYSICS
@@ -84,16 +85,17 @@ class Session:
         run_folder.claim(outdir, self.comm, self.job)
         log = None if quiet else self.log
         blocks = Blocks(self.comm, self.threads, outdir, log, self.stop, balance_on=self.balance)
+        blocks.prepare_kernels = self.prepare
         project = Project(blocks, self.directory, outdir)
         project.job, project.keep = self.job, self.keep
         self.projects.append(project)
         return project
 
     def prepare(self, kind: str) -> None:
-        """Collective: wait for the kernels of a kind, see `warm_up`, once."""
+        """Collective: wait for the kernels of a kind, see KINDS, once."""
         if kind not in self.ready:
             with self._counted():
-                prepare(self.comm, self.log, kind, self.threads)
+                prepare(self.comm, self.log, [kind], self.threads)
             self.ready.add(kind)
             if kind in ("", "blocks"):
                 self.stop.install(self.comm.rank)
@@ -174,29 +176,63 @@ class Session:
             run_folder.leave(Path(sim.outdir), self.comm, state, sim.clock.step)
 
 
-def prepare(comm: SerialComm, log: Log, kind: str, *threads: int) -> Path:
-    """Collective: load the kernels of a kind (see `warm_up`), and before them those that all share, or compile them,
-    for each number of threads; particles and blocks come before "coupled". Returns their cache folder."""
+def prepare(comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int) -> Path:
+    """Collective: load the kernels of kinds, see KINDS, with those that they need and those that all share, or compile
+    them, for each number of threads. Returns the last cache folder."""
     from hpcdem.runtime.kernels import prepare_kernels
 
-    kinds = dict.fromkeys(("shared", kind))
-    return prepare_kernels(comm, log, {name: partial(warm_up, name, *threads) for name in kinds})
+    needed = dict.fromkeys(["shared"])
+    for kind in kinds:
+        needed |= dict.fromkeys([*(KINDS[kind].after if kind in KINDS else ()), kind])
+    return prepare_kernels(comm, log, {name: partial(warm_up, name, *threads) for name in needed})
+
+
+class Kernels(NamedTuple):
+    """Kernels that are loaded together, from a folder of their own. warm_up: the module whose function calls each of
+    them once, and the function if it is not `warm_up`; after: kinds that this function needs too; modules: those whose
+    kernels these are, though they may have been imported before, with others."""
+
+    warm_up: str
+    after: tuple[str, ...] = ()
+    modules: tuple[str, ...] = ()
+
+
+_FDEM = "hpcdem.physics.fdem"
+KINDS = {
+    "shared": Kernels("hpcdem.runtime.warm_up"),
+    "": Kernels("hpcdem.commands.dem.warm_up"),
+    "blocks": Kernels("hpcdem.commands.fdem.warm_up"),
+    "coupled": Kernels("hpcdem.physics.coupling.warm_up"),
+    "bolts": Kernels("hpcdem.physics.bolts.warm_up", modules=("hpcdem.physics.bolts.kernels",)),
+    "liners": Kernels("hpcdem.physics.liners.warm_up", modules=("hpcdem.physics.liners.kernels",)),
+    "flow": Kernels("hpcdem.physics.flow.warm_up", modules=("hpcdem.physics.flow.kernels",)),
+    "yielding": Kernels(
+        f"{_FDEM}.warm_up:yielding", modules=(f"{_FDEM}.kernels.plasticity", f"{_FDEM}.kernels.plastic_quads")
+    ),
+    "creep": Kernels(f"{_FDEM}.warm_up:creeping", modules=(f"{_FDEM}.kernels.creep",)),
+    "tangent": Kernels(f"{_FDEM}.warm_up:tangent", modules=(f"{_FDEM}.kernels.stiffness",)),
+    "plastic-tangent": Kernels(
+        f"{_FDEM}.warm_up:plastic_tangent", ("yielding", "tangent"), (f"{_FDEM}.kernels.plastic_stiffness",)
+    ),
+}
+"""Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
+others are loaded, or compiled, by the first model that needs them."""
+OF_BLOCKS = ("bolts", "liners", "flow", "yielding", "creep", "tangent", "plastic-tangent")
+"""Those that come when a model of blocks asks for them."""
 
 
 def warm_up(kind: str, *threads: int) -> None:
-    """Call every kernel of a kind once for each number of threads: "" of particles, "blocks", "coupled" what both need
-    besides, "shared" by all, or the name of a physics. Imports them: the cache must be settled before."""
+    """Call every kernel of a kind once for each number of threads: one of KINDS, or the name of a physics of particles.
+    Imports them: the cache must be settled before."""
+    from hpcdem.runtime.kernels import keep_here
+
     call: Callable[[int], None]
-    if kind == "shared":
-        from hpcdem.runtime.warm_up import warm_up as call
-    elif kind == "blocks":
-        from hpcdem.commands.fdem.warm_up import warm_up as call
-    elif kind == "coupled":
-        from hpcdem.physics.coupling.warm_up import warm_up as call
-    elif kind in PHYSICS:
+    if kind in PHYSICS:
         call = PHYSICS[kind]().warm_up
     else:
-        from hpcdem.commands.dem.warm_up import warm_up as call
+        module, _, name = KINDS[kind].warm_up.partition(":")
+        keep_here(KINDS[kind].modules)
+        call = getattr(importlib.import_module(module), name or "warm_up")
     for n in threads:
         call(n)
 

@@ -20,7 +20,7 @@ from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.errors import EXIT_OK
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
-from hpcdem.session import Session, greet, prepare
+from hpcdem.session import OF_BLOCKS, Session, greet, prepare
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -35,10 +35,11 @@ STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 """`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
 
 
-KERNELS = {"particles": ("",), "blocks": ("blocks",), "coupled": ("", "blocks", "coupled")} | {
+_BLOCKS = ("blocks", *OF_BLOCKS)
+KERNELS = {"particles": ("",), "blocks": _BLOCKS, "coupled": ("", *_BLOCKS, "coupled")} | {
     name: ("", name) for name in PHYSICS
 }
-"""Kinds of kernels (`session.warm_up`) in the order in which runs load them."""
+"""Kinds of kernels (`session.KINDS`) in the order in which runs load them."""
 
 
 @click.command(context_settings=HELP)
@@ -114,8 +115,7 @@ def run_warmup(words: list[str]) -> NoReturn:
         from hpcdem.runtime.kernels import warmup as compile_all
         from hpcdem.runtime.progress import Log
 
-        for one in KERNELS[kind]:
-            compile_all(Log(), partial(prepare, SerialComm(), Log(), one, *{1, threads}))
+        compile_all(Log(), partial(prepare, SerialComm(), Log(), KERNELS[kind], *{1, threads}))
     sys.exit(EXIT_OK)
 
 

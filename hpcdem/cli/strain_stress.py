@@ -65,4 +65,4 @@ def load_kernels(comm: SerialComm) -> None:
     from hpcdem.runtime.progress import Log
     from hpcdem.session import prepare
 
-    prepare(comm, Log(1), "shared", 1)  # of which nobody need hear
+    prepare(comm, Log(1), ["shared"], 1)  # of which nobody need hear

@@ -44,19 +44,21 @@ def global_order(cell: np.ndarray, gid: np.ndarray) -> np.ndarray:
         order = _count_out(cell, left, bottom, rows, number)
     else:
         order = np.argsort(cell, kind="stable")
-    _sort_ids(order, cell, gid)
+    if _sort_ids(order, cell, gid):
+        order = order[np.lexsort((gid[order], cell[order]))]
     return order
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _extent(cell):
     """First and last column, first and last row."""
-    left, right = column(cell.min()), column(cell.max())
+    first = last = cell[0]
     bottom = top = row(cell[0])
     for key in cell:
+        first, last = min(first, key), max(last, key)
         at = row(key)
         bottom, top = min(bottom, at), max(top, at)
-    return left, right, bottom, top
+    return column(first), column(last), bottom, top
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -79,8 +81,9 @@ def _count_out(cell, left, bottom, rows, number):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _sort_ids(order, cell, gid):
-    """Put those of one cell in the order of their ids. Nearly always they are."""
+    """Put those of one cell in the order of their ids. Nearly always they are. Returns whether a crowd is left over."""
     n = len(order)
+    crowded = False
     k = 1
     while k < n:
         i = order[k]
@@ -94,8 +97,7 @@ def _sort_ids(order, cell, gid):
         while end < n and cell[order[end]] == cell[i]:
             end += 1
         if end - begin > CROWD:
-            crowd = order[begin:end].copy()
-            order[begin:end] = crowd[np.argsort(gid[crowd])]
+            crowded = True
         else:
             for m in range(k, end):
                 moving = order[m]
@@ -105,6 +107,7 @@ def _sort_ids(order, cell, gid):
                     at -= 1
                 order[at] = moving
         k = end
+    return crowded
 
 
 def strays(cell: np.ndarray, borders: np.ndarray, rank: int) -> np.ndarray:

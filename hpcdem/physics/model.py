@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ class Model:
         self.balance_on = balance_on
         self.timers = Timers()
         self.halo: Any = None
+        self.prepare_kernels: Callable[[str], object] = lambda kind: None
+        """Collective: loads or compiles those of a kind, see `session.KINDS`."""
 
     def restart(self) -> None:
         """Back to step 0, with the first ownership."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import math
 import os
 import pickle
@@ -35,7 +36,10 @@ BUILDING = ".building-"
 UNUSED_DAYS = 60
 
 
-KERNELS = {"shared": 31, "": 126, "blocks": 294, "coupled": 17}
+KERNELS = {
+    "shared": 31, "": 126, "blocks": 195, "coupled": 17, "bolts": 8, "liners": 11, "flow": 10, "yielding": 38,
+    "creep": 11, "tangent": 10, "plastic-tangent": 6,
+}  # fmt: skip
 """About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
 """Between two lines on how far compiling has come."""
@@ -43,7 +47,7 @@ PROCESSES = 8
 """At most so many compile at the same time: the kernel that takes longest takes a fifth of the time of all."""
 MEMORY = 700e6
 """Of one of them, at most [bytes]."""
-FEW = 40
+FEW = 20
 """So many kernels are compiled in less time than it takes to start processes for them."""
 
 
@@ -197,6 +201,18 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
         numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
         _only_read.update((building, folder))  # the kernels of this process still have it under its first name
     return True
+
+
+def keep_here(modules: Sequence[str]) -> None:
+    """Kernels of these modules belong to the folder that is set now, even if they were imported with others before."""
+    from numba.core.caching import FunctionCache
+    from numba.core.dispatcher import Dispatcher
+
+    for name in modules:
+        for thing in vars(importlib.import_module(name)).values():
+            if isinstance(thing, Dispatcher) and thing.py_func.__module__ == name:
+                if isinstance(thing._cache, FunctionCache):  # type: ignore[attr-defined]
+                    thing.enable_caching()  # type: ignore[attr-defined]
 
 
 late: list[str] = []

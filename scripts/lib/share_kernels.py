@@ -17,6 +17,7 @@ from pathlib import Path
 from numba.core.caching import _CacheLocator
 
 import hpcdem
+from hpcdem.session import KINDS
 
 FOLDER = """
 from hpcdem.runtime import kernels, launch
@@ -34,8 +35,8 @@ def folder(threads: int) -> Path:
 def main() -> None:
     """Copy what is there."""
     compiled, single = folder(2), folder(1)
-    for kind in ("-shared", "", "-blocks", "-coupled"):
-        source, target = (f.with_name(f.name + kind) for f in (compiled, single))
+    for kind in KINDS:
+        source, target = (f.with_name(f"{f.name}-{kind}" if kind else f.name) for f in (compiled, single))
         for package in {path.parent for path in Path(hpcdem.__file__).parent.rglob("*.py")}:
             of_package = source / _CacheLocator.get_suitable_cache_subpath(str(package / "any.py"))
             if of_package.is_dir():

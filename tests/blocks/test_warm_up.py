@@ -14,7 +14,7 @@ from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, 
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem import build, histories, pairs
 from hpcdem.physics.fdem import creep as clock
-from hpcdem.physics.fdem.warm_up import warm_up
+from hpcdem.physics.fdem import warm_up
 from hpcdem.physics.fdem import connectivity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.kernels import contact, creep, detect, elements, energy
@@ -28,7 +28,8 @@ def compiled():
     found = ((m.__name__, name, f) for m in modules for name, f in vars(m).items())
     return {(module, name): len(f.signatures) for module, name, f in found if hasattr(f, "signatures")}
 
-warm_up(1)
+for one in (warm_up.warm_up, warm_up.yielding, warm_up.creeping, warm_up.tangent, warm_up.plastic_tangent):
+    one(1)
 before = compiled()
 for kind in ("cross", "quad", "mixed"):
     sim = model(rectangle(4, 4, 1.0, 1.0, kind=kind))

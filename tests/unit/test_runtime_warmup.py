@@ -18,6 +18,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import compilers
 from hpcdem.runtime import kernels as kernels_
 from hpcdem.runtime.progress import Log
+from hpcdem.session import OF_BLOCKS
 
 KERNELS = """
 import numba
@@ -125,6 +126,7 @@ print(kernels.late, len(list(folder.rglob("*.nbc"))), sum(one.is_end for _, one 
         pytest.param(("shared", ""), marks=pytest.mark.slow),
         pytest.param(("shared", "blocks"), marks=pytest.mark.slow),
         pytest.param(("shared", "", "blocks", "coupled"), marks=pytest.mark.slow),
+        pytest.param(("shared", "blocks", *OF_BLOCKS), marks=pytest.mark.slow),
     ],
 )
 def test_processes_know_what_to_compile(tmp_path, kinds):

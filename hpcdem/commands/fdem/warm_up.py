@@ -8,21 +8,15 @@ from hpcdem.commands.fdem import assignments, frames, meshes, settings, steps
 from hpcdem.commands.fdem.project import Project
 from hpcdem.decomp import strips
 from hpcdem.halo.comm import SerialComm
-from hpcdem.physics.bolts import warm_up as bolts
 from hpcdem.physics.fdem import saved_state
 from hpcdem.physics.fdem import warm_up as physics
 from hpcdem.physics.fdem.groups import OnLayer
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.flow import warm_up as flow
-from hpcdem.physics.liners import warm_up as liners
 
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
     physics.warm_up(threads)
-    bolts.warm_up(threads)
-    flow.warm_up(threads)
-    liners.warm_up(threads)
     project = Project(Blocks(SerialComm(), threads))
     project.cracks_filed = 0  # no file is begun for them
     meshes.rectangle(project, (0.0, 0.0), (2.0, 1.0), (2, 1))

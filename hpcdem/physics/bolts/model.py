@@ -80,6 +80,7 @@ class Bolts(Structure):
     other."""
 
     name: ClassVar[str] = "bolts"
+    kernel_kind: ClassVar[str] = "bolts"
     word: ClassVar[str] = "bolt"
     parts: ClassVar[tuple[str, str]] = (BOLT_ELEMENT, BOLT_NODE)
     quantities = QUANTITIES

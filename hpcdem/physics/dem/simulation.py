@@ -122,7 +122,6 @@ class Simulation(Model):
         self.keep = 0  # numbered checkpoints that are kept, 0: all
         self.watchers: list[Watcher] = []
         self.number = 0  # of the simulations of a program, in the order in which they were made
-        self.prepare_kernels: Callable[[str], object] = lambda kind: None  # compiles those of added physics
         self.coupled = False  # to blocks, which step them both (physics/coupling)
         self.resume_advice = "--resume"
         self.draws = False

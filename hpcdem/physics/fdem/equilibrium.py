@@ -704,7 +704,7 @@ def tangent(
     sim: Blocks, matrices: bool = True, flows: bool = True, softening: bool = False
 ) -> tuple[list[Pieces], int]:
     """Stiffness of the owned elements and joints at the present positions, and how many joints are behind their peak,
-    see `of_joints`. flows: less what the flow of elements takes from it."""
+    see `of_joints`. flows: less what the flow of elements takes from it. Collective, as its parts are."""
     joints, past = of_joints(sim, softening)
     return ([*of_elements(sim, flows), joints] if matrices else []), past
 
@@ -712,6 +712,7 @@ def tangent(
 def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
     """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
     that pass it now."""
+    sim.prepare_kernels("tangent")
     local, cells = sim.local, sim.the_mesh().cells
     slots = _lower_slots(sim)
     joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
@@ -739,6 +740,7 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
 
 def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     """Stiffness of the owned triangles and quads at the present positions. flows: less what flow takes from it."""
+    sim.prepare_kernels("tangent")
     local, small, number = sim.local, not sim.options.large_strain, sim.number
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
     triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
@@ -751,6 +753,7 @@ def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     stiffness.triangles(rows, sim.x, c, s0, small, triangles)
     stiffness.quads(quad_rows, sim.x, local.q, quad_s0, small, quads)
     if local.yields and flows:
+        sim.prepare_kernels("plastic-tangent")
         table = local.yield_table
         plastic_stiffness.triangles(rows, sim.x, local.c, local.s0, local.law, table, small, triangles)
         plastic_stiffness.quads(quad_rows, sim.x, local.q, local.quad_s0, local.quad_law, table, small, quads)

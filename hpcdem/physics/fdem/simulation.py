@@ -497,6 +497,12 @@ class Blocks(State):
             self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
         if "creep" not in self.cold and creeps:
             self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
+        for kind, needed in (("yielding", "plastic" in self.cold), ("creep", "creep" in self.cold)):
+            if needed:
+                self.prepare_kernels(kind)
+        for load in self.surface_loads:
+            if load.kernel_kind:
+                self.prepare_kernels(load.kernel_kind)
         user_laws.begin(self)
         with self.timers("neighbour"):
             if self._topology_stale:

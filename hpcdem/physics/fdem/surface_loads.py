@@ -24,6 +24,8 @@ class SurfaceLoad(ABC):
     of_mesh: ClassVar[bool] = False
     stays: ClassVar[bool] = False
     """Its forces stay as they are while the static solve looks for equilibrium."""
+    kernel_kind: ClassVar[str] = ""
+    """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
 
     @abstractmethod
     def corners(self, blocks: Any) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""A tiny run of blocks that calls every kernel once, so that they are compiled before anyone waits for them."""
+"""Tiny runs of blocks that call every kernel once, so that they are compiled before anyone waits for them: one for what
+each model needs, one for each kind that only some do."""
 
 from __future__ import annotations
 
@@ -17,31 +18,11 @@ JOINT = {
 
 
 def warm_up(threads: int = 1) -> None:
-    """Call the kernels of a run with this many threads per rank. Writes nothing."""
-    points = [(x, y) for x in (0.0, 1.0, 2.0, 3.0) for y in (0.0, 1.0)] + [(0.5, 0.999), (1.5, 0.999), (1.0, 2.0)]
-    quads = [[0, 2, 3, 1], [2, 4, 5, 3]]
-    triangles = [[4, 6, 7, -1], [4, 7, 5, -1], [8, 9, 10, -1]]
-    for cells in (quads + triangles, triangles):
-        used, numbers = np.unique(np.array(cells)[np.array(cells) >= 0], return_inverse=True)
-        again = np.array(cells)
-        again[again >= 0] = numbers
-        mesh = Mesh.of(np.array(points)[used], again)
+    """Call the kernels of all runs with this many threads per rank. Writes nothing."""
+    for mesh in _meshes():
         _rest(mesh, threads)
-        _flow(mesh, threads)
-        _creep(mesh, threads)
-        sim = Blocks(SerialComm(), threads)
-        sim.take_mesh(mesh)
-        sim.option(overlap="keep")
-        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
-        sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
-        sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10, "damping_t": 1e8})
-        sim.face_property([0], {"friction": 1.0})
-        sim.velocity_condition([0], vx=0.0, vy=0.0)
-        sim.stress_condition([0], normal=-1.0, quiet=True)
-        diagnostics.account_energy(sim)
-        changes.set_velocity(sim, [len(used) - 1], 0.0, -1e-3)
+        sim = _jointed(mesh, threads)
         sim.close_model()
-        equilibrium.tangent(sim, softening=True)
         connectivity.bodies(sim.partner)
         convergence.advance(sim, 3)
         diagnostics.energies(sim)
@@ -55,15 +36,68 @@ def warm_up(threads: int = 1) -> None:
         diagnostics.contacts(sim)
         diagnostics.account_energy(sim, False)
         sim.option(dynamic=False)
-        changes.null(sim, [len(cells) - 2], relax=2)
+        changes.null(sim, [len(mesh.cells) - 2], relax=2)
         convergence.advance(sim, 2)
         sim.time_step(mass_scaling=1e-3)
         sim.option(dynamic=True)
         sim.step()
 
 
-def _flow(mesh: Mesh, threads: int) -> None:
-    """Elements of which some yield."""
+def tangent(threads: int = 1) -> None:
+    """Those of the static solve."""
+    for mesh in _meshes():
+        sim = _jointed(mesh, threads)
+        sim.close_model()
+        equilibrium.tangent(sim, softening=True)
+
+
+def yielding(threads: int = 1) -> None:
+    """Those of elements that yield."""
+    for mesh in _meshes():
+        sim = _weak(mesh, threads)
+        convergence.advance(sim, 2)
+        diagnostics.energies(sim)
+        sim.local.flow(sim.local.plastic_state(), 1)
+
+
+def plastic_tangent(threads: int = 1) -> None:
+    """Those of their static solve."""
+    for mesh in _meshes():
+        equilibrium.tangent(_weak(mesh, threads))
+
+
+def _meshes() -> list[Mesh]:
+    """Quads beside triangles, and triangles alone."""
+    points = [(x, y) for x in (0.0, 1.0, 2.0, 3.0) for y in (0.0, 1.0)] + [(0.5, 0.999), (1.5, 0.999), (1.0, 2.0)]
+    quads = [[0, 2, 3, 1], [2, 4, 5, 3]]
+    triangles = [[4, 6, 7, -1], [4, 7, 5, -1], [8, 9, 10, -1]]
+    found = []
+    for cells in (quads + triangles, triangles):
+        used, numbers = np.unique(np.array(cells)[np.array(cells) >= 0], return_inverse=True)
+        again = np.array(cells)
+        again[again >= 0] = numbers
+        found.append(Mesh.of(np.array(points)[used], again))
+    return found
+
+
+def _jointed(mesh: Mesh, threads: int) -> Blocks:
+    """With joints, contact, conditions and accounts; not closed."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    sim.option(overlap="keep")
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+    sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e10, "damping_t": 1e8})
+    sim.face_property([0], {"friction": 1.0})
+    sim.velocity_condition([0], vx=0.0, vy=0.0)
+    sim.stress_condition([0], normal=-1.0, quiet=True)
+    diagnostics.account_energy(sim)
+    changes.set_velocity(sim, [len(mesh.points) - 1], 0.0, -1e-3)
+    return sim
+
+
+def _weak(mesh: Mesh, threads: int) -> Blocks:
+    """Elements of which some yield; closed."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
     sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
@@ -72,14 +106,18 @@ def _flow(mesh: Mesh, threads: int) -> None:
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
     sim.close_model()
-    equilibrium.tangent(sim)
     diagnostics.account_energy(sim)
-    convergence.advance(sim, 2)
-    diagnostics.energies(sim)
+    return sim
+
+
+def creeping(threads: int = 1) -> None:
+    """Those of elements that creep: triangles in motion, then in a static creep step."""
+    for mesh in _meshes():
+        _creep(mesh, threads)
 
 
 def _creep(mesh: Mesh, threads: int) -> None:
-    """Triangles that creep in motion, then in a static creep step, and the tangent in it."""
+    """Some of them beside elastic ones."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
@@ -96,7 +134,7 @@ def _creep(mesh: Mesh, threads: int) -> None:
     sim.option(dynamic=False)
     creep.switch(sim, True, dt=1.0)
     creep.begin(sim, 1.0)
-    equilibrium.tangent(sim)
+    sim.local.linear()
     sim.step()
     creep.finish(sim, 1.0)
 

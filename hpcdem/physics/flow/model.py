@@ -82,6 +82,7 @@ class Flow(SurfaceLoad):
     """
 
     name: ClassVar[str] = "fluid"
+    kernel_kind: ClassVar[str] = "flow"
     of_mesh: ClassVar[bool] = True
     stays: ClassVar[bool] = True
 

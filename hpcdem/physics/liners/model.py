@@ -94,6 +94,7 @@ class Liners(Structure):
     """All liners of a model of blocks, see `Structure`: an element for each free face of the rock they are on."""
 
     name: ClassVar[str] = "liners"
+    kernel_kind: ClassVar[str] = "liners"
     word: ClassVar[str] = "liner"
     parts: ClassVar[tuple[str, str]] = (LINER_ELEMENT, LINER_NODE)
     quantities = QUANTITIES
