@@ -429,20 +429,25 @@ def _edges(n, dt, lanes):
     _edge_b2(n, dt, lanes)
 
 
+_A_SIDE, _B_SIDE = np.int64(0), np.int64(1)
+_FIRST, _SECOND, _THIRD = np.int64(0), np.int64(1), np.int64(2)
+"""Not literals, for each of which numba would compile `_damp` once more."""
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _damped_edges(n, slots, dampers, largest, dt, lanes):
     """The same with normal damping."""
-    _damp(n, 0, 0, slots, dampers, largest, lanes)
+    _damp(n, _A_SIDE, _FIRST, slots, dampers, largest, lanes)
     _edge_a0(n, dt, lanes)
-    _damp(n, 0, 1, slots, dampers, largest, lanes)
+    _damp(n, _A_SIDE, _SECOND, slots, dampers, largest, lanes)
     _edge_a1(n, dt, lanes)
-    _damp(n, 0, 2, slots, dampers, largest, lanes)
+    _damp(n, _A_SIDE, _THIRD, slots, dampers, largest, lanes)
     _edge_a2(n, dt, lanes)
-    _damp(n, 1, 0, slots, dampers, largest, lanes)
+    _damp(n, _B_SIDE, _FIRST, slots, dampers, largest, lanes)
     _edge_b0(n, dt, lanes)
-    _damp(n, 1, 1, slots, dampers, largest, lanes)
+    _damp(n, _B_SIDE, _SECOND, slots, dampers, largest, lanes)
     _edge_b1(n, dt, lanes)
-    _damp(n, 1, 2, slots, dampers, largest, lanes)
+    _damp(n, _B_SIDE, _THIRD, slots, dampers, largest, lanes)
     _edge_b2(n, dt, lanes)
 
 
