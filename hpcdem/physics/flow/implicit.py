@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 LEAST_PRESSURE = 1e4
 """p0 is at least this [Pa]."""
+ROUNDING = 1e-8
+"""Part of the fluid of a node that counts as flowing: where nothing flows any more the rest is rounding."""
 
 
 @dataclass
@@ -174,7 +176,7 @@ class Fluid:
         dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
         held = step.known | out | dry
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
-        sizes = np.abs(stored) + passing + gone + np.abs(rate)
+        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
         return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------
