@@ -158,9 +158,9 @@ class Fluid:
         q, lost = np.empty(self.m), np.zeros(self.m)
         since = self.flow.since[self.channels]
         leaks = bool(np.isfinite(since).any())
-        kernels.flows(
-            1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, state, q, lost
-        )  # fmt: skip
+        wet = state.copy()
+        wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
+        kernels.flows(1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
         volume = np.bincount(self.end, table[self.both, kernels.HALF], self.n)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
@@ -212,7 +212,9 @@ class Fluid:
         delta, conduct, half = now.table[mine].T
         m, dt = len(ends), step.dt
         p_u, s_u = self._rises(u)
+        s_u = np.where(u > -1.0, s_u, 0.0)
         p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
+        s = np.maximum(s, 0.0)
         head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1])
         mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
         up = np.where(down, s[:, 0], s[:, 1])
@@ -228,12 +230,12 @@ class Fluid:
         at = np.flatnonzero(now.lost[mine] > 0.0)
         if len(at):
             over = 0.5 * p[at].sum(axis=1) - self.laws[self.law[mine][at], kernels.PORE]
-            of_mean_s = mean[at]
-            leak_u[at] = now.lost[mine][at][:, None] * 0.5 * (
-                p_u[ends[at]] / over[:, None]
-                + (6.0 * (1.0 - of_mean_s) / np.maximum(of_mean_s * (3.0 - 2.0 * of_mean_s), 1e-300))[:, None]
-                * s_u[ends[at]]
-            )  # fmt: skip
+            held = mean[at]
+            by_part = now.lost[mine][at] / np.maximum(held * held * (3.0 - 2.0 * held), 1e-300)
+            leak_u[at] = 0.5 * (
+                (now.lost[mine][at] / over)[:, None] * p_u[ends[at]]
+                + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
+            )
         a, b, c, d = (x[self.at[mine, k]] for k in range(4))
         way = 0.5 * ((b + c) - (a + d))
         h = np.hypot(way[:, 0], way[:, 1])
