@@ -100,13 +100,15 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
     if "hydraulic" in arguments:
-        others = arguments.keys() - {"hydraulic", "time", "dt", "steady", "solver"}
+        others = arguments.keys() - {"hydraulic", "time", "dt", "steady", "solver", "auto"}
         if others:
             raise ValueError(f"hydraulic takes no {min(others)}")
         if ("steady" in arguments) == ("time" in arguments):
             raise ValueError("hydraulic takes time or steady, one of them")
+        if "auto" in arguments and "steady" in arguments:
+            raise ValueError("auto goes with time: steady flow is found by implicit steps")
         return
-    for word in ("dt", "steady"):
+    for word in ("dt", "steady", "auto"):
         if word in arguments:
             raise ValueError(f"{word} goes with hydraulic")
     for word in ("solver", "steps"):

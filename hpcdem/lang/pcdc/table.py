@@ -575,7 +575,8 @@ _MODEL = (
             "away; `pcdc.solved['reason']` says how a run ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve elastic steps 10", "pcdc model solve hydraulic time 5 dt 0.01",
-             "pcdc model solve hydraulic steady", "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
+             "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
+             "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
                      Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
@@ -596,6 +597,9 @@ _MODEL = (
                             "may pass their peak and break; with mechanical off, flow alone"),
                      Option("dt", (POSITIVE,), "with hydraulic: longest time step; steps are shorter where joints "
                             "break or no balance is found", "s", "a hundredth of the time"),
+                     Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
+                            "where an estimate says that these cost less, or where implicit ones are refused; the log "
+                            "has both estimates"),
                      Option("stea{dy}", (), "with hydraulic: until as much flows out as in; no time passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic or hydraulic: SciPy on one "
                             "rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
