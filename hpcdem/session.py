@@ -8,13 +8,13 @@ also sees to it that an error on one rank ends all of them, with its message and
 from __future__ import annotations
 
 import atexit
-import importlib
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hpcdem.core.errors import StoppedWithCheckpoint, UsageError
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from hpcdem.runtime.progress import Log
     from hpcdem.runtime.reproducibility import Reproduction
     from hpcdem.runtime.stop_requests import StopRequests
+
+    WarmUp = tuple[Callable[[int], None], tuple[ModuleType, ...]]
 
 
 @dataclass
@@ -188,32 +190,96 @@ def prepare(comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int) -> 
 
 
 class Kernels(NamedTuple):
-    """Kernels that are loaded together, from a folder of their own. warm_up: the module whose function calls each of
-    them once, and the function if it is not `warm_up`; after: kinds that this function needs too; modules: those whose
-    kernels these are, though they may have been imported before, with others."""
+    """Kernels that are loaded together, from a folder of their own. load: imports them, and gives the function that
+    calls each of them once, with the modules whose kernels these are even if they were imported with others before;
+    after: kinds that this function needs too."""
 
-    warm_up: str
+    load: Callable[[], WarmUp]
     after: tuple[str, ...] = ()
-    modules: tuple[str, ...] = ()
 
 
-_FDEM = "hpcdem.physics.fdem"
+def _shared() -> WarmUp:
+    from hpcdem.runtime import warm_up
+
+    return warm_up.warm_up, ()
+
+
+def _particles() -> WarmUp:
+    from hpcdem.commands.dem import warm_up
+
+    return warm_up.warm_up, ()
+
+
+def _blocks() -> WarmUp:
+    from hpcdem.commands.fdem import warm_up
+
+    return warm_up.warm_up, ()
+
+
+def _coupled() -> WarmUp:
+    from hpcdem.physics.coupling import warm_up
+
+    return warm_up.warm_up, ()
+
+
+def _bolts() -> WarmUp:
+    from hpcdem.physics.bolts import kernels, warm_up
+
+    return warm_up.warm_up, (kernels,)
+
+
+def _liners() -> WarmUp:
+    from hpcdem.physics.liners import kernels, warm_up
+
+    return warm_up.warm_up, (kernels,)
+
+
+def _flow() -> WarmUp:
+    from hpcdem.physics.flow import kernels, warm_up
+
+    return warm_up.warm_up, (kernels,)
+
+
+def _yielding() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import plastic_quads, plasticity
+
+    return warm_up.yielding, (plasticity, plastic_quads)
+
+
+def _creep() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import creep
+
+    return warm_up.creeping, (creep,)
+
+
+def _tangent() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import stiffness
+
+    return warm_up.tangent, (stiffness,)
+
+
+def _plastic_tangent() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import plastic_stiffness
+
+    return warm_up.plastic_tangent, (plastic_stiffness,)
+
+
 KINDS = {
-    "shared": Kernels("hpcdem.runtime.warm_up"),
-    "": Kernels("hpcdem.commands.dem.warm_up"),
-    "blocks": Kernels("hpcdem.commands.fdem.warm_up"),
-    "coupled": Kernels("hpcdem.physics.coupling.warm_up"),
-    "bolts": Kernels("hpcdem.physics.bolts.warm_up", modules=("hpcdem.physics.bolts.kernels",)),
-    "liners": Kernels("hpcdem.physics.liners.warm_up", modules=("hpcdem.physics.liners.kernels",)),
-    "flow": Kernels("hpcdem.physics.flow.warm_up", modules=("hpcdem.physics.flow.kernels",)),
-    "yielding": Kernels(
-        f"{_FDEM}.warm_up:yielding", modules=(f"{_FDEM}.kernels.plasticity", f"{_FDEM}.kernels.plastic_quads")
-    ),
-    "creep": Kernels(f"{_FDEM}.warm_up:creeping", modules=(f"{_FDEM}.kernels.creep",)),
-    "tangent": Kernels(f"{_FDEM}.warm_up:tangent", modules=(f"{_FDEM}.kernels.stiffness",)),
-    "plastic-tangent": Kernels(
-        f"{_FDEM}.warm_up:plastic_tangent", ("yielding", "tangent"), (f"{_FDEM}.kernels.plastic_stiffness",)
-    ),
+    "shared": Kernels(_shared),
+    "": Kernels(_particles),
+    "blocks": Kernels(_blocks),
+    "coupled": Kernels(_coupled),
+    "bolts": Kernels(_bolts),
+    "liners": Kernels(_liners),
+    "flow": Kernels(_flow),
+    "yielding": Kernels(_yielding),
+    "creep": Kernels(_creep),
+    "tangent": Kernels(_tangent),
+    "plastic-tangent": Kernels(_plastic_tangent, after=("yielding", "tangent")),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
@@ -226,13 +292,8 @@ def warm_up(kind: str, *threads: int) -> None:
     Imports them: the cache must be settled before."""
     from hpcdem.runtime.kernels import keep_here
 
-    call: Callable[[int], None]
-    if kind in PHYSICS:
-        call = PHYSICS[kind]().warm_up
-    else:
-        module, _, name = KINDS[kind].warm_up.partition(":")
-        keep_here(KINDS[kind].modules)
-        call = getattr(importlib.import_module(module), name or "warm_up")
+    call, modules = (PHYSICS[kind]().warm_up, ()) if kind in PHYSICS else KINDS[kind].load()
+    keep_here(modules)
     for n in threads:
         call(n)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import importlib
 import math
 import os
 import pickle
@@ -22,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.runtime import cgroups, launch
@@ -203,14 +203,14 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     return True
 
 
-def keep_here(modules: Sequence[str]) -> None:
+def keep_here(modules: Sequence[ModuleType]) -> None:
     """Kernels of these modules belong to the folder that is set now, even if they were imported with others before."""
     from numba.core.caching import FunctionCache
     from numba.core.dispatcher import Dispatcher
 
-    for name in modules:
-        for thing in vars(importlib.import_module(name)).values():
-            if isinstance(thing, Dispatcher) and thing.py_func.__module__ == name:
+    for module in modules:
+        for thing in vars(module).values():
+            if isinstance(thing, Dispatcher) and thing.py_func.__module__ == module.__name__:
                 if isinstance(thing._cache, FunctionCache):  # type: ignore[attr-defined]
                     thing.enable_caching()  # type: ignore[attr-defined]
 
