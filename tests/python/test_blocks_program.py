@@ -60,6 +60,8 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model solve elastic time 1e6", "sim.solve(elastic=True, time=1e6)"),
     ("pcdc model solve elastic solver direct", "sim.solve(elastic=True, solver='direct')"),
     ("pcdc model solve elastic steps 4", "sim.solve(elastic=True, steps=4)"),
+    ("pcdc model solve thermal time 5 dt 0.1", "sim.solve(thermal=True, time=5, dt=0.1)"),
+    ("pcdc model solve thermal steady solver petsc", "sim.solve(thermal=True, steady=True, solver='petsc')"),
     ("pcdc model solve hydraulic time 5 dt 0.1", "sim.solve(hydraulic=True, time=5, dt=0.1)"),
     ("pcdc model solve hydraulic steady solver direct", "sim.solve(hydraulic=True, steady=True, solver='direct')"),
     ("pcdc geometry create polyline (0,0) (1,2) as-layer 'l'", "sim.geometry.polyline([(0, 0), (1, 2)], 'l')"),

@@ -311,6 +311,8 @@ def _solve(call: Call) -> None:
         fdem.steps.solve_elastic(call.project, **call.given("elastic"))
     elif "hydraulic" in call.arguments:
         fdem.steps.solve_hydraulic(call.project, **call.given("hydraulic"))
+    elif "thermal" in call.arguments:
+        fdem.steps.solve_thermal(call.project, **call.given("thermal"))
     else:
         fdem.steps.solve(call.project, **call.given())
 

@@ -382,6 +382,7 @@ class Heat(SurfaceLoad):
         dead = np.repeat(~blocks.alive, 4)
         node, lead = connectivity.corner_clusters(mesh.cells, blocks.partner, blocks.open | dead)
         node[~blocks.alive] = -1
+        self.node, self.leads = node, lead
         sizes = np.bincount(node[node >= 0], minlength=len(lead))
         member_begin = np.zeros(len(lead) + 1, np.int64)
         member = np.empty(int(sizes[sizes > 1].sum()), np.int64)
@@ -405,25 +406,63 @@ class Heat(SurfaceLoad):
                 f"{blocks.rebuild_state.side:g} m: joints that are not broken have opened too far"
             )
         self._begin, self._corner = begin, corner // 8 * width + corner % 8 // 2
-        self._capacity = np.empty(n)
-        kernels.sums(begin, self._corner, self._corner_capacity.reshape(-1), self._capacity)
+        self.node_ids = node[first // 4, first % 4]
+        self.capacity = np.empty(n)
+        kernels.sums(begin, self._corner, self._corner_capacity.reshape(-1), self.capacity)
         lead_point = mesh.cells[first // 4, first % 4]
         self._held = self.held[lead_point].astype(np.int64) - 1
         self._make_faces()
         self._find_limit()
         self._stale = False
 
-    def _make_faces(self) -> None:
-        """Exposed faces of the elements held here, by their numbers."""
-        blocks, mesh = self.blocks, self.blocks.the_mesh()
+    def renew_nodes(self) -> None:
+        """Nodes are those of the joints that hold now; the model is closed."""
+        if self._stale:
+            self._make_nodes()
+
+    @property
+    def nodes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """begin, corner and held of kernels.warm, of the nodes that this rank's elements have; `node_ids`: their
+        numbers among those of the model, whose lowest corners are `leads`. Not to be changed. Not collective."""
+        return self._begin, self._corner, self._held
+
+    @property
+    def conductances(self) -> np.ndarray:
+        """Of the elements held here, see `kernels.conductances`. Not to be changed. Not collective."""
+        return self._g
+
+    def transfers(self, everywhere: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Exposed faces (m,), ascending, their ends as corners (m, 2), element * 4 + k, and what each passes on per
+        degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
+        at, ends, half = self._exposed()
+        if not everywhere:
+            row = self.blocks.where[at // 4]
+            mine = (row >= self.blocks.owned.start) & (row < self.blocks.owned.stop)
+            at, ends, half = at[mine], ends[mine], half[mine]
+        h = self.column("transfer_coeficient")[self.row[at // 4]]
+        own = np.array([math.nan if one.transfer is None else one.transfer for one in self.faces])[self.face[at]]
+        there = np.array([one.environment is not None for one in self.faces])[self.face[at]]
+        transfer = half * np.where(there, np.where(np.isnan(own), h, own), 0.0)
+        return at, 4 * (at // 4)[:, None] + ends, transfer
+
+    def _exposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Free faces with a condition, of all ranks: numbers (m,), their two corners (m, 2) and half lengths [m]."""
+        blocks, mesh = self.blocks, self.blocks.reference
         at = np.flatnonzero((self.face > 0) & blocks.face_exists() & ~blocks.closed_faces())
-        at = at[blocks.where[at // 4] >= 0]
         e, k = at // 4, at % 4
         ends = np.column_stack([k, (k + 1) % connectivity.corner_counts(mesh.cells[e])])
-        self._face_corner = blocks.where[e][:, None] * self.t.shape[1] + ends
-        points = blocks.reference.points[np.take_along_axis(blocks.reference.cells[e], ends, axis=1)]
+        points = mesh.points[np.take_along_axis(mesh.cells[e], ends, axis=1)]
         way = points[:, 1] - points[:, 0]
-        self._half = 0.5 * np.hypot(way[:, 0], way[:, 1])
+        return at, ends, 0.5 * np.hypot(way[:, 0], way[:, 1])
+
+    def _make_faces(self) -> None:
+        """Exposed faces of the elements held here, by their numbers."""
+        blocks = self.blocks
+        at, ends, half = self._exposed()
+        held = blocks.where[at // 4] >= 0
+        at, ends, self._half = at[held], ends[held], half[held]
+        e = at // 4
+        self._face_corner = blocks.where[e][:, None] * self.t.shape[1] + ends
         # One row for each condition and coefficient of the element.
         h = self.column("transfer_coeficient")[self.row[e]]
         pairs, which = np.unique(np.column_stack([self.face[at].astype(float), h]), axis=0, return_inverse=True)
@@ -440,7 +479,7 @@ class Heat(SurfaceLoad):
                 table[row, kernels.ENVIRONMENT] = self._now(one.environment, time)
         return table
 
-    def _held_at(self, time: float) -> np.ndarray:
+    def held_at(self, time: float) -> np.ndarray:
         """Prescribed temperatures (rows,) at a time of heat."""
         return np.array([self._now(one, time) for one in self.prescribed[1:]], np.float64)
 
@@ -463,10 +502,10 @@ class Heat(SurfaceLoad):
             corner[:, b] += each[:, pair]
         h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
         np.add.at(corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, 2))
-        total = np.empty(len(self._capacity))
+        total = np.empty(len(self.capacity))
         kernels.sums(self._begin, self._corner, corner.reshape(-1), total)
         free = (self._held < 0) & (total > 0.0)
-        least = float((self._capacity[free] / total[free]).min(initial=math.inf))
+        least = float((self.capacity[free] / total[free]).min(initial=math.inf))
         self._limit = float(self.blocks.comm.min_into(np.array([least]))[0])
 
     def limit(self) -> float:
@@ -527,10 +566,9 @@ class Heat(SurfaceLoad):
                 "thermal",
             )
 
-    def check_start(self) -> None:
-        blocks, o = self.blocks, self.blocks.options
-        if not self.rows or self._checked:
-            return
+    def check_elements(self) -> None:
+        """CommandError if an element lacks a thermal model, or has a law that knows no temperature. Not collective."""
+        blocks = self.blocks
         bare = np.flatnonzero((self.row == 0) & blocks.alive)
         if len(bare):
             raise CommandError(
@@ -542,6 +580,12 @@ class Heat(SurfaceLoad):
                 f"{user_laws.some(blocks)} has a law of the user, which knows no temperature: expansion-coeficient "
                 "must be 0 with it"
             )
+
+    def check_start(self) -> None:
+        o = self.blocks.options
+        if not self.rows or self._checked:
+            return
+        self.check_elements()
         if self.on and o.mechanical and not o.dynamic and o.heat_dt == 0.0:
             raise CommandError(
                 "in static runs time of heat passes by model time-step thermal, which comes first; or model option "
@@ -577,8 +621,7 @@ class Heat(SurfaceLoad):
             return
         self.waited = 0
         with blocks.timers("heat"):
-            if self._stale:
-                self._make_nodes()
+            self.renew_nodes()
             if self._found_for != self._given():
                 self._find_step()
             if blocks.budget is not None and o.dynamic and self.expands:
@@ -591,20 +634,32 @@ class Heat(SurfaceLoad):
         if self.cycles % LOOK == 0:
             self._check_finite()
 
+    def _own_corners(self) -> tuple[int, int]:
+        """From where to where this rank's corners lie in t, flat."""
+        width, own = self.t.shape[1], self.blocks.owned
+        return width * own.start, width * own.stop
+
+    def inflow(self, time: float, dt: float) -> np.ndarray:
+        """Heat (n, w) [W/m] that flows to the corners of the elements held here, with the conditions of faces of a time
+        of heat; what these bring in dt [s] is booked. Not collective."""
+        threads = self.blocks.threads
+        (kernels.conduct if threads == 1 else kernels.conduct_threaded)(threads, self.t, self._g, self._q)
+        if len(self._face_row):
+            t, q, given = (part.reshape(-1) for part in (self.t, self._q, self.blocks.cold[GIVEN]))
+            kernels.through_faces(
+                self._face_corner, self._half, self._face_row, self._faces_at(time), *self._own_corners(), t, q, dt,
+                given,
+            )  # fmt: skip
+        return self._q
+
     def _sub_step(self) -> None:
         blocks, threads = self.blocks, self.blocks.threads
-        one = threads == 1
-        (kernels.conduct if one else kernels.conduct_threaded)(threads, self.t, self._g, self._q)
-        before, self.time = self.time, self.time + self.dt
-        width = self.t.shape[1]
-        first, last = (width * row for row in (blocks.owned.start, blocks.owned.stop))
-        t, q, given = (part.reshape(-1) for part in (self.t, self._q, blocks.cold[GIVEN]))
-        if len(self._face_row):
-            kernels.through_faces(
-                self._face_corner, self._half, self._face_row, self._faces_at(before), first, last, t, q, self.dt, given
-            )  # fmt: skip
-        (kernels.warm if one else kernels.warm_threaded)(
-            threads, self._begin, self._corner, self._capacity, self._held, self._held_at(self.time), first, last,
+        q = self.inflow(self.time, self.dt).reshape(-1)
+        self.time += self.dt
+        first, last = self._own_corners()
+        t, given = self.t.reshape(-1), blocks.cold[GIVEN].reshape(-1)
+        (kernels.warm if threads == 1 else kernels.warm_threaded)(
+            threads, self._begin, self._corner, self.capacity, self._held, self.held_at(self.time), first, last,
             self.dt, q, t, given,
         )  # fmt: skip
         blocks.halo.fill(self.t)
