@@ -999,17 +999,19 @@ class BlockCommands:
         thermal: bool = False,
         dt: float | None = None,
         steady: bool = False,
+        auto: bool = False,
     ) -> None:
         """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
         in so many steps of what is new in the loads; with hydraulic fluid flows by implicit steps of at most dt [s],
-        for this time or until it is steady, through blocks in equilibrium; with thermal so does heat.
+        for this time or until it is steady, through blocks in equilibrium; with thermal so does heat. With auto
+        fluid flows by explicit steps, if these cost less.
         In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {
             "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
             "elastic": elastic, "solver": solver, "steps": steps, "hydraulic": hydraulic, "thermal": thermal, "dt": dt,
-            "steady": steady,
+            "steady": steady, "auto": auto,
         }  # fmt: skip
         self._before_steps()
         self._blocks("model solve", given)

@@ -64,6 +64,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model solve thermal steady solver petsc", "sim.solve(thermal=True, steady=True, solver='petsc')"),
     ("pcdc model solve hydraulic time 5 dt 0.1", "sim.solve(hydraulic=True, time=5, dt=0.1)"),
     ("pcdc model solve hydraulic steady solver direct", "sim.solve(hydraulic=True, steady=True, solver='direct')"),
+    ("pcdc model solve hydraulic auto time 5", "sim.solve(hydraulic=True, auto=True, time=5)"),
     ("pcdc geometry create polyline (0,0) (1,2) as-layer 'l'", "sim.geometry.polyline([(0, 0), (1, 2)], 'l')"),
     ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'l'",
      "sim.geometry.polygon([(0, 0), (4, 0), (2, 3)], 'l')"),

@@ -16,6 +16,7 @@ from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, Sto
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
+from hpcdem.physics.flow import costs
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.implicit import Implicit
@@ -133,16 +134,23 @@ def solve_elastic(
 
 
 def solve_hydraulic(
-    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
-) -> None:
+    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto",
+    auto: bool = False,
+) -> None:  # fmt: skip
     """Flow by implicit steps, see `coupled.Coupled`: for so much flow time [s], with blocks in static equilibrium if
-    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given."""
+    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given. auto: by
+    explicit steps instead, as model solve and model step do them, where these cost less."""
     project.refuse_inside("model solve hydraulic")
     coupling.refuse(project, "model solve hydraulic")
     if steady == (time is not None):
         raise CommandError("flow is solved for some time or until it is steady: time or steady, one of them")
+    if auto and time is None:
+        raise CommandError("auto compares the steps of some time: steady flow is found by implicit ones")
     blocks = project.ready()
     flow = Flow.there(blocks)
+    if auto and flow is not None and time is not None and _explicit_is_cheaper(project, flow, time, dt, solver):
+        _flow_by_steps(project, flow, time)
+        return
     first, began = project.step, clocks.monotonic()
     run = Coupled(blocks, dt or (STEADY_STEP if time is None else 0.01 * time), solver)
     if time is None:
@@ -230,6 +238,61 @@ def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
         asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
         if asked:
             _answer(project, asked)
+
+
+def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
+    """Whether so much flow time [s] is to pass by explicit steps: they cost less, or implicit ones are refused; said in
+    the log. A command that goes on from a checkpoint does what it did before. Collective."""
+    if project.progress is not None:
+        return bool(project.progress["command"][0] != "solve hydraulic")
+    blocks, refused = project.blocks, None
+    blocks.close_model()
+    stepped = costs.explicit(flow, time)
+    try:
+        at_once: costs.Cost | str = Coupled(blocks, dt or 0.01 * time, solver).cost(time)
+    except CommandError as error:
+        refused, at_once = error, str(error)
+    if refused is not None and isinstance(stepped, str):
+        raise refused
+    wanted = refused is not None or (
+        isinstance(stepped, costs.Cost) and isinstance(at_once, costs.Cost) and stepped.seconds < at_once.seconds
+    )
+    if project.log is not None:
+        project.log.info(
+            f"{_where(project)}solve hydraulic auto: {'explicit' if wanted else 'implicit'} steps; "
+            f"explicit: {stepped}; implicit: {at_once}"
+        )
+    return wanted
+
+
+def _flow_by_steps(project: Project, flow: Flow, time: float) -> None:
+    """So much flow time [s] by explicit steps."""
+    o = project.blocks.options
+    if o.mechanical and not o.dynamic:
+        step(project, costs.cycles(flow, time))
+    else:
+        solve(project, time=time)
+
+
+def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> None:
+    """A word on the fluid before a run of so many steps, or of so much time [s], that will take long. Collective."""
+    blocks, log = project.blocks, project.log
+    flow, o = Flow.there(blocks), blocks.options
+    if flow is None or not o.hydraulic or not len(flow.network.channels):
+        return
+    if o.mechanical and not o.dynamic:
+        time = None if steps is None else steps * max(1, o.flow_steps) * o.flow_dt / o.flow_every
+    elif time is None and steps is not None:
+        time = steps * blocks.clock.dt
+    if not time:
+        return
+    cost = costs.explicit(flow, time)
+    if log is not None and isinstance(cost, costs.Cost) and cost.seconds > costs.LONG:
+        what = "stiff fluid in thin fractures" if o.flow_dt == 0.0 else "as model time-step hydraulic says"
+        log.warn(
+            f"{_where(project)}flow by explicit sub-steps, {what}: {cost} on one core; model solve hydraulic takes "
+            "implicit steps"
+        )
 
 
 def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> int:
@@ -360,6 +423,7 @@ def _run(
         log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
         project.blocks.drop_creep_step()
+        _tell_of_thin(project, steps, time)
         end = None if time is None or creeps else clock.time + time
         project.progress = {"first": clock.step, "end": end, "command": command}
         if time is not None and creeps:

@@ -145,7 +145,8 @@ class Implicit:
         lowest = heat.leads[heat.node_ids] // 4
         self._mine = (row >= sim.owned.start) & (row < sim.owned.stop) & (sim.number[row] == lowest)
         self._ids = heat.node_ids[self._mine]
-        made_for = dt, heat.leads.tobytes()
+        said = (part.tobytes() for part in (heat.leads, heat.held, heat.face, heat.row))
+        made_for = dt, sim.alive.tobytes(), *said
         if self.solver is not None and made_for == self._made_for:
             return
         self.close()
