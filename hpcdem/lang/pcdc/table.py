@@ -615,8 +615,8 @@ _MODEL = (
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
                             "may pass their peak and break; with mechanical off, flow alone"),
-                     Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its steady "
-                            "state at once; in static runs blocks are in equilibrium at the end of each step, and "
+                     Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
+                            "steady state at once; in static runs blocks are in equilibrium at the end of each step, and "
                             "joints may pass their peak and break; with mechanical off, heat alone"),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
                             "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
@@ -626,8 +626,7 @@ _MODEL = (
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
                             "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
-                            "SciPy on one "
-                            "rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
+                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
                             "from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
