@@ -240,6 +240,12 @@ def _flow() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _heat() -> WarmUp:
+    from hpcdem.physics.heat import kernels, warm_up
+
+    return warm_up.warm_up, (kernels,)
+
+
 def _yielding() -> WarmUp:
     from hpcdem.physics.fdem import warm_up
     from hpcdem.physics.fdem.kernels import plastic_quads, plasticity
@@ -276,6 +282,7 @@ KINDS = {
     "bolts": Kernels(_bolts),
     "liners": Kernels(_liners),
     "flow": Kernels(_flow),
+    "heat": Kernels(_heat),
     "yielding": Kernels(_yielding),
     "creep": Kernels(_creep),
     "tangent": Kernels(_tangent),
@@ -283,7 +290,7 @@ KINDS = {
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_BLOCKS = ("bolts", "liners", "flow", "yielding", "creep", "tangent", "plastic-tangent")
+OF_BLOCKS = ("bolts", "liners", "flow", "heat", "yielding", "creep", "tangent", "plastic-tangent")
 """Those that come when a model of blocks asks for them."""
 
 

@@ -19,6 +19,7 @@ from hpcdem.physics.fdem.convergence import RATIO, Watch
 from hpcdem.physics.flow import costs
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
 
@@ -59,6 +60,8 @@ def resume(project: Project) -> None:
             solve_elastic(project, **given)
         case "solve hydraulic":
             solve_hydraulic(project, **given)
+        case "solve thermal":
+            solve_thermal(project, **given)
 
 
 def solve(
@@ -177,6 +180,64 @@ def solve_hydraulic(
         )
     histories.flush(project)
     frames.settle(project)
+
+
+def solve_thermal(
+    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
+) -> None:
+    """Heat by implicit steps, see `implicit.Implicit`: for so much time of heat [s], with blocks in static equilibrium
+    if they move, or the steady state at once. dt: longest time step [s]; a hundredth of the time, if it is not
+    given."""
+    project.refuse_inside("model solve thermal")
+    coupling.refuse(project, "model solve thermal")
+    if steady == (time is not None):
+        raise CommandError("heat is solved for some time or until it is steady: time or steady, one of them")
+    if steady and dt is not None:
+        raise CommandError("dt goes with time: the steady state of heat is found at once")
+    if dt is not None and not dt > 0.0:
+        raise CommandError(f"the time step must be positive, got {dt:g}")
+    blocks = project.ready()
+    began, first = clocks.monotonic(), project.step
+    run = Implicit(blocks, solver)
+    try:
+        if time is None:
+            run.steady()
+            _write_due(project)
+        else:
+            if project.progress is None:
+                count = max(1, math.ceil(time / (dt or 0.01 * time) - 1e-9))
+                command = "solve thermal", {"time": time, "dt": dt, "solver": solver}
+                project.progress = {"first": first, "left": count, "dt": time / count, "command": command}
+            first = project.progress["first"]
+            project.stepping = "solve thermal"
+            frames.write_due(project)
+            while project.progress["left"] > 0:
+                _heat_on(project, run, project.progress)
+    finally:
+        run.close()
+        under_way.wait()
+        project.progress, project.stepping = None, ""
+    project.solved = {"reason": "steady" if steady else "time", "ratio": math.nan, "steps": project.step - first}
+    if project.log is not None:
+        name = "" if run.solver is None else f", {run.solver.name}"
+        project.log.info(
+            f"{_where(project)}solve thermal: {run.steps} implicit steps, {run.factors} factors, {run.unknowns} "
+            f"unknowns{name}, {duration(clocks.monotonic() - began)}"
+        )
+    histories.flush(project)
+    frames.settle(project)
+
+
+def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
+    """An implicit step of heat, and what is due then; a checkpoint, if one is asked for."""
+    run.advance(progress["dt"])
+    progress["left"] -= 1
+    _write_due(project)
+    stop = project.blocks.stop
+    if stop is not None and progress["left"] > 0:
+        asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
+        if asked:
+            _answer(project, asked)
 
 
 def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
