@@ -616,8 +616,8 @@ _MODEL = (
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
                             "may pass their peak and break; with mechanical off, flow alone"),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
-                            "steady state at once; in static runs blocks are in equilibrium at the end of each step, and "
-                            "joints may pass their peak and break; with mechanical off, heat alone"),
+                            "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
+                            "and joints may pass their peak and break; with mechanical off, heat alone"),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
                             "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
@@ -626,8 +626,8 @@ _MODEL = (
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
                             "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
-                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
-                            "from 400 000 unknowns on", default="auto"),
+                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
+                            "it is there, from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1"))),
@@ -1010,6 +1010,7 @@ _RECORDS = (
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
             (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
              Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
+             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity"),), "beside it the model as it "
                     "is now, its channels coloured by that"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
