@@ -330,13 +330,16 @@ class Coupled:
     # ---- Newton's method -----------------------------------------------------------------------------------------
 
     def _newton(self, step: Step, x: np.ndarray, u: np.ndarray) -> _Found:
+        timers = self.sim.timers
         lack, force, fluid = self._lacking(step, x, u)
         iterations, error, past = 0, "", 0
         while lack > AIM and iterations < MOST:
-            pieces = self._pieces(step, fluid, u, x)
+            with timers.around("matrix"):
+                pieces = self._pieces(step, fluid, u, x)
             try:
-                self.solver.factor(pieces)
-                way = self.solver.solve(force, 0.0)
+                with timers.around("solve"):
+                    self.solver.factor(pieces)
+                    way = self.solver.solve(force, 0.0)
             except CommandError as singular:
                 error = str(singular)
                 break
@@ -388,6 +391,10 @@ class Coupled:
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, 2); the fluid."""
+        with self.sim.timers.around("balance"):
+            return self._evaluated(step, x, u)
+
+    def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.n, 2))
         right[len(x) :, 0] = -now.residual
