@@ -834,11 +834,20 @@ class Charts(Words):
         self._do("chart add", given, where, g.JOINT)
 
     def export(
-        self, name: str, file: File, cracks: bool = False, plastic: bool = False, fluid: str | None = None
+        self,
+        name: str,
+        file: File,
+        cracks: bool = False,
+        plastic: bool = False,
+        fluid: str | None = None,
+        temperature: bool = False,
     ) -> None:
-        """Write a diagram as figure and CSV; cracks, plastic, fluid ("pressure", "saturation", "aperture" or
-        "velocity"): beside it the model as it is now, with one of them."""
-        given = {"name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid}
+        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture"
+        or "velocity"): beside it the model as it is now, with one of them."""
+        given = {
+            "name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid,
+            "temperature": temperature,
+        }  # fmt: skip
         self._do("chart export", given)
 
 

@@ -265,6 +265,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc chart export 'c' 'c.png' cracks", "sim.charts.export('c', 'c.png', cracks=True)"),
     ("pcdc chart add 'c' profile flow-rate scale-y 1e3 label 'q' range crack",
      "sim.charts.add('c', profile='flow_rate', scale_y=1e3, label='q', where='crack')"),
+    ("pcdc chart export 'c' 'c.png' temperature", "sim.charts.export('c', 'c.png', temperature=True)"),
     ("pcdc chart export 'c' 'c.png' fluid velocity", "sim.charts.export('c', 'c.png', fluid='velocity')"),
     ("pcdc chart export 'c' 'c.png' plastic", "sim.charts.export('c', 'c.png', plastic=True)"),
     ("pcdc output vtk 'f' every 10", "sim.output.vtk('f', every=10)"),

@@ -412,7 +412,13 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "chart create": lambda c: fdem.charts.create(c.project, **c.given()),
     "chart add": _curve,
     "chart export": lambda c: fdem.charts.export(
-        c.project, c["name"], c["file"], "cracks" in c.arguments, "plastic" in c.arguments, c.get("fluid", "")
+        c.project,
+        c["name"],
+        c["file"],
+        "cracks" in c.arguments,
+        "plastic" in c.arguments,
+        c.get("fluid", ""),
+        "temperature" in c.arguments,
     ),
     "output vtk": _output,
 }

@@ -626,8 +626,8 @@ _MODEL = (
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
                             "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
-                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it "
-                            "is there, from 400 000 unknowns on", default="auto"),
+                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
+                            "it is there, from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1"))),
@@ -1010,6 +1010,7 @@ _RECORDS = (
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
             (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
              Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
+             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity"),), "beside it the model as it "
                     "is now, its channels coloured by that"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",

@@ -82,7 +82,13 @@ class Implicit:
             sim.local.restress()
         if self.moves:
             joints = bool((sim.joint_row[sim.joint_exists()] > 0).any())
-            equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints)
+            try:
+                equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints)
+            except CommandError as error:
+                raise CommandError(
+                    f"heat time {self.heat.time:.6g} s: {error}; temperatures are those of that time, blocks lie where "
+                    "they did before"
+                ) from None
         else:
             sim.clock.step += 1
 
