@@ -213,8 +213,9 @@ def fill_up(sim: Blocks) -> None:
 
 
 def creeping(sim: Blocks) -> None:
-    """A specimen under load at rest, the left of it creeps, joints in the elastic right break in mid-creep."""
-    mesh = shaken(rectangle(14, 8, 1.4, 0.8), 0.2)
+    """A specimen of triangles and quads under load at rest, the left of it creeps, joints in the elastic right break in
+    mid-creep."""
+    mesh = shaken(rectangle(14, 8, 1.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05, "friction": 20.0})
     soft = {**ROCK, "maxwell_viscosity": 4e6, "kelvin_shear": 1e10, "kelvin_viscosity": 1e6, "damp_factor": 0.05}

@@ -228,7 +228,7 @@ USER = Model(
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
     "Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations. Strain "
-    "of the Kelvin unit goes with a stress that was there before. For triangles.",
+    "of the Kelvin unit goes with a stress that was there before.",
     declared(
         properties.MECH_BURGERS, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "b{ulk}", "k{elvin}-s{hear}",
         "k{elvin}-v{iscosity}", "m{axwell}-s{hear}", "m{axwell}-v{iscosity}", "k{elvin}-s{train}-xx",

@@ -12,7 +12,7 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
-from hpcdem.physics.fdem.kernels import creep, elements, plasticity
+from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
@@ -260,7 +260,7 @@ def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarra
     """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
     strains, lost = np.zeros((sim.n_own, 6)), np.zeros(sim.n_own)
     if "creep" in sim.cold:
-        strains, lost = sim.local.creep_strains(), sim.local.crept()[0][:, creep.LOST]
+        strains, lost = sim.local.creep_strains(), sim.local.lost_by_creep()
     names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy")]
     return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 

@@ -200,30 +200,39 @@ class Local:
         rows = self.triangle_rows[:count]
         self.law = np.zeros(count + 3, np.int32)
         self.law[:count] = sim.element_row[sim.number[rows]]
-        self.said = self.s0[:count].copy()
-        self.uncrept = self.said
+        quad_law = sim.element_row[sim.number[self.quad_rows]].astype(np.int32)
+        self.said, self.quad_said = self.s0[:count].copy(), self.quad_s0.copy()
+        self.uncrept, self.quad_uncrept = self.said, self.quad_said
         if self.creeps:
-            self.creep_table, self.creep_law = creep_table(sim.element_rows), self.law.copy()
-            self.creeping = np.flatnonzero(sim.creeping()[sim.number[rows]])
-            self._relieve_crept(np.arange(count))
-        self.initial = self.s0[:count].copy()
+            self.creep_table = creep_table(sim.element_rows)
+            self.creep_law, self.quad_creep_law = self.law.copy(), quad_law
+            creeping = sim.creeping()[sim.number]
+            self.creeping = np.flatnonzero(creeping[rows])
+            self.creeping_quads = np.flatnonzero(creeping[self.quad_rows])
+            self._relieve_crept(np.arange(count), np.arange(len(self.quad_rows)), self.s0, self.quad_s0)
+        self.initial, self.quad_initial = self.s0[:count].copy(), self.quad_s0.copy()
         if self.plastic:
-            memory, own = sim.cold["plastic"], self.quad_rows
-            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.initial, memory, self.s0)
-            self.quad_initial = self.quad_s0[:, :4].copy()
-            self.quad_law = np.repeat(sim.element_row[sim.number[own]].astype(np.int32)[:, None], 4, axis=1)
+            self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
+            self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
             self._make_strength(rows)
-            if len(own):
-                plastic_quads.relieve_all(own, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
-            self.uncrept = self.said.copy()
-            plasticity.relieve_all(rows, sim.n_left, self.c[:count], self.said, sim.cold["plastic"], self.uncrept)
-            self._relieve_crept(self.creeping)
+            self.uncrept, self.quad_uncrept = self.said.copy(), self.quad_said.copy()
+            self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
+            self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
 
-    def _relieve_crept(self, who: np.ndarray) -> None:
-        """Stress without strain of the triangles `who`, less that of their creep strain."""
-        sim = self.sim
-        creep.relieve_all(who, self.triangle_rows, sim.n_left, self.c, self.uncrept, sim.cold["creep"], self.s0)
+    def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
+        """Stress without strain of these triangles and quads, less that of their creep strain."""
+        sim, memory, rows = self.sim, self.sim.cold["creep"], self.triangle_rows
+        creep.relieve_all(who, rows, sim.n_left, self.c, self.uncrept, memory, s0)
+        if len(quads):
+            creep.relieve_quads(quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, memory, quad_s0)
+
+    def _relieve_flowed(self, base: np.ndarray, quad_base: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
+        """Stress without strain of all, that of their plastic strain less than base."""
+        sim, memory, rows = self.sim, self.sim.cold["plastic"], self.triangle_rows[: self.count]
+        plasticity.relieve_all(rows, sim.n_left, self.c[: self.count], base, memory, s0)
+        if len(self.quad_rows):
+            plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, quad_base, memory, quad_s0)
 
     def _make_strength(self, rows: np.ndarray) -> None:
         """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
@@ -545,9 +554,9 @@ class Local:
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None or self.plastic, small, self.slots_of_triangles, self.slot_at, self.slot_law,
-            self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond, pairs.quad_slot,
-            pairs.pushed,
+            sim.stress0 is not None or self.plastic or self.creeps, small, self.slots_of_triangles, self.slot_at,
+            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond,
+            pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -574,7 +583,7 @@ class Local:
         if self.yields:
             self._flow_triangles(self.plastic_state(), step)
         if self._creeps_now():
-            self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
+            self.creep(sim.cold["creep"], self.s0, self.quad_s0, keep=o.dynamic)
         if self.laws:
             self._obey(sim.cold[user_laws.COLUMN], self.s0)
         self._triangles(
@@ -658,41 +667,63 @@ class Local:
         sim = self.sim
         return self.creeps and sim.creep.on and (sim.options.dynamic or sim.creep.passed > 0.0)
 
-    def creep(self, memory: np.ndarray, s0: np.ndarray, keep: bool) -> None:
-        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10), if they keep it, and s0
-        (count + 3, 4) [Pa] become those after it."""
-        sim = self.sim
-        kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
+    def creep(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, keep: bool) -> None:
+        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10 or 40), if they keep it,
+        s0 (count + 3, 4) and quad_s0 (quads, 16) [Pa] become those after it."""
+        sim, one = self.sim, self.sim.threads == 1
+        how = self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory
+        kernel = creep.creep if one else creep.creep_threaded
         kernel(
             sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.creep_law,
-            self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory, s0,
+            *how, s0,
         )  # fmt: skip
+        if len(self.creeping_quads):
+            kernel = creep.creep_quads if one else creep.creep_quads_threaded
+            kernel(
+                sim.threads, self.creeping_quads, self.quad_rows, sim.n_left, sim.x, self.q, self.quad_uncrept,
+                self.quad_creep_law, *how, quad_s0,
+            )  # fmt: skip
 
-    def crept(self, s0: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The same of what elements remember of creep (n_own, 10), into s0 or a copy."""
+    def crept(
+        self, s0: np.ndarray | None = None, quad_s0: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of what elements remember of creep (n_own, 10 or 40), into s0 and quad_s0 or copies."""
         memory, s0 = self.sim.cold["creep"].copy(), self.s0.copy() if s0 is None else s0
+        quad_s0 = self.quad_s0.copy() if quad_s0 is None else quad_s0
         if self._creeps_now():
-            self.creep(memory, s0, keep=True)
-        return memory, s0
+            self.creep(memory, s0, quad_s0, keep=True)
+        return memory, s0, quad_s0
 
-    def linear(self) -> tuple[np.ndarray, np.ndarray]:
+    def lost_by_creep(self) -> np.ndarray:
+        """What owned elements have lost by creep (n_own,) [J/m]."""
+        return self.crept()[0].reshape(self.sim.n_own, -1, creep.MEMORY)[:, :, creep.LOST].sum(axis=1)
+
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Constants (count + 3, 12) and stress without strain (count + 3, 4) [Pa] of the elastic triangles that those
-        that creep are within this creep step. Not to be changed."""
+        that creep are within this creep step, and (quads, 32), (quads, 16) of quads. Not to be changed."""
         sim = self.sim
         if not (self.creeps and sim.creep.passed > 0.0):
-            return self.c, self.s0
-        c, s0 = self.c.copy(), self.s0.copy()
+            return self.c, self.s0, self.q, self.quad_s0
+        c, s0, q, quad_s0 = (one.copy() for one in (self.c, self.s0, self.q, self.quad_s0))
+        how = self.creep_table, sim.creep.passed, sim.cold["creep"]
         creep.as_elastic(
-            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, self.creep_table,
-            sim.creep.passed, sim.cold["creep"], c, s0,
-        )  # fmt: skip
-        return c, s0
+            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, *how, c, s0
+        )
+        if len(self.creeping_quads):
+            creep.quads_as_elastic(
+                self.creeping_quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, self.quad_creep_law, *how,
+                q, quad_s0,
+            )  # fmt: skip
+        return c, s0, q, quad_s0
 
     def creep_strains(self) -> np.ndarray:
-        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space."""
+        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space; of quads the
+        mean over their triangles by area."""
         sim, out = self.sim, np.zeros((self.sim.n_own, 6))
-        small = not sim.options.large_strain
-        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, self.crept()[0], out)
+        small, memory = not sim.options.large_strain, self.crept()[0]
+        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, memory, out)
+        if len(self.quad_rows):
+            creep.strains_of_quads(self.quad_rows, sim.n_left, sim.x, self.q, small, memory, out)
         return out
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -779,7 +810,7 @@ class Local:
                 *(self.plastic_state() if self.yields else ()),
                 *((sim.cold["creep"],) if self._creeps_now() else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
-                *((self.s0,) if self.laws or self._creeps_now() else ()),
+                *((self.s0, self.quad_s0) if self.laws or self._creeps_now() else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -866,7 +897,9 @@ class Local:
         forces will see; without it, which looks at all elements, after that of the last step."""
         sim = self.sim
         memory, s0, quad_s0 = self.flowed() if self.plastic and flow else (None, self.s0, self.quad_s0)
-        crept, s0 = self.crept(None if memory is None else s0) if self.creeps else (None, s0)
+        crept = None
+        if self.creeps:
+            crept, s0, quad_s0 = self.crept(*(() if memory is None else (s0, quad_s0)))
         if self.laws:
             s0 = s0.copy()
             self.obeyed(s0)
@@ -884,18 +917,25 @@ class Local:
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
         if energies and (memory is not None or crept is not None):
-            more, triangles = np.zeros(sim.n_own), self.triangle_rows[: self.count]
+            more, triangles, quads = np.zeros(sim.n_own), self.triangle_rows[: self.count], self.quad_rows
             if crept is not None:
-                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, self.creep_table, crept, more)
+                table = self.creep_table
+                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, table, crept, more)
+                if len(quads):
+                    creep.stored_in_quads(
+                        quads, sim.n_left, self.q, self.quad_said, self.quad_creep_law, table, crept, more
+                    )
             if memory is not None:
-                initial = self.initial
+                initial, of_quads = self.initial, self.quad_initial
                 if crept is not None:
-                    initial = self.said.copy()
-                    every = np.arange(self.count)
+                    initial, of_quads = self.said.copy(), self.quad_said.copy()
+                    every, all_quads = np.arange(self.count), np.arange(len(quads))
                     creep.relieve_all(every, triangles, sim.n_left, self.c, self.said, crept, initial)
+                    if len(quads):
+                        creep.relieve_quads(all_quads, quads, sim.n_left, self.q, self.quad_said, crept, of_quads)
                 plasticity.locked_in(triangles, sim.n_left, self.c, initial, memory, more)
-                if len(self.quad_rows):
-                    plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
+                if len(quads):
+                    plastic_quads.locked_in(quads, sim.n_left, self.q, of_quads, memory, more)
             energy += more if at is None else more[at]
         if self.laws and energies:  # what such a law stores is not known
             of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0

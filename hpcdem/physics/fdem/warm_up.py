@@ -79,12 +79,10 @@ def _flow(mesh: Mesh, threads: int) -> None:
 
 
 def _creep(mesh: Mesh, threads: int) -> None:
-    """Triangles that creep in motion, then in a static creep step, and the tangent in it."""
+    """Elements that creep in motion, then in a static creep step, and the tangent in it."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
-    at = np.flatnonzero(mesh.cells[:, 3] < 0)
-    changes.element_model(sim, at, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    changes.element_model(sim, None, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
     creep.switch(sim, True)

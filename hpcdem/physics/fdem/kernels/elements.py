@@ -419,7 +419,7 @@ def _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_stretch(p, xy, c, small):
+def part_stretch(p, xy, c, small):
     """The same of triangle p of a quad with the corners xy (8,) and the row c (32,) of the table."""
     i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
     return _part(
@@ -532,11 +532,11 @@ _quad_edge_loop_2, _quad_edge_loop_3 = _edge_loop(X3, X4, A2, Q_LEFT2), _edge_lo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _mean_trace(overlay, xy, c, small):
+def mean_trace(overlay, xy, c, small):
     """Mean by area of e11 + e22 over the two triangles of an overlay (0, 1) of a quad."""
     mean, area = 0.0, 0.0
     for p in (2 * overlay, 2 * overlay + 1):
-        _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
+        _, _, _, _, _, _, e11, e22, _ = part_stretch(p, xy, c, small)
         mean += c[Q_AREA + p] * (e11 + e22)
         area += c[Q_AREA + p]
     return mean / area
@@ -549,9 +549,9 @@ def quad_stress(xy, c, s0, small, stress):
     stress[:] = 0.0
     areas = 0.0
     for overlay in range(2):
-        mean = _mean_trace(overlay, xy, c, small)
+        mean = mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            _, _, _, _, cs, sn, e11, e22, e12 = part_stretch(p, xy, c, small)
             shift, m = 0.5 * (mean - (e11 + e22)), c[Q_TWO_MU]
             s11 = s0[4 * p] + (c[Q_LAMBDA] * mean + m * (e11 + shift))
             s22 = s0[4 * p + 1] + (c[Q_LAMBDA] * mean + m * (e22 + shift))
@@ -571,9 +571,9 @@ def quad_energy(xy, c, s0, small):
     """Elastic energy [J/m] of a quad: the mean of its two overlays."""
     total = 0.0
     for overlay in range(2):
-        mean = _mean_trace(overlay, xy, c, small)
+        mean = mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, _, _, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            _, _, _, _, _, _, e11, e22, e12 = part_stretch(p, xy, c, small)
             shift = 0.5 * (mean - (e11 + e22))
             density = _energy(e11 + shift, e22 + shift, e12, c[Q_LAMBDA], c[Q_TWO_MU], s0[4 * p : 4 * p + 4])
             total += 0.5 * c[Q_AREA + p] * density
@@ -842,7 +842,7 @@ def drift_threaded(threads, first, last, x, v, dt):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _triangle_stretch(xy, c, small):
+def triangle_stretch(xy, c, small):
     """Rotation (cos, sin) and strain (11, 22, 12) of a triangle with the corners xy (6,)."""
     ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
     f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
@@ -857,7 +857,7 @@ def _triangle_stretch(xy, c, small):
 @njit(cache=True, nogil=True, error_model="numpy")
 def triangle_stress(xy, c, s0, small, stress):
     """Stress (4,) xx, yy, xy, zz [Pa] of a triangle with the corners xy (6,), without the viscous part."""
-    cs, sn, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    cs, sn, e11, e22, e12 = triangle_stretch(xy, c, small)
     p, m = c[LAMBDA] * (e11 + e22), c[TWO_MU]
     stress[0], stress[1], stress[2] = laws.turned(s0[0] + (p + m * e11), s0[1] + (p + m * e22), s0[2] + m * e12, cs, sn)
     stress[3] = s0[3] + p
@@ -866,5 +866,5 @@ def triangle_stress(xy, c, s0, small, stress):
 @njit(cache=True, nogil=True, error_model="numpy")
 def triangle_energy(xy, c, s0, small):
     """Elastic energy per area [J/m3] of a triangle."""
-    _, _, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    _, _, e11, e22, e12 = triangle_stretch(xy, c, small)
     return _energy(e11, e22, e12, c[LAMBDA], c[TWO_MU], s0)
