@@ -220,7 +220,7 @@ _PARAMETER = Option(
     repeated=True,
 )
 USER = Model(
-    "user", "", "A law in a Python file of the user, see docs/user_laws.md. For triangles.",
+    "user", "", "A law in a Python file of the user, see docs/user_laws.md.",
     (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
                "fri{ction}", "pen{alty}"), _PARAMETER),
     one_of=_PAIRS, of=properties.USER, leading=(_LAW,),

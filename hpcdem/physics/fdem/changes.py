@@ -72,8 +72,6 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if MARK in name and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
-        raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
     if MARK in name and sim.budget is not None:
         raise CommandError(
             f"an energy budget is kept, but what the law {name.partition(MARK)[0]} stores and loses is not known: "

@@ -225,7 +225,7 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
         columns |= _creep_columns(sim, some)
     if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
-        memory = local.obeyed(local.s0.copy()) if local.laws else sim.cold[user_laws.COLUMN]
+        memory = local.law_states()
         columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]

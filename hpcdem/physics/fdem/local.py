@@ -135,6 +135,27 @@ class Evaluation:
     """Velocities after this moment's kick (n, w) [m/s]."""
 
 
+@dataclass(frozen=True)
+class LawHere:
+    """A law of the user on this rank: its table of properties, which blocks of triangles have an element with it, how
+    many triangles and quads have it."""
+
+    law: user_laws.UserLaw
+    table: np.ndarray
+    some: np.ndarray
+    triangles: int
+    quads: int
+
+    def obeying(self, local: Local, memory: np.ndarray, quads: bool) -> tuple:
+        """What its kernels need, of triangles or of quads; memory: see `user_laws.begin`."""
+        from hpcdem.physics.fdem.kernels.user_laws import Obeying
+
+        sim = local.sim
+        dt = sim.clock.dt if sim.options.dynamic else 0.0
+        row = local.quad_law_row if quads else local.law_row
+        return Obeying(self.some, row, self.table, dt, sim.n_left, memory, (memory.shape[1] - 1) // sim.element_parts)
+
+
 class Local:
     """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
 
@@ -256,30 +277,71 @@ class Local:
             strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
     def _make_laws(self) -> None:
-        """Elements with a law of the user have no moduli in the table of forces, see kernels/user_laws.py; stiff: the
-        table by which the time step is found, with moduli in the ratio of those of the element."""
-        sim, count = self.sim, self.count
-        self.stiff, self.laws = self.c, []
-        numbers = user_laws.numbers(sim)[sim.number[self.triangle_rows[:count]]]
-        if not user_laws.of_rows(sim.element_rows):
+        """Elements with a law of the user have no moduli in the tables of forces, see kernels/user_laws.py; stiff,
+        stiff_q: the tables by which the time step is found, with moduli in the ratio of those of the element."""
+        sim, rows = self.sim, self.sim.element_rows
+        self.stiff, self.stiff_q = self.c, self.q
+        self.laws: list[LawHere] = []
+        self.law_of_triangles: LawHere | None = None
+        self.law_of_quads: LawHere | None = None
+        if not user_laws.of_rows(rows):
             return
-        of, models = np.flatnonzero(numbers), element_table(sim.element_rows)
-        self.law_row = np.zeros(count + 3, np.int32)
-        self.law_row[:count] = sim.element_row[sim.number[self.triangle_rows[:count]]]
-        self.law_base = np.zeros((count + 3, 4))
+        owned = self.triangle_rows[: self.count], self.quad_rows
+        numbers = [user_laws.numbers(sim)[sim.number[of]] for of in owned]
+        self.law_row = np.zeros(self.count + 3, np.int32)
+        self.law_row[: self.count] = sim.element_row[sim.number[owned[0]]]
+        self.quad_law_row = np.zeros(len(self.quad_rows) + 3, np.int32)
+        self.quad_law_row[: len(self.quad_rows)] = sim.element_row[sim.number[owned[1]]]
+        self.law_base, self.quad_law_base = np.zeros((self.count + 3, 4)), np.zeros((len(self.quad_rows), 16))
         if sim.stress0 is not None:
-            self.law_base[of] = sim.initial_stresses(sim.number[self.triangle_rows[of]])
-        self.stiff = self.c.copy()
-        bound, row = sim.element_rows.column(user_laws.BOUND), self.law_row[of]
-        part = bound[row] / (models[row, build.LAME] + models[row, build.MU2])
-        self.stiff[of, elements.LAMBDA] *= part
-        self.stiff[of, elements.TWO_MU] *= part
-        self.c[of, elements.LAMBDA] = self.c[of, elements.TWO_MU] = 0.0
-        for k, law in enumerate(user_laws.of_rows(sim.element_rows)):
-            at = np.flatnonzero(numbers == 1 + k)
-            if len(at):
-                which = np.concatenate([at, np.repeat(at[-1:], 3)]).astype(np.int32)
-                self.laws.append((law, which, law.table(sim.element_rows)))
+            self.law_base[: self.count] = sim.initial_stresses(sim.number[owned[0]])
+            self.quad_law_base[:] = np.tile(sim.initial_stresses(sim.number[owned[1]]), 4)
+        self.stiff, self.stiff_q = self.c.copy(), self.q.copy()
+        models, bound = element_table(rows), np.array(rows.column(user_laws.BOUND))
+        modulus = models[:, build.LAME] + models[:, build.MU2]
+        for table, stiff, number, row, columns, s0, base in (
+            (
+                self.c, self.stiff, numbers[0], self.law_row, np.array([elements.LAMBDA, elements.TWO_MU]), self.s0,
+                self.law_base,
+            ),
+            (
+                self.q, self.stiff_q, numbers[1], self.quad_law_row, np.array([elements.Q_LAMBDA, elements.Q_TWO_MU]),
+                self.quad_s0, self.quad_law_base,
+            ),
+        ):  # fmt: skip
+            at = np.flatnonzero(number)
+            stiff[np.ix_(at, columns)] *= (bound[row[at]] / modulus[row[at]])[:, None]
+            table[np.ix_(at, columns)] = 0.0
+            s0[at] = base[at]  # what such an element has flowed or crept, with another model, is not of the law
+        blocks = np.arange(self.count) // elements.BLOCK
+        for k, law in enumerate(user_laws.of_rows(rows)):
+            triangles, quads = (number == 1 + k for number in numbers)
+            some = np.zeros(-(-self.count // elements.BLOCK), bool)
+            some[blocks[triangles]] = True
+            if triangles.any() or quads.any():
+                self.laws.append(LawHere(law, law.table(rows), some, int(triangles.sum()), int(quads.sum())))
+        # One law runs in the loop over forces, that of most elements; of the others stress is found before it.
+        for one in self.laws:
+            if one.triangles > (self.law_of_triangles.triangles if self.law_of_triangles else 0):
+                self.law_of_triangles = one
+            if one.quads > (self.law_of_quads.quads if self.law_of_quads else 0) and not self.yields:
+                self.law_of_quads = one
+
+    def try_law(self, law: user_laws.UserLaw) -> None:
+        """Call the kernels of a law as steps and looks will: those of quads where there are some, else those of
+        triangles. No element has it."""
+        sim, quads = self.sim, len(self.quad_rows) > 0
+        self.law_row, self.quad_law_row = (np.zeros(n + 3, np.int32) for n in (self.count, len(self.quad_rows)))
+        self.law_base, self.quad_law_base = self.s0, self.quad_s0
+        one = LawHere(law, np.zeros(len(law.columns)), np.zeros(len(self.head), bool), int(not quads), int(quads))
+        sim.cold[user_laws.COLUMN] = np.zeros((sim.n_own, 1 + sim.element_parts * len(law.states)))
+        self.laws, self.law_of_triangles, self.law_of_quads = [one], None, None
+        if quads:
+            self.law_of_quads = one
+        else:
+            self.law_of_triangles = one
+        self._elements(self.triangle_special, self.block_special, self.force, self.of_joints, False)
+        self.obeyed(self.s0, self.quad_s0)
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -489,7 +551,8 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = limits.time_step(
-            self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start,
+            *self.springs(),
             o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
@@ -508,7 +571,7 @@ class Local:
         own = sim.owned
         if not o.dynamic or not o.mechanical:
             limits.static_masses(
-                self.stiff, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
+                self.stiff, self.stiff_q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
@@ -546,15 +609,17 @@ class Local:
         self._move: Any = moving.move if one else moving.move_threaded
         self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
         small = not o.large_strain
+        stressed = sim.stress0 is not None or self.plastic or self.creeps
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic or self.creeps or bool(self.laws), small, self.slot_at,
+            stressed or any(one is not self.law_of_triangles for one in self.laws), small, self.slot_at,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None or self.plastic or self.creeps, small, self.slots_of_triangles, self.slot_at,
+            stressed or any(one is not self.law_of_quads for one in self.laws), small, self.slots_of_triangles,
+            self.slot_at,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond,
             pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
@@ -585,23 +650,28 @@ class Local:
         if self._creeps_now():
             self.creep(sim.cold["creep"], self.s0, self.quad_s0, keep=o.dynamic)
         if self.laws:
-            self._obey(sim.cold[user_laws.COLUMN], self.s0)
-        self._triangles(
-            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, o.mass_damping,
-            o.stiffness_damping, alpha, step, self.tally,
-        )  # fmt: skip
-        if len(self.quad_rows):
-            args = (
-                *self._quad_args, force, of_joints, keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping, step,
-                self.tally,
+            memory = sim.cold[user_laws.COLUMN]
+            self._obey(memory, self.s0, self.quad_s0, every=False)
+        what = (keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping)
+        args: tuple[Any, ...] = *self._triangle_args, special, block_special, force, of_joints, *what, alpha, step
+        if (one := self.law_of_triangles) is not None:
+            loop = one.law.loops.triangles if sim.threads == 1 else one.law.loops.triangles_threaded
+            loop(args[0], one.obeying(self, memory, False), *args[1:], self.tally)
+        else:
+            self._triangles(*args, self.tally)
+        if not len(self.quad_rows):
+            return
+        args = *self._quad_args, force, of_joints, *what, step
+        if (one := self.law_of_quads) is not None:
+            loop = one.law.loops.quads if sim.threads == 1 else one.law.loops.quads_threaded
+            loop(args[0], one.obeying(self, memory, True), *args[1:], self.tally)
+        elif self.yields:
+            self._yielding_quads(
+                *args, self.tally, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],
+                self.yield_table,
             )  # fmt: skip
-            if self.yields:
-                self._yielding_quads(
-                    *args, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],
-                    self.yield_table,
-                )  # fmt: skip
-            else:
-                self._quads(*args)
+        else:
+            self._quads(*args, self.tally)
 
     def open_joints(self) -> None:
         """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""
@@ -643,24 +713,43 @@ class Local:
             self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0, table,
         )  # fmt: skip
 
-    def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
-        """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0
-        (count + 3, 4) [Pa] the stress."""
-        sim = self.sim
-        dt = sim.clock.dt if sim.options.dynamic else 0.0
-        for law, which, table in self.laws:
-            loop = law.loop if sim.threads == 1 else law.loop_threaded
-            loop(
-                sim.threads, len(which) - 3, which, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c,
-                self.law_base, self.law_row, table, dt, not sim.options.large_strain, memory, s0,
-            )  # fmt: skip
+    def _obey(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, every: bool) -> None:
+        """Laws of the user at the present positions: memory, see `user_laws.begin`, becomes that after it, s0
+        (count + 3, 4) and quad_s0 (quads, 16) [Pa] the stress. every: those too that run in the loop over forces."""
+        sim, small = self.sim, not self.sim.options.large_strain
+        for one in self.laws:
+            if one.triangles and (every or one is not self.law_of_triangles):
+                one.law.loops.look(
+                    one.obeying(self, memory, False), self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c,
+                    self.law_base, small, s0,
+                )  # fmt: skip
+            if one.quads and (every or one is not self.law_of_quads):
+                one.law.loops.look_quads(
+                    one.obeying(self, memory, True), len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q,
+                    self.quad_law_base, small, quad_s0,
+                )  # fmt: skip
 
-    def obeyed(self, s0: np.ndarray) -> np.ndarray:
-        """State variables of laws of the user (n_own, 1 + states) after this moment, which the next forces will see;
-        s0 (count + 3, 4) [Pa] becomes their stress. The model stays as it is."""
+    def obeyed(self, s0: np.ndarray, quad_s0: np.ndarray) -> np.ndarray:
+        """State variables of laws of the user, see `user_laws.begin`, after this moment, which the next forces will
+        see; s0 (count + 3, 4) and quad_s0 (quads, 16) [Pa] become their stress. The model stays as it is."""
         memory = self.sim.cold[user_laws.COLUMN].copy()
-        self._obey(memory, s0)
+        self._obey(memory, s0, quad_s0, every=True)
         return memory
+
+    def law_states(self) -> np.ndarray:
+        """The same (n_own, 1 + states); of quads the mean of their triangles by area."""
+        sim = self.sim
+        memory = self.obeyed(self.s0.copy(), self.quad_s0.copy()) if self.laws else sim.cold[user_laws.COLUMN]
+        found = memory[:, : 1 + (memory.shape[1] - 1) // sim.element_parts].copy()
+        quads = self.quad_rows - sim.n_left
+        if len(quads) and found.shape[1] > 1:
+            found[quads, 1:] = self._mean_of_parts(memory[quads, 1:].reshape(len(quads), 4, -1))
+        return found
+
+    def _mean_of_parts(self, parts: np.ndarray) -> np.ndarray:
+        """Mean by area of columns (quads, 4, n) of the triangles of quads."""
+        areas = self.q[:, elements.Q_AREA : elements.Q_AREA + 4, None]
+        return (areas * parts).sum(axis=1) / areas.sum(axis=1)
 
     def _creeps_now(self) -> bool:
         """The next forces are those after some creep, or begin it."""
@@ -743,8 +832,7 @@ class Local:
         quads = self.quad_rows - self.sim.n_left
         if len(quads):
             parts = memory[quads].reshape(len(quads), 4, plasticity.MEMORY)
-            areas = self.q[:, elements.Q_AREA : elements.Q_AREA + 4, None]
-            found[quads] = (areas * parts).sum(axis=1) / areas.sum(axis=1)
+            found[quads] = self._mean_of_parts(parts)
             latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]
             found[np.ix_(quads, latest)] = parts[:, :, latest].max(axis=1)
             found[quads, plasticity.WORK] = parts[:, :, plasticity.WORK].sum(axis=1)
@@ -901,8 +989,8 @@ class Local:
         if self.creeps:
             crept, s0, quad_s0 = self.crept(*(() if memory is None else (s0, quad_s0)))
         if self.laws:
-            s0 = s0.copy()
-            self.obeyed(s0)
+            s0, quad_s0 = s0.copy(), quad_s0.copy()
+            self.obeyed(s0, quad_s0)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0
             n, first = sim.n_own, sim.n_left

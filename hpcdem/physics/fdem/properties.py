@@ -255,7 +255,7 @@ MECH_MOHR_COULOMB = Model(
 USER = Model(
     "user",
     ELEMENT,
-    "a law of the user, in a Python file: what its elements have beside what the law declares; triangles",
+    "a law of the user, in a Python file: what its elements have beside what the law declares",
     MECH_ISO_ELASTIC.properties,
     _elastic,
 )  # fmt: skip

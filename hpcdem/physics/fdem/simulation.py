@@ -502,6 +502,7 @@ class Blocks(State):
         if creeps or "creep" in self.cold:
             self._remember("creep", creeping.MEMORY)
         user_laws.begin(self)
+        user_laws.compile_for_quads(self)
         with self.timers("neighbour"):
             if self._topology_stale:
                 self.renew_topology()

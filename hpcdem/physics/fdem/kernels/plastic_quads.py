@@ -410,8 +410,8 @@ def _yielding(
         name_quads(first, n, rows, item, row)
         gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
         _gather_yield(whole, item, flat_yields, flat_surfaces, lanes)
-        _look_0(whole, small, beta, lanes)
-        _look_1(whole, small, beta, lanes)
+        _look_0(whole, small, beta, 0.0, lanes)
+        _look_1(whole, small, beta, 0.0, lanes)
         m = _outside_of(n, item, row, lanes, who, whose)
         if m > 0:
             for k in range(0, m, TILE):
@@ -420,8 +420,8 @@ def _yielding(
                     step, flat_memory, flat_s0, surfaces, tile,
                 )  # fmt: skip
             gather_stresses(whole, item, flat_s0, lanes)
-            overlay_loop_0(whole, small, beta, lanes)
-            overlay_loop_1(whole, small, beta, lanes)
+            overlay_loop_0(whole, small, beta, 0.0, lanes)
+            overlay_loop_1(whole, small, beta, 0.0, lanes)
         tied = finish_quads(
             first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
             flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
