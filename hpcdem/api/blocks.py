@@ -399,6 +399,23 @@ class Faces(_Modelled):
         }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
 
+    def heat(
+        self,
+        *,
+        heat_flux: Number | None = None,
+        transfer_coeficient: float | None = None,
+        environment_temperature: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Heat that comes in [W/m2], or its transfer [W/(m2 K)] from an environment of this temperature, without a
+        coefficient with that of the elements. Numbers or names of tables over the time of heat. Without a range: the
+        whole surface of the model."""
+        given = {
+            "heat_flux": heat_flux, "transfer_coeficient": transfer_coeficient,
+            "environment_temperature": environment_temperature,
+        }  # fmt: skip
+        self._carry_out("boundary", given, where, "thermal-const-heat")
+
     def free_field(self, *, where: Where = None) -> None:
         """Vertical sides beyond which the ground goes on, in dynamic runs: columns beside them move with the base."""
         self._carry_out("boundary", {}, where, "free-field")
@@ -466,13 +483,21 @@ class Nodes(Objects):
         given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
         self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
 
+    def temperature(self, temperature: Number, *, where: Where = None) -> None:
+        """Temperature of nodes from now on: a number or the name of a table over the time of heat."""
+        self._carry_out("boundary", {"temperature": temperature}, where, "thermal-solid-boundary-condition")
+
     def remove_boundary(self, *, where: Where = None) -> None:
-        """Take boundary conditions back, those of fluid too."""
+        """Take boundary conditions back, those of fluid and heat too."""
         self._carry_out("boundary remove", {}, where)
 
     def initial_velocity(self, velocity: Point, *, where: Where = None) -> None:
         """The velocity of nodes now [m/s]."""
         self._carry_out("initial", {"velocity": velocity}, where)
+
+    def initial_temperature(self, temperature: float, *, where: Where = None) -> None:
+        """The temperature of nodes now; elements around them are free of thermal stress then."""
+        self._carry_out("initial", {"temperature": temperature}, where)
 
     def reset_velocity(self) -> None:
         """All velocities become zero."""
@@ -809,11 +834,20 @@ class Charts(Words):
         self._do("chart add", given, where, g.JOINT)
 
     def export(
-        self, name: str, file: File, cracks: bool = False, plastic: bool = False, fluid: str | None = None
+        self,
+        name: str,
+        file: File,
+        cracks: bool = False,
+        plastic: bool = False,
+        fluid: str | None = None,
+        temperature: bool = False,
     ) -> None:
-        """Write a diagram as figure and CSV; cracks, plastic, fluid ("pressure", "saturation", "aperture" or
-        "velocity"): beside it the model as it is now, with one of them."""
-        given = {"name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid}
+        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture"
+        or "velocity"): beside it the model as it is now, with one of them."""
+        given = {
+            "name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid,
+            "temperature": temperature,
+        }  # fmt: skip
         self._do("chart export", given)
 
 
@@ -881,13 +915,15 @@ class BlockCommands:
         mechanical: bool | None = None,
         hydraulic: bool | None = None,
         one_way: bool | None = None,
+        thermal: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
         "refuse", "relax" or "keep"; rotations of elements; keep the energy budget; motion at all; flow of fluid, and
-        whether it does not push."""
+        whether it does not push; flow of heat."""
         given = {
             "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
             "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way,
+            "thermal": thermal,
         }  # fmt: skip
         self._blocks("model option", given)
 
@@ -899,20 +935,33 @@ class BlockCommands:
         safety: float | None = None,
         mass_scaling: float | None = None,
         hydraulic: float | None = None,
+        thermal: float | None = None,
     ) -> None:
         """The time step of dynamic runs of blocks: given [s], estimated again and again, or reached by mass;
-        hydraulic [s]: that of flow."""
-        given = {"value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling, "hydraulic": hydraulic}
+        hydraulic, thermal [s]: those of flow and of heat."""
+        given = {
+            "value": value, "auto": auto, "safety": safety, "mass_scaling": mass_scaling, "hydraulic": hydraulic,
+            "thermal": thermal,
+        }  # fmt: skip
         self._blocks("model time-step", given)
 
-    def sub_step(self, *, mechanical: int | None = None, hydraulic: int | None = None) -> None:
-        """Steps of the blocks between two cycles of flow, and sub-steps of such a cycle (0: as many as are stable)."""
-        self._blocks("model sub-step", {"mechanical": mechanical, "hydraulic": hydraulic})
+    def sub_step(
+        self, *, mechanical: int | None = None, hydraulic: int | None = None, thermal: int | None = None
+    ) -> None:
+        """Steps of the blocks between two cycles of flow and heat, and sub-steps of such cycles (0: as many as are
+        stable)."""
+        given = {"mechanical": mechanical, "hydraulic": hydraulic, "thermal": thermal}
+        self._blocks("model sub-step", given)
 
     @property
     def fluid(self) -> dict[str, float]:
         """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
         return fdem.queries.fluid(self._blocks.project())
+
+    @property
+    def heat(self) -> dict[str, float]:
+        """The account of heat [J/m]: given, commands, stored, removed; what does not add up. Collective."""
+        return fdem.queries.heat(self._blocks.project())
 
     def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:
         """Rayleigh damping of elements in dynamic runs: ratio of the critical one at a frequency [Hz]; part: both
@@ -956,18 +1005,22 @@ class BlockCommands:
         solver: str | None = None,
         steps: int | None = None,
         hydraulic: bool = False,
+        thermal: bool = False,
         dt: float | None = None,
         steady: bool = False,
+        auto: bool = False,
     ) -> None:
         """Steps until the first of ratio, cycles and time [s] is reached; with elastic straight to static equilibrium,
         in so many steps of what is new in the loads; with hydraulic fluid flows by implicit steps of at most dt [s],
-        for this time or until it is steady, through blocks in equilibrium.
+        for this time or until it is steady, through blocks in equilibrium; with thermal so does heat. With auto
+        fluid flows by explicit steps, if these cost less.
         In static runs with creep time is creep time.
         A run towards a ratio that gets nowhere (window, limit) ends the program with exit code 3, unless on_failure
         is "continue"; `solved` says how it ended."""
         given = {
             "ratio": ratio, "cycles": cycles, "time": time, "window": window, "limit": limit, "on_failure": on_failure,
-            "elastic": elastic, "solver": solver, "steps": steps, "hydraulic": hydraulic, "dt": dt, "steady": steady,
+            "elastic": elastic, "solver": solver, "steps": steps, "hydraulic": hydraulic, "thermal": thermal, "dt": dt,
+            "steady": steady, "auto": auto,
         }  # fmt: skip
         self._before_steps()
         self._blocks("model solve", given)

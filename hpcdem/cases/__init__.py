@@ -26,7 +26,7 @@ CASES = {
     "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar", "creep": "Creep",
     "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
-    "hydraulic-fracture": "HydraulicFracture",
+    "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]

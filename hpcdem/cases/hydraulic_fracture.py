@@ -14,13 +14,14 @@ from hpcdem.cases.kgd_solutions import resolution
 @dataclass(frozen=True)
 class Fracture:
     """length [m]: half length, to the damage 0.2 (toughness) or to the last joint behind its peak (viscosity); opening
-    [m] and pressure [Pa, above the confinement] in the middle; *_error: relative, to the closed form; balance: what of
-    the fluid does not add up; curve: (time [s], length, opening, pressure) at ten times, or at the end; steps: implicit
-    ones."""
+    [m] and pressure [Pa, above the confinement] in the middle; front [m]: of the fluid; *_error: relative, to the
+    closed form; balance: what of the fluid does not add up; curve: (time [s], length, opening, pressure) at ten times,
+    or at the end; steps: implicit ones."""
 
     length: float
     opening: float
     pressure: float
+    front: float
     length_error: float
     opening_error: float
     pressure_error: float
@@ -127,14 +128,16 @@ def state():
     gone = np.where(state == 3, 1.0, np.where(state == 2, damage, 0.0)) > TIP
     tip = x[order][gone].max() + 0.5 * size if gone.any() else 0.0
     well = float(np.asarray(pcdc.values('flow-node', 'pressure', group='well', set='wet'))[0])
-    return tip, float(1.5 * opening[0] - 0.5 * opening[1]), well - confinement, x[order], opening
+    filled = np.asarray(pcdc.values('flow-channel', 'saturation'))[order] > 0.5
+    front = float(x[order][filled].max()) + 0.5 * size
+    return tip, float(1.5 * opening[0] - 0.5 * opening[1]), well - confinement, front, x[order], opening
 pcdc history create 'pressure' flow-node value pressure mean range group 'well' set 'wet'
 pcdc history create 'given' model value fluid-given
 curve, first = [], pcdc.cycle
 parts = PARTS
 for part in range(parts):
     pcdc model solve hydraulic time [time/parts] dt [time/steps_at_most]
-    length, opening, pressure, x, profile = state()
+    length, opening, pressure, front, x, profile = state()
     t = (part + 1) * time / parts
     curve.append((t, float(length), opening, pressure))
     print('%.4g s: half length %.4g m (%.4g), opening %.4g um (%.4g), net pressure %.4g MPa (%.4g)' % (

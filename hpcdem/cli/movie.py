@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from hpcdem.runtime.progress import Log
 
 FLUID = ("pressure", "saturation", "aperture", "velocity")
-PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", *FLUID)} | {"both": ("cracks", "stress")}
+PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", "temperature", *FLUID)} | {
+    "both": ("cracks", "stress")
+}
 """By words of --show."""
 PAGE = 17.0
 """Width [cm] of a page on which fonts and lines have their sizes; a film shows the page with --size pixels."""
@@ -35,8 +37,8 @@ PAGE = 17.0
 @click.option("-o", "--output", type=PATH, metavar="FILE", help="The film [DIR/movie.gif, .mp4].")
 @click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
 @click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
-              "they broke, compressive stress, plastic strain, of fluid in joints pressure, saturation, aperture or "
-              "velocity; both: the first two [what there is].")  # fmt: skip
+              "they broke, compressive stress, plastic strain, temperature, of fluid in joints pressure, saturation, "
+              "aperture or velocity; both: the first two [what there is].")  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @looks
 def movie(**options: Any) -> None:

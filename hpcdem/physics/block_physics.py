@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.free_field import FreeField
     from hpcdem.physics.fdem.structures import Structure
     from hpcdem.physics.flow.model import Flow
+    from hpcdem.physics.heat.model import Heat
 
 
 def _bolts() -> type[Structure]:
@@ -39,7 +40,13 @@ def _free_field() -> type[FreeField]:
     return FreeField
 
 
-PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow]]] = {
-    "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid,
+def _heat() -> type[Heat]:
+    from hpcdem.physics.heat.model import Heat
+
+    return Heat
+
+
+PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Heat]]] = {
+    "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "heat": _heat,
 }  # fmt: skip
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

@@ -21,8 +21,8 @@ from hpcdem.io.axes import View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post import bolts, fluid, liners
 
-CRACKS, STRESS, PLASTIC = "cracks", "stress", "plastic"
-PANELS = (CRACKS, STRESS, PLASTIC, *fluid.PICTURES)
+CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
+PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
 CM = 1.0 / 2.54
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
@@ -43,9 +43,9 @@ _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the pa
 
 @dataclass(frozen=True)
 class Looks:
-    """panels: of PANELS, none: cracks, stress, and plastic strain and pressure of fluid where there is some; page:
-    width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with {step} and {time}; ranges: of
-    the colours of panels, SI; those that are not given are those of the frame."""
+    """panels: of PANELS, none: cracks, stress, and plastic strain, temperature and pressure of fluid where there is
+    some; page: width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with {step} and {time};
+    ranges: of the colours of panels, SI; those that are not given are those of the frame."""
 
     panels: tuple[str, ...] = ()
     page: float = 17.0
@@ -112,6 +112,18 @@ def plastic_shear(state: MeshState) -> np.ndarray:
     return state.of_elements.get("plastic_shear_strain", np.zeros(len(state.cells)))
 
 
+def temperature(state: MeshState) -> np.ndarray:
+    """(n,) temperature of the corners; 0 where the frame has none."""
+    return state.of_points.get("temperature", np.zeros(len(state.points)))
+
+
+def temperature_range(state: MeshState) -> tuple[float, float]:
+    """Least and greatest temperature of the corners of elements."""
+    values = temperature(state)[state.cells[state.cells >= 0]]
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+
+
 def stress_range(state: MeshState) -> tuple[float, float]:
     """Least and greatest compressive stress [Pa] without the extreme percent of the elements."""
     values = compression(state)
@@ -131,18 +143,20 @@ def plastic_range(state: MeshState) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Contours:
-    """A panel with contours of what elements have; units: from the largest value to size and name of the unit."""
+    """A panel with contours of what elements have, or their corners; units: from the largest value to size and name of
+    the unit."""
 
     values: Callable[[MeshState], np.ndarray]
     range: Callable[[MeshState], tuple[float, float]]
     units: Sequence[tuple[float, str]]
     title: str
     colours: str
+    of_corners: bool = False
 
 
 def panels_of(state: MeshState) -> tuple[str, ...]:
     """The panels that show what there is."""
-    wet = ("pressure",) if fluid.there(state) else ()
+    wet = (TEMPERATURE,) * ("temperature" in state.of_points) + ("pressure",) * fluid.there(state)
     if plastic_range(state)[1] > 0.0:
         return ((CRACKS,) if len(state.joints) else ()) + (STRESS, PLASTIC, *wet)
     return CRACKS, STRESS, *wet
@@ -340,6 +354,7 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 CONTOURS = {
     STRESS: Contours(compression, stress_range, fluid.PRESSURES, "compressive stress", "YlOrBr"),
     PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGn"),
+    TEMPERATURE: Contours(temperature, temperature_range, ((1.0, "K"),), "temperature", "inferno_r", of_corners=True),
 }
 COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
 """Panels with a bar of colours."""
@@ -362,7 +377,7 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
         return None
     unit, _ = unit_of(shown, span)
     levels = nice_levels(span[0] / unit, span[1] / unit)
-    points, triangles, values = smoothed(state, shown.values(state))
+    points, triangles, values = (cornered if shown.of_corners else smoothed)(state, shown.values(state))
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
     filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap=shown.colours, extend="both", zorder=1)
     joints = state.of_joints.get("state", np.empty(0))
@@ -384,6 +399,15 @@ def nice_levels(low: float, high: float) -> np.ndarray:
     step = next(s * power for s in (1.0, 2.0, 2.5, 5.0, 10.0) if spread / (s * power) <= LEVELS)
     first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
     return step * np.arange(first, max(last, first + 1) + 1)
+
+
+def cornered(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of values (n,) of the corners of elements."""
+    quads = state.cells[state.cells[:, 3] >= 0]
+    triangles = np.concatenate([state.cells[:, :3], quads[:, [0, 2, 3]]])
+    a, b, c = (state.points[triangles[:, k]] for k in range(3))
+    area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    return state.points, triangles[area != 0.0], np.nan_to_num(values)
 
 
 def smoothed(state: MeshState, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -66,7 +66,7 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
     from hpcdem.post import blocks
 
     coloured = panel != blocks.CRACKS
-    views = {blocks.CRACKS: blocks.view, blocks.PLASTIC: blocks.view_of_flow}
+    views = {blocks.CRACKS: blocks.view, blocks.TEMPERATURE: blocks.view, blocks.PLASTIC: blocks.view_of_flow}
     seen = views.get(panel, blocks.view_of_fluid)(model)
     height = SIZE[1] - (0.95 if coloured else 0.75)  # of the panels: above and below there are words
     width = min(max(height * seen.width / seen.height, 0.3 * height), 1.5 * height)

@@ -254,7 +254,7 @@ def test_the_bulk_modulus_says_how_fast() -> None:
 @pytest.mark.parametrize(
     "name, value",
     [("matrix_permeability", 4e-15), ("matrix_porosity", 0.4), ("matrix_porosity_compressibility", 4e-9),
-     ("matrix_pore_pressure", 5e5), ("leak_off", 0.0)],
+     ("matrix_pore_pressure", 5e5), ("matrix_pore_pressure", -5e5), ("leak_off", 0.0)],
 )  # fmt: skip
 def test_each_property_of_leak_off_changes_it(name: str, value: float) -> None:
     matrix = {"matrix_permeability": 1e-15, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}

@@ -3,7 +3,8 @@
 python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
-SOLVER-pumped: a joint that fluid opens by implicit steps; one after the other. Files are RUN.npz.
+SOLVER-pumped: a joint that fluid opens by implicit steps, or SOLVER-cooled: a jointed bar that cools; one after
+the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -21,8 +22,11 @@ from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.implicit import Implicit
+from hpcdem.physics.heat.model import Heat
 from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
 from tests.flow.support import WATER
+from tests.heat.support import GRANITE
 from tests.parallel.model import communicator
 
 NAMES = (
@@ -112,7 +116,38 @@ def pumped(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def cooled(sim: Blocks, solver: str, out: str) -> None:
+    sim.take_mesh(shaken(rectangle(24, 6, 2.4, 0.6, kind="mixed"), 0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    mesh = sim.the_mesh()
+    x, y = mesh.points.T
+    joints = sim.numbers_of_joints(None)
+    law = {**JOINT, "friction": 30.0, "tensile_strength": 1e8, "cohesion": 1e8, "penalty_normal": 20.0 * ROCK["young"]}
+    ends = np.array([mesh.points[mesh.cells[j // 4]][:3].mean(axis=0)[0] for j in joints])
+    sim.joint_model(joints[np.abs(ends - 1.2) < 0.15], "classic_intrinsic_cohesive_interface", law)
+    sim.option(dynamic=False, large_strain=False, collision=False)
+    for end in (0.0, 2.4):
+        sim.velocity_condition(np.flatnonzero(np.abs(x - end) < 1e-9), vx=0.0, vy=0.0)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 1e-5, "conductivity_across": 1.0})
+    heat.initial(None, 20.0)
+    sim.table("winter", [(0.0, 20.0), (1e5, -10.0)])
+    heat.prescribe(np.flatnonzero(x < 1e-9), "winter")
+    heat.expose(None, environment="winter", transfer=30.0)
+    run = Implicit(sim, solver)
+    for _ in range(10):
+        run.advance(1e4)
+    run.close()
+    found = {name: diagnostics.values(sim, name) for name in (*NAMES, "temperature")}
+    found["joints"] = np.array(diagnostics.joint_counts(sim))
+    found["account"] = np.array(list(heat.account().values())[:4])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
 if __name__ == "__main__":
     for run in sys.argv[1:]:
         solver, _, kind = run.partition("-")
-        {"": excavation, "yields": stamp, "pumped": pumped}[kind](Blocks(communicator()), solver, f"{run}.npz")
+        {"": excavation, "yields": stamp, "pumped": pumped, "cooled": cooled}[kind](
+            Blocks(communicator()), solver, f"{run}.npz"
+        )

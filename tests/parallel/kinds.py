@@ -6,7 +6,8 @@ from tests.blocks.models import MODELS as BLOCKS
 from tests.bolts.models import MODELS as BOLTS
 from tests.coupled.models import MODELS as COUPLED
 from tests.flow.models import MODELS as FLOW
+from tests.heat.models import MODELS as HEAT
 from tests.liners.models import MODELS as LINERS
 from tests.parallel.model import Model
 
-KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | COUPLED
+KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | HEAT | COUPLED

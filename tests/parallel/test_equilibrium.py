@@ -34,7 +34,9 @@ def runs(tmp_path_factory) -> Callable[[int, str], Found]:
                 found[name] = dict(values)
         return found
 
-    return lambda ranks, name: started(ranks, *(name.split("-")[0] + kind for kind in ("", "-yields", "-pumped")))[name]
+    return lambda ranks, name: started(
+        ranks, *(name.split("-")[0] + kind for kind in ("", "-yields", "-pumped", "-cooled"))
+    )[name]
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +65,14 @@ def test_fluid_opens_the_joint(runs):
     assert found["joints"][2] > 3 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
 
 
+def test_cold_strains_the_joints(runs):
+    found = runs(1, "direct-cooled")
+    assert found["joints"][0] > 20 and np.ptp(found["temperature"]) > 5.0
+    assert np.nanmax(found["stress_xx"]) > 1e6 and np.nanmax(found["opening"]) > 1e-7
+
+
 @pytest.mark.mpi
-@pytest.mark.parametrize("name", ["direct", "direct-yields", "direct-pumped"])
+@pytest.mark.parametrize("name", ["direct", "direct-yields", "direct-pumped", "direct-cooled"])
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=SLOW), 3, pytest.param(4, marks=SLOW)])
 def test_the_same_bits(runs, name, ranks):
     alone, found = runs(1, name), runs(ranks, name)
@@ -75,12 +83,15 @@ def test_the_same_bits(runs, name, ranks):
 
 ELASTIC = ("stress_xx", "stress_yy", "stress_xy", "displacement_x", "displacement_y", "opening")
 PUMPED = ("stress_yy", "displacement_y", "opening", "pressure", "saturation", "fluid", "joints", "account")
+COOLED = ("stress_xx", "displacement_x", "temperature", "account")
 PLASTIC = ("stress_xx", "stress_yy", "displacement_x", "displacement_y", "plastic_shear_strain", "plastic_work")
 
 
 @pytest.mark.mpi
 @pytest.mark.petsc
-@pytest.mark.parametrize(("kind", "quantities"), [("", ELASTIC), ("-yields", PLASTIC), ("-pumped", PUMPED)])
+@pytest.mark.parametrize(
+    ("kind", "quantities"), [("", ELASTIC), ("-yields", PLASTIC), ("-pumped", PUMPED), ("-cooled", COOLED)]
+)
 @pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=SLOW), pytest.param(4, marks=SLOW)])
 def test_petsc_on_several_ranks(runs, kind, quantities, ranks):
     alone, found = runs(1, f"direct{kind}"), runs(ranks, f"petsc{kind}")

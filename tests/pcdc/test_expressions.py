@@ -58,7 +58,9 @@ def _without(options: tuple[Option, ...], *names: str) -> list[Option]:
 
 EXCLUDING = {
     "model time-step": ("value", "mass-scaling"),
-    "model solve": ("time", "elastic", "cycles", "solver", "steps", "hydraulic", "dt", "steady"),
+    "model solve": (
+        "time", "elastic", "cycles", "solver", "steps", "hydraulic", "thermal", "dt", "steady", "auto",
+    ),
     "history create": ("id", "nearest", "mean", "minimum", "sum", "variable", "well"),
     "bolt create polyline": ("length",), "flow-node initial": ("saturation",),
     "well stage": ("pressure", "shut-in"),

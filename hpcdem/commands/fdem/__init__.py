@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         flow,
         frames,
         geometry,
+        heat,
         histories,
         liners,
         meshes,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "flow", "frames", "geometry",
-    "histories", "liners", "meshes", "queries", "settings", "steps", "summary", "supports",
+    "heat", "histories", "liners", "meshes", "queries", "settings", "steps", "summary", "supports",
 ]  # fmt: skip
 
 

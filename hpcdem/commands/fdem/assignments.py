@@ -32,6 +32,8 @@ def element_model(project: Project, name: str, properties: Mapping[str, Value], 
     taken out come back, free of stress where their place is now; without a range these stay away."""
     blocks = project.ready()
     elements = chosen(project, ELEMENT, where, null_too=True)
+    if elements is not None and "heat" in blocks.surface_loads and not blocks.alive[elements].all():
+        raise CommandError("elements that were taken out do not come back in a model with heat in this version")
     changes.element_model(blocks, elements, name, properties)
     if elements is not None:
         project.alive[elements] = True

@@ -19,6 +19,7 @@ from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import path as path_of
+from hpcdem.physics.heat.model import Heat
 
 
 def create(project: Project, name: str, title: str = "", x_label: str = "", y_label: str = "") -> None:
@@ -79,18 +80,21 @@ def _by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def export(
-    project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False, fluid: str = ""
-) -> None:
+    project: Project, name: str, path: str, cracks: bool = False, plastic: bool = False, fluid: str = "",
+    temperature: bool = False,
+) -> None:  # fmt: skip
     """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
-    row per point. cracks, plastic, fluid (pressure, saturation, aperture or velocity): the figure also shows the model
-    at this moment, with one of them. Collective."""
+    row per point. cracks, plastic, temperature, fluid (pressure, saturation, aperture or velocity): the figure also
+    shows the model at this moment, with one of them. Collective."""
     from hpcdem.post.charts import draw
 
     chart, figure = _chart(project, name), project.result(path)
     figure_name(path)
-    beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, fluid) if panel]
+    beside = [panel for panel in ("cracks" * cracks, "plastic" * plastic, "temperature" * temperature, fluid) if panel]
     if len(beside) > 1:
-        raise CommandError("cracks, plastic and fluid: beside a diagram there is room for one of them")
+        raise CommandError("cracks, plastic, temperature and fluid: beside a diagram there is room for one of them")
+    if temperature and Heat.there(project.ready(use=False)) is None:
+        raise CommandError("there is no heat: element c-model thermal-iso-heat comes first")
     if fluid and Flow.there(project.ready(use=False)) is None:
         raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]

@@ -110,6 +110,11 @@ def stage(
     _flow(project).stage(name, does, value, duration, most)
 
 
-def sub_step(project: Project, mechanical: int | None = None, hydraulic: int | None = None) -> None:
-    """Steps of the blocks between two cycles of flow, and sub-steps of such a cycle."""
-    project.blocks.flow_clock(every=mechanical, steps=hydraulic)
+def sub_step(
+    project: Project, mechanical: int | None = None, hydraulic: int | None = None, thermal: int | None = None
+) -> None:
+    """Steps of the blocks between two cycles of flow and heat, and sub-steps of such cycles."""
+    if (mechanical, hydraulic) != (None, None):
+        project.blocks.flow_clock(every=mechanical, steps=hydraulic)
+    if thermal is not None:
+        project.blocks.heat_clock(steps=thermal)

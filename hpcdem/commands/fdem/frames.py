@@ -119,13 +119,15 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
         name for name, quantity in QUANTITIES.items()
         if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
         and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
+        and (name != "mean_temperature" or "heat" in blocks.surface_loads)
     ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip
 
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
     """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
     vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
-    columns = diagnostics.owned_values(blocks, "corner", vectors)
+    heat = ["temperature"] if "heat" in blocks.surface_loads else []
+    columns = diagnostics.owned_values(blocks, "corner", vectors + heat)
     columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
     return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
 

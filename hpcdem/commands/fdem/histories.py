@@ -74,7 +74,7 @@ def create(
 def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
     if kind in SUPPORTS or kind in FLOW:
         numbers, middles = everything(project, kind, None), places(project, kind)
-        return nearest_point(middles, at, numbers)
+        return int(numbers[nearest_point(middles, at)])
     mesh, xy = project.whole_mesh(), project.positions()
     if kind == NODE:
         return nearest_point(xy, at, np.flatnonzero(~np.isnan(xy[:, 0])))

@@ -14,6 +14,7 @@ from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.groups import FLOW, SUPPORTS, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
+from hpcdem.physics.heat.model import Heat
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
@@ -62,6 +63,14 @@ def fluid(project: Project) -> dict[str, float]:
     found = Flow.there(project.ready(use=False))
     if found is None:
         raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
+    return found.account()
+
+
+def heat(project: Project) -> dict[str, float]:
+    """The account of heat [J/m], see `Heat.account`. Collective."""
+    found = Heat.there(project.ready(use=False))
+    if found is None:
+        raise CommandError("there is no heat: element c-model thermal-iso-heat comes first")
     return found.account()
 
 

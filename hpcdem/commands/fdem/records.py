@@ -15,6 +15,7 @@ from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, SUPPORTS
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
+from hpcdem.physics.heat.model import Heat
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
@@ -27,13 +28,14 @@ LAW_STATE = "law_state"
 UNITS = {
     NODE: {
         "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
-        "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m",
+        "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m", "temperature": "K",
     },
     ELEMENT: {
         "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
         "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
         "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
-        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", LAW_STATE: "that of the law",
+        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", "mean_temperature": "K",
+        LAW_STATE: "that of the law",
     },
     JOINT: {
         "opening": "m", "slip": "m", "damage": "1", "normal_stress": "Pa", "shear_stress": "Pa", "state": "1",
@@ -52,8 +54,9 @@ UNITS = {
         "kinetic_energy": "J/m", "strain_energy": "J/m", "joint_energy": "J/m", "joint_loss": "J/m",
         "contact_energy": "J/m", "viscous_loss": "J/m", "plastic_loss": "J/m", "creep_loss": "J/m",
         "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "liner_work": "J/m",
-        "energy_error": "J/m",
+        "heat_work": "J/m", "energy_error": "J/m",
         "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
+        "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -74,6 +77,16 @@ def _of_fluid(name: str) -> Callable[[Any], float]:
         if flow is None:
             return 0.0
         return float(flow.time) if name == "time" else flow.account()[name]
+
+    return measure
+
+
+def _of_heat(name: str) -> Callable[[Any], float]:
+    def measure(blocks: Blocks) -> float:
+        heat = Heat.there(blocks)
+        if heat is None:
+            return 0.0
+        return float(heat.time) if name == "time" else heat.account()[name]
 
     return measure
 
@@ -99,17 +112,23 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "disc_work": _energy("work_discs"),
     "bolt_work": _energy("work_bolts"),
     "liner_work": _energy("work_liners"),
+    "heat_work": _energy("work_heat"),
     "energy_error": _energy("closing"),
     "flow_time": _of_fluid("time"),
     "fluid_given": _of_fluid("given"),
     "fluid_stored": _of_fluid("stored"),
     "fluid_leaked": _of_fluid("leaked"),
+    "heat_time": _of_heat("time"),
+    "heat_given": _of_heat("given"),
+    "heat_stored": _of_heat("stored"),
 }
 _OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
     "": lambda values: values[0], "sum": lambda values: math.fsum(values.tolist()),
     "mean": lambda values: math.fsum(values.tolist()) / len(values), "minimum": np.min, "maximum": np.max,
 }  # fmt: skip
-ENERGIES = tuple(name for name, unit in UNITS[MODEL].items() if unit == "J/m")
+ENERGIES = tuple(
+    name for name, unit in UNITS[MODEL].items() if unit == "J/m" and name not in ("heat_given", "heat_stored")
+)
 
 
 @dataclass

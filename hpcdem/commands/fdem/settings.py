@@ -32,13 +32,14 @@ def option(
     mechanical: bool | None = None,
     hydraulic: bool | None = None,
     one_way: bool | None = None,
+    thermal: bool | None = None,
 ) -> None:
     """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on; mechanical, hydraulic, one_way: see `Blocks.parts`."""
+    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal: see `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
-    if (mechanical, hydraulic, one_way) != (None, None, None):
-        project.blocks.parts(mechanical=mechanical, hydraulic=hydraulic, one_way=one_way)
+    if (mechanical, hydraulic, one_way, thermal) != (None, None, None, None):
+        project.blocks.parts(mechanical=mechanical, hydraulic=hydraulic, one_way=one_way, thermal=thermal)
     if dynamic is not None:
         project.dynamic = dynamic
     if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
@@ -57,10 +58,14 @@ def time_step(
     safety: float | None = None,
     mass_scaling: float | None = None,
     hydraulic: float | None = None,
+    thermal: float | None = None,
 ) -> None:
-    """The time step of dynamic runs [s]; see `Blocks.time_step`. hydraulic: of flow, see `Blocks.flow_clock`."""
+    """The time step of dynamic runs [s]; see `Blocks.time_step`. hydraulic, thermal: of flow and of heat, see
+    `Blocks.flow_clock`, `Blocks.heat_clock`."""
     if hydraulic is not None:
         project.blocks.flow_clock(dt=hydraulic)
+    if thermal is not None:
+        project.blocks.heat_clock(dt=thermal)
     if (value, auto, safety, mass_scaling) == (None, None, None, None):
         return
     project.blocks.time_step(value=value, auto=auto, safety=safety, mass_scaling=mass_scaling)

@@ -16,8 +16,10 @@ from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError, Sto
 from hpcdem.io.behind import under_way
 from hpcdem.physics.fdem import convergence, creep, diagnostics, equilibrium
 from hpcdem.physics.fdem.convergence import RATIO, Watch
+from hpcdem.physics.flow import costs
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.runtime.progress import duration, rate
 from hpcdem.runtime.stop_requests import STOP
 
@@ -58,6 +60,8 @@ def resume(project: Project) -> None:
             solve_elastic(project, **given)
         case "solve hydraulic":
             solve_hydraulic(project, **given)
+        case "solve thermal":
+            solve_thermal(project, **given)
 
 
 def solve(
@@ -130,16 +134,23 @@ def solve_elastic(
 
 
 def solve_hydraulic(
-    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
-) -> None:
+    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto",
+    auto: bool = False,
+) -> None:  # fmt: skip
     """Flow by implicit steps, see `coupled.Coupled`: for so much flow time [s], with blocks in static equilibrium if
-    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given."""
+    they move, or until it is steady. dt: longest time step [s]; a hundredth of the time, if it is not given. auto: by
+    explicit steps instead, as model solve and model step do them, where these cost less."""
     project.refuse_inside("model solve hydraulic")
     coupling.refuse(project, "model solve hydraulic")
     if steady == (time is not None):
         raise CommandError("flow is solved for some time or until it is steady: time or steady, one of them")
+    if auto and time is None:
+        raise CommandError("auto compares the steps of some time: steady flow is found by implicit ones")
     blocks = project.ready()
     flow = Flow.there(blocks)
+    if auto and flow is not None and time is not None and _explicit_is_cheaper(project, flow, time, dt, solver):
+        _flow_by_steps(project, flow, time)
+        return
     first, began = project.step, clocks.monotonic()
     run = Coupled(blocks, dt or (STEADY_STEP if time is None else 0.01 * time), solver)
     if time is None:
@@ -169,6 +180,119 @@ def solve_hydraulic(
         )
     histories.flush(project)
     frames.settle(project)
+
+
+def solve_thermal(
+    project: Project, time: float | None = None, dt: float | None = None, steady: bool = False, solver: str = "auto"
+) -> None:
+    """Heat by implicit steps, see `implicit.Implicit`: for so much time of heat [s], with blocks in static equilibrium
+    if they move, or the steady state at once. dt: longest time step [s]; a hundredth of the time, if it is not
+    given."""
+    project.refuse_inside("model solve thermal")
+    coupling.refuse(project, "model solve thermal")
+    if steady == (time is not None):
+        raise CommandError("heat is solved for some time or until it is steady: time or steady, one of them")
+    if steady and dt is not None:
+        raise CommandError("dt goes with time: the steady state of heat is found at once")
+    if dt is not None and not dt > 0.0:
+        raise CommandError(f"the time step must be positive, got {dt:g}")
+    blocks = project.ready()
+    began, first = clocks.monotonic(), project.step
+    run = Implicit(blocks, solver)
+    try:
+        if time is None:
+            run.steady()
+            _write_due(project)
+        else:
+            if project.progress is None:
+                count = max(1, math.ceil(time / (dt or 0.01 * time) - 1e-9))
+                command = "solve thermal", {"time": time, "dt": dt, "solver": solver}
+                project.progress = {"first": first, "left": count, "dt": time / count, "command": command}
+            first = project.progress["first"]
+            project.stepping = "solve thermal"
+            frames.write_due(project)
+            while project.progress["left"] > 0:
+                _heat_on(project, run, project.progress)
+    finally:
+        run.close()
+        under_way.wait()
+        project.progress, project.stepping = None, ""
+    project.solved = {"reason": "steady" if steady else "time", "ratio": math.nan, "steps": project.step - first}
+    if project.log is not None:
+        name = "" if run.solver is None else f", {run.solver.name}"
+        project.log.info(
+            f"{_where(project)}solve thermal: {run.steps} implicit steps, {run.factors} factors, {run.unknowns} "
+            f"unknowns{name}, {duration(clocks.monotonic() - began)}"
+        )
+    histories.flush(project)
+    frames.settle(project)
+
+
+def _heat_on(project: Project, run: Implicit, progress: dict[str, Any]) -> None:
+    """An implicit step of heat, and what is due then; a checkpoint, if one is asked for."""
+    run.advance(progress["dt"])
+    progress["left"] -= 1
+    _write_due(project)
+    stop = project.blocks.stop
+    if stop is not None and progress["left"] > 0:
+        asked = int(project.comm.max_into(np.array([stop.local_request()], np.int64))[0])
+        if asked:
+            _answer(project, asked)
+
+
+def _explicit_is_cheaper(project: Project, flow: Flow, time: float, dt: float | None, solver: str) -> bool:
+    """Whether so much flow time [s] is to pass by explicit steps: they cost less, or implicit ones are refused; said in
+    the log. A command that goes on from a checkpoint does what it did before. Collective."""
+    if project.progress is not None:
+        return bool(project.progress["command"][0] != "solve hydraulic")
+    blocks, refused = project.blocks, None
+    blocks.close_model()
+    stepped = costs.explicit(flow, time)
+    try:
+        at_once: costs.Cost | str = Coupled(blocks, dt or 0.01 * time, solver).cost(time)
+    except CommandError as error:
+        refused, at_once = error, str(error)
+    if refused is not None and isinstance(stepped, str):
+        raise refused
+    wanted = refused is not None or (
+        isinstance(stepped, costs.Cost) and isinstance(at_once, costs.Cost) and stepped.seconds < at_once.seconds
+    )
+    if project.log is not None:
+        project.log.info(
+            f"{_where(project)}solve hydraulic auto: {'explicit' if wanted else 'implicit'} steps; "
+            f"explicit: {stepped}; implicit: {at_once}"
+        )
+    return wanted
+
+
+def _flow_by_steps(project: Project, flow: Flow, time: float) -> None:
+    """So much flow time [s] by explicit steps."""
+    o = project.blocks.options
+    if o.mechanical and not o.dynamic:
+        step(project, costs.cycles(flow, time))
+    else:
+        solve(project, time=time)
+
+
+def _tell_of_thin(project: Project, steps: int | None, time: float | None) -> None:
+    """A word on the fluid before a run of so many steps, or of so much time [s], that will take long. Collective."""
+    blocks, log = project.blocks, project.log
+    flow, o = Flow.there(blocks), blocks.options
+    if flow is None or not o.hydraulic or not len(flow.network.channels):
+        return
+    if o.mechanical and not o.dynamic:
+        time = None if steps is None else steps * max(1, o.flow_steps) * o.flow_dt / o.flow_every
+    elif time is None and steps is not None:
+        time = steps * blocks.clock.dt
+    if not time:
+        return
+    cost = costs.explicit(flow, time)
+    if log is not None and isinstance(cost, costs.Cost) and cost.seconds > costs.LONG:
+        what = "stiff fluid in thin fractures" if o.flow_dt == 0.0 else "as model time-step hydraulic says"
+        log.warn(
+            f"{_where(project)}flow by explicit sub-steps, {what}: {cost} on one core; model solve hydraulic takes "
+            "implicit steps"
+        )
 
 
 def _flow_on(project: Project, run: Coupled, flow: Flow, end: float) -> int:
@@ -299,6 +423,7 @@ def _run(
         log.warn(f"{time:g} s is less than half a time step ({clock.dt:.4g} s): no step is done")
     if project.progress is None:
         project.blocks.drop_creep_step()
+        _tell_of_thin(project, steps, time)
         end = None if time is None or creeps else clock.time + time
         project.progress = {"first": clock.step, "end": end, "command": command}
         if time is not None and creeps:

@@ -12,6 +12,7 @@ from hpcdem.io.agreed import on_first
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
 
 ENERGY_WORDS = {
     "kinetic": "stored: motion",
@@ -27,6 +28,7 @@ ENERGY_WORDS = {
     "work_discs": output.ACROSS,
     "work_bolts": "work of bolts on the rock",
     "work_liners": "work of liners on the rock",
+    "work_heat": "brought by thermal stress",
     "commands": "brought by commands",
     "closing": "closing error",
 }
@@ -54,6 +56,11 @@ FLUID_WORDS = {
     "closing": "closing error",
 }
 """The same of the account of the fluid, volumes at its density without pressure."""
+HEAT_WORDS = {
+    "given": "given by conditions", "commands": "brought by commands", "stored": "stored, above zero",
+    "removed": "removed with elements", "closing": "closing error",
+}  # fmt: skip
+"""The same of the account of heat."""
 ACROSS_WORDS = {
     "work_on_particles": "work on particles",
     "work_on_blocks": "work on blocks",
@@ -75,7 +82,8 @@ def close(project: Project, figure: bool = True) -> None:
         rows = [
             (text, f"{energies[name]:.6g}")
             for name, text in ENERGY_WORDS.items()
-            if name not in ("work_discs", "work_bolts", "work_liners", "plastic_lost", "creep_lost") or energies[name]
+            if name not in ("work_discs", "work_bolts", "work_liners", "work_heat", "plastic_lost", "creep_lost")
+            or energies[name]
         ]
         log.table("energy budget", ("energy", "J/m"), rows)
         log.info(f"energy: closing error {energies['relative']:.2g} of the largest flow")
@@ -89,6 +97,10 @@ def close(project: Project, figure: bool = True) -> None:
     if flow is not None:
         found = flow.account()
         log.table("fluid", ("volume", "m2"), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
+    heat = Heat.there(blocks)
+    if heat is not None:
+        found = heat.account()
+        log.table("heat", ("heat", "J/m"), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
     _tell_both(project)
     if figure:
         path = last_figure(project)

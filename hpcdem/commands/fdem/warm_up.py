@@ -14,6 +14,7 @@ from hpcdem.physics.fdem import warm_up as physics
 from hpcdem.physics.fdem.groups import OnLayer
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import warm_up as flow
+from hpcdem.physics.heat import warm_up as heat
 from hpcdem.physics.liners import warm_up as liners
 
 
@@ -22,6 +23,7 @@ def warm_up(threads: int = 1) -> None:
     physics.warm_up(threads)
     bolts.warm_up(threads)
     flow.warm_up(threads)
+    heat.warm_up(threads)
     liners.warm_up(threads)
     project = Project(Blocks(SerialComm(), threads))
     project.cracks_filed = 0  # no file is begun for them

@@ -9,7 +9,7 @@ from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
-from hpcdem.lang.pcdc.table import FLOW_CONDITION, POROUS
+from hpcdem.lang.pcdc.table import CONST_HEAT, FLOW_CONDITION, ISO_HEAT, POROUS, TEMPERATURE
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -160,6 +160,8 @@ def _element_model(call: Call) -> None:
         fdem.assignments.null(call.project, **call.properties(), where=call.where)
     elif call["model"] == "user":
         fdem.assignments.user_model(call.project, call["law"], call.properties(), call.where)
+    elif trial.MODELS[call["model"]] is ISO_HEAT.of:
+        fdem.heat.model(call.project, call.properties(), call.where)
     else:
         name = trial.MODELS[call["model"]].name
         fdem.assignments.element_model(call.project, name, call.properties(), call.where)
@@ -197,11 +199,26 @@ def _node_condition(call: Call) -> None:
             commands.move(call.project, kind, along[0] if along else (0.0, 0.0), call.where)
         case FLOW_CONDITION.keyword.name:
             fdem.flow.condition(call.project, **given, where=call.where)
+        case TEMPERATURE.keyword.name:
+            fdem.heat.condition(call.project, **_over_time(call), where=call.where)
 
 
 def _free_nodes(call: Call) -> None:
     fdem.assignments.remove_node_conditions(call.project, call.where)
     fdem.flow.remove_conditions(call.project, call.where)
+    fdem.heat.remove_conditions(call.project, call.where)
+
+
+def _free_faces(call: Call) -> None:
+    fdem.assignments.remove_face_conditions(call.project, call.where)
+    fdem.heat.remove_face_conditions(call.project, call.where)
+
+
+def _initial_nodes(call: Call) -> None:
+    if "velocity" in call.arguments:
+        fdem.assignments.initial_velocity(call.project, call["velocity"], call.where)
+    if "temperature" in call.arguments:
+        fdem.heat.initial(call.project, call["temperature"], call.where)
 
 
 def _short(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -213,8 +230,19 @@ def _face_condition(call: Call) -> None:
     if call["model"] == "free-field":
         fdem.assignments.free_field(call.project, call.where)
         return
+    if call["model"] == CONST_HEAT.keyword.name:
+        fdem.heat.face_condition(call.project, **_over_time(call), where=call.where)
+        return
     given = {name.removeprefix("stress_"): value for name, value in call.properties().items()}
     fdem.assignments.stress(call.project, **given, where=call.where)
+
+
+def _over_time(call: Call) -> dict[str, Any]:
+    """Properties of a condition of heat."""
+    for name, value in call.arguments["properties"].items():
+        if isinstance(value, FunctionName):
+            raise CommandError(f"{name} is a number or a table over the time of heat, no function of place")
+    return call.properties()
 
 
 def _stage(call: Call) -> None:
@@ -283,6 +311,8 @@ def _solve(call: Call) -> None:
         fdem.steps.solve_elastic(call.project, **call.given("elastic"))
     elif "hydraulic" in call.arguments:
         fdem.steps.solve_hydraulic(call.project, **call.given("hydraulic"))
+    elif "thermal" in call.arguments:
+        fdem.steps.solve_thermal(call.project, **call.given("thermal"))
     else:
         fdem.steps.solve(call.project, **call.given())
 
@@ -335,7 +365,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element group": _group(g.ELEMENT),
     "element c-model": _element_model,
     "element law": lambda c: fdem.assignments.load_law(c.project, c["law"]),
-    "element property": lambda c: fdem.assignments.element_property(c.project, with_parameters(c.given()), c.where),
+    "element property": lambda c: fdem.heat.element_property(c.project, with_parameters(c.given()), c.where),
     "element initial": _initial_stress,
     "element reset state": lambda c: fdem.settings.reset_elements(c.project, c.where),
     "element reset kelvin-strain": lambda c: fdem.settings.reset_kelvin_strain(c.project, c.where),
@@ -343,7 +373,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "element-face c-model": _face_model,
     "element-face property": lambda c: fdem.assignments.face_property(c.project, c.given(), c.where),
     "element-face boundary": _face_condition,
-    "element-face boundary remove": lambda c: fdem.assignments.remove_face_conditions(c.project, c.where),
+    "element-face boundary remove": _free_faces,
     "face-joint group": _group(g.JOINT),
     "face-joint c-model": _joint_model,
     "face-joint property": lambda c: fdem.flow.joint_property(c.project, c.given(), c.where),
@@ -352,7 +382,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "node boundary": _node_condition,
     "node function": lambda c: fdem.assignments.load_function(c.project, c["function"]),
     "node boundary remove": _free_nodes,
-    "node initial": lambda c: fdem.assignments.initial_velocity(c.project, c["velocity"], c.where),
+    "node initial": _initial_nodes,
     "node reset velocity": lambda c: fdem.settings.reset_velocity(c.project),
     "node reset displacement": lambda c: fdem.settings.reset_displacement(c.project),
     "flow-node initial": lambda c: fdem.flow.initial(c.project, **c.given(), where=c.where),
@@ -382,7 +412,13 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "chart create": lambda c: fdem.charts.create(c.project, **c.given()),
     "chart add": _curve,
     "chart export": lambda c: fdem.charts.export(
-        c.project, c["name"], c["file"], "cracks" in c.arguments, "plastic" in c.arguments, c.get("fluid", "")
+        c.project,
+        c["name"],
+        c["file"],
+        "cracks" in c.arguments,
+        "plastic" in c.arguments,
+        c.get("fluid", ""),
+        "temperature" in c.arguments,
     ),
     "output vtk": _output,
 }

@@ -99,16 +99,23 @@ def _solve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError(f"{watched[0]} goes with a ratio that steps lead to")
     if "limit" in watched and "cycles" in arguments:
         raise ValueError("limit and cycles exclude each other: a run that reaches its cycles has not failed")
-    if "hydraulic" in arguments:
-        others = arguments.keys() - {"hydraulic", "time", "dt", "steady", "solver"}
-        if others:
-            raise ValueError(f"hydraulic takes no {min(others)}")
-        if ("steady" in arguments) == ("time" in arguments):
-            raise ValueError("hydraulic takes time or steady, one of them")
-        return
+    for part, more in (("hydraulic", {"auto"}), ("thermal", set())):
+        if part in arguments:
+            others = arguments.keys() - {part, "time", "dt", "steady", "solver", *more}
+            if others:
+                raise ValueError(f"{part} takes no {min(others)}")
+            if ("steady" in arguments) == ("time" in arguments):
+                raise ValueError(f"{part} takes time or steady, one of them")
+            if "auto" in arguments and "steady" in arguments:
+                raise ValueError("auto goes with time: steady flow is found by implicit steps")
+            if part == "thermal" and {"steady", "dt"} <= arguments.keys():
+                raise ValueError("dt goes with time: the steady state of heat is found at once")
+            return
+    if "auto" in arguments:
+        raise ValueError("auto goes with hydraulic")
     for word in ("dt", "steady"):
         if word in arguments:
-            raise ValueError(f"{word} goes with hydraulic")
+            raise ValueError(f"{word} goes with hydraulic or thermal")
     for word in ("solver", "steps"):
         if word in arguments and "elastic" not in arguments:
             raise ValueError(f"{word} goes with elastic; a run by steps needs none")

@@ -44,10 +44,11 @@ from hpcdem.lang.pcdc.kinds import (
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
+from hpcdem.physics.heat.properties import ISO_HEAT as HEAT_PROPERTIES
 from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
 
 THREE_D = "this version computes in two dimensions"
-HEAT = "heat comes later; this version computes mechanics"
+HEAT = "heat in fluid comes later; this version computes that of elements"
 PROPPANT = "proppant comes later; this version computes mechanics"
 
 
@@ -241,11 +242,17 @@ _HEAT_OF = (
     Option("cap{acity}", (POSITIVE,), "heat capacity", "J/(kg K)"),
     Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer", "W/(m2 K)", also=("t{ransfer}-c{oefficient}",)),
 )
+_COEFFICIENTS = {
+    "transfer-coeficient": ("t{ransfer}-c{oefficient}",), "expansion-coeficient": ("e{xpansion}-c{oefficient}",),
+}  # fmt: skip
 ISO_HEAT = Model(
-    "therm{al}-iso-h{eat}", "12", "Heat conduction and thermal expansion.",
-    (*_HEAT_OF,
-     Option("e{xpansion}-c{oeficient}", (FLOAT,), "thermal expansion", "1/K", also=("e{xpansion}-c{oefficient}",))),
-    later=HEAT,
+    "therm{al}-iso-h{eat}", "12",
+    "Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need it "
+    "where one has it. Heat crosses joints until they break. At the temperatures of this moment elements are free of "
+    "thermal stress. Temperatures are those of any scale of degrees.",
+    declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
+             "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
+    of=HEAT_PROPERTIES,
 )  # fmt: skip
 
 # ---- boundary conditions of nodes and faces (tables 4 to 7, 11, 14 to 16, 18) --------------------------------------
@@ -299,9 +306,11 @@ FREE_FIELD = Model(
     "that see the difference of both motions. The nodes of the side are held by the forces that they have now, so the "
     "conditions of the static stage can go.", (),
 )  # fmt: skip
+TEMPERATURE = Model(
+    "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
+)  # fmt: skip
 _LATER_NODE = (
-    Model("therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes.",
-          (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
     Model("therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of fluid.",
           (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
     Model("hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that is injected.",
@@ -309,9 +318,13 @@ _LATER_NODE = (
            Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=PROPPANT),
 )  # fmt: skip
 CONST_HEAT = Model(
-    "therm{al}-c{onst}-h{eat}", "16", "Heat through surfaces.",
-    (Option("h{eat}-f{lux}", (FLOAT,), "", "W/m2"), _HEAT_OF[2],
-     Option("e{nvironment}-t{emperature}", (FLOAT,), "", "degrees C")), later=HEAT,
+    "therm{al}-c{onst}-h{eat}", "16",
+    "Heat through surfaces, which are adiabatic without it; faces that are inside begin with it when they are free. "
+    "Times of tables are those of heat.",
+    (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
+     Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
+            "that of the elements", also=_COEFFICIENTS["transfer-coeficient"]),
+     Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True,
 )  # fmt: skip
 
 # ---- contact and joints (tables 8, 9, 10, 13, 17) ------------------------------------------------------------------
@@ -447,13 +460,13 @@ _NAME = Option("name", (STRING,), "name", required=True)
 RECORDED = {
     "node": {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
-        "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m",
+        "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m", "temperature": "K",
     },
     "element": {
         "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
         "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
         "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
-        "kelvin-strain-xy": "1", "creep-work": "J/m", "law-state": "that of the law",
+        "kelvin-strain-xy": "1", "creep-work": "J/m", "mean-temperature": "K", "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
@@ -486,8 +499,9 @@ RECORDED = {
         "kinetic-energy": "J/m", "strain-energy": "J/m", "joint-energy": "J/m", "joint-loss": "J/m",
         "contact-energy": "J/m", "viscous-loss": "J/m", "plastic-loss": "J/m", "creep-loss": "J/m",
         "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "liner-work": "J/m",
-        "energy-error": "J/m",
+        "heat-work": "J/m", "energy-error": "J/m",
         "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
+        "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -518,6 +532,7 @@ _OF_SOLIDS = (
       if o.name == "friction" else o for o in _properties(ISO_ELASTIC)),
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
+    *_properties(ISO_HEAT),
     _PARAMETER,
 )  # fmt: skip
 
@@ -540,14 +555,16 @@ _MODEL = (
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
                        default="refuse"),
-                Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid flows",
+                Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid or heat flows",
                        default="on"),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off"),
                 Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
-                Option("therm{al}", (BOOL,), "", later=HEAT), Option("prop{pant}", (BOOL,), "", later=PROPPANT)),
+                Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
+                       "the stress that they bring, stay as they are", default="on"),
+                Option("prop{pant}", (BOOL,), "", later=PROPPANT)),
             needs_option=True, manual=True),
     Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
             "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
@@ -564,7 +581,9 @@ _MODEL = (
                 Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
                        "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
                        "s", "0"),
-                Option("therm{al}", (POSITIVE,), "", later=HEAT)),
+                Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
+                       "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
+                       "0")),
             needs_option=True, manual=True),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
@@ -575,7 +594,9 @@ _MODEL = (
             "away; `pcdc.solved['reason']` says how a run ended.",
             ("pcdc model solve ratio 1e-6", "pcdc model solve time 0.05", "pcdc model solve elastic time 1e6",
              "pcdc model solve elastic steps 10", "pcdc model solve hydraulic time 5 dt 0.01",
-             "pcdc model solve hydraulic steady", "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
+             "pcdc model solve hydraulic steady", "pcdc model solve hydraulic auto time 3600",
+             "pcdc model solve thermal time 3e7 dt 1e5", "pcdc model solve thermal steady",
+             "pcdc model solve ratio 1e-6 limit 200000 on-failure continue"),
             options=(Option("rat{io}", (POSITIVE,), "unbalanced over all forces of the nodes; with elastic: 1e-8, and "
                             "as far below as rounding allows", "1"),
                      Option("cyc{les}", (COUNT,), "steps; with elastic: units of time (1) for which prescribed "
@@ -594,18 +615,28 @@ _MODEL = (
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
                             "may pass their peak and break; with mechanical off, flow alone"),
-                     Option("dt", (POSITIVE,), "with hydraulic: longest time step; steps are shorter where joints "
-                            "break or no balance is found", "s", "a hundredth of the time"),
-                     Option("stea{dy}", (), "with hydraulic: until as much flows out as in; no time passes"),
-                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic or hydraulic: SciPy on one "
-                            "rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if it is there, "
-                            "from 400 000 unknowns on", default="auto"),
+                     Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
+                            "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
+                            "and joints may pass their peak and break; with mechanical off, heat alone"),
+                     Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
+                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
+                     Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
+                            "where an estimate says that these cost less, or where implicit ones are refused; the log "
+                            "has both estimates"),
+                     Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
+                            "passes"),
+                     Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
+                            "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
+                            "it is there, from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1"))),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
-            ("pcdc model sub-step mechanical 10 hydraulic 5",),
-            options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow", default="1"),
+            ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
+            options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
+                            default="1"),
+                     Option("therm{al}", (ZERO_OR_MORE,), "sub-steps of a cycle of heat; 0: as many as are stable",
+                            default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
                             default="0")),
             needs_option=True),
@@ -757,6 +788,7 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
              "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),
             models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True),
@@ -765,6 +797,7 @@ _OBJECTS = (
             ("pcdc element law 'clay.py:clay'",), (_LAW,)),
     Command("el{ement} prop{erty}", "Changes properties; the others stay.",
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
+             "pcdc element property conductivity 3.5 range group 'salt'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
             options=_OF_SOLIDS, ranged="element", needs_option=True),
     Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
@@ -791,7 +824,8 @@ _OBJECTS = (
     Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
             ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
-             "pcdc element-face boundary free-field range boundary x 0 0"),
+             "pcdc element-face boundary free-field range boundary x 0 0",
+             "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
             models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face"),
     Command("element-f{ace} bou{ndary} rem{ove}", "Takes boundary conditions of surfaces back.",
             ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face"),
@@ -814,16 +848,19 @@ _OBJECTS = (
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",
              "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1",
-             "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'"),
-            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, *_LATER_NODE), ranged="node"),
+             "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'",
+             "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'"),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, TEMPERATURE, *_LATER_NODE), ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
     Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
             ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
-    Command("node init{ial}", "The velocity of nodes now.", ("pcdc node initial velocity (1,0) range group 'block'",),
+    Command("node init{ial}", "The velocity or temperature of nodes now.",
+            ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
-                     Option("temp{erature}", (FLOAT,), "", later=HEAT)), ranged="node", needs_option=True),
+                     Option("temp{erature}", (FLOAT,), "temperature; before, it is 0. Elements around the nodes are "
+                            "free of thermal stress then", "K")), ranged="node", needs_option=True),
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True),
@@ -973,6 +1010,7 @@ _RECORDS = (
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
             (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
              Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
+             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity"),), "beside it the model as it "
                     "is now, its channels coloured by that"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",

@@ -74,6 +74,11 @@ class Model:
         """The account of the fluid [m2]: given, stored, leaked, removed, closing, relative."""
         return self._look(lambda: fdem.queries.fluid(self._project))
 
+    @property
+    def heat(self) -> dict[str, float]:
+        """The account of heat [J/m]: given, commands, stored, removed, closing, relative."""
+        return self._look(lambda: fdem.queries.heat(self._project))
+
     def node(self, number: int) -> View:
         """A node by its number: .position, .displacement, .velocity, .reaction (Vectors), .values(name)."""
         return View(self, "node", number)

@@ -26,7 +26,8 @@ it."""
 class Budget:
     """The account of one model. accounts: work of each kind up to the last interruption [J/m]; commands: changes by
     commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
-    of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer.
+    of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer; heat: changes of
+    what is stored by thermal stress; by_heat: that is what interrupts the account now.
 
     running: steps are being booked; otherwise the account stands at a whole step.
     """
@@ -37,6 +38,8 @@ class Budget:
         self.start: dict[str, float] | None = None
         self.left = dict.fromkeys(STORED, 0.0)
         self.running = False
+        self.heat = 0.0
+        self.by_heat = False
         self.discs = 0
         self._before = np.empty((0, 0))
 
@@ -66,16 +69,21 @@ class Budget:
             self.start = stored
         else:
             for name in STORED:
-                self.commands[name] += stored[name] - self.left[name]
+                change = stored[name] - self.left[name]
+                if self.by_heat:
+                    self.heat += change
+                else:
+                    self.commands[name] += change
         for name in WORK:
             self.accounts[name] -= half[name]
         sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
         self.running = True
 
-    def pause(self, sim: Blocks) -> None:
-        """A command is about to change the model: bring the account to the whole step. Collective."""
+    def pause(self, sim: Blocks, by_heat: bool = False) -> None:
+        """A command, or heat, is about to change the model: bring the account to the whole step. Collective."""
         if not self.running:
             return
+        self.by_heat = by_heat
         self.left, half = self._read(sim)
         done = self._done(sim)
         for name in WORK:
@@ -113,12 +121,13 @@ class Budget:
             "work_discs": of_discs,
             "work_bolts": of_loads.get("bolts", 0.0),
             "work_liners": of_loads.get("liners", 0.0),
+            "work_heat": self.heat,
             "commands": by_commands,
         }
-        given = work["gravity"] + work["outside"] + by_commands
+        given = work["gravity"] + work["outside"] + self.heat + by_commands
         taken = joints_lost - work["contact"] - work["viscous"] - work["plastic"] - work["creep"]
         found["closing"] = change + taken - given
-        flows = [joints_lost, *(work[name] for name in WORK[1:]), by_commands]
+        flows = [joints_lost, *(work[name] for name in WORK[1:]), self.heat, by_commands]
         flows += [sum(map(abs, part.values())) for part in (stored, start)]
         largest = max(map(abs, flows))
         found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
@@ -180,7 +189,8 @@ class Budget:
         """As JSON values; the columns of the elements are saved with them. Collective."""
         return {
             "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,
-            "running": self.running, "discs": hex(sum(sim.comm.allgather(self.discs))),
+            "running": self.running, "heat": self.heat, "by_heat": self.by_heat,
+            "discs": hex(sum(sim.comm.allgather(self.discs))),
         }  # fmt: skip
 
     @staticmethod
@@ -189,5 +199,6 @@ class Budget:
         made = Budget()
         made.discs = int(state.get("discs", "0x0"), 16) if first else 0
         made.accounts, made.commands = {**made.accounts, **state["accounts"]}, dict(state["commands"])
+        made.heat, made.by_heat = state.get("heat", 0.0), state.get("by_heat", False)
         made.start, made.left, made.running = state["start"], state["left"], state["running"]
         return made

@@ -131,6 +131,20 @@ def constants(number, points, cells, row, models, viscous, triangle_rows, quad_r
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def stress_without_strain(triangle_rows, quad_rows, n_left, said, quad_said, heat, s0, quad_s0):
+    """Rows of s0 (n, 4) and quad_s0 (m, 16) [Pa] from what was said (n, 4), (m, 4), and from heat (n_own,): stress xx,
+    yy and zz of owned elements, without rows if there is none."""
+    for i in range(len(triangle_rows)):
+        more = heat[triangle_rows[i] - n_left] if len(heat) else 0.0
+        s0[i, 0], s0[i, 1], s0[i, 2], s0[i, 3] = said[i, 0] + more, said[i, 1] + more, said[i, 2], said[i, 3] + more
+    for i in range(len(quad_rows)):
+        more = heat[quad_rows[i] - n_left] if len(heat) else 0.0
+        for p in range(4):
+            for c in range(4):
+                quad_s0[i, 4 * p + c] = quad_said[i, c] + (0.0 if c == 2 else more)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def links(number, rows, n, first, width, where, partner, closed, joint_row, face, at, law, kind, state):
     """Edges of elements of n edges in the given storage rows, into slots first, first + 1, ...
 

@@ -81,7 +81,8 @@ class Options:
     """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
     of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
     one_way: fluid does not push; flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps
-    (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable one). mass_damping [1/s],
+    (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in
+    cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s],
     stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
 
     gx: float = 0.0
@@ -100,6 +101,9 @@ class Options:
     flow_every: int = 1
     flow_steps: int = 0
     flow_dt: float = 0.0
+    thermal: bool = True
+    heat_steps: int = 0
+    heat_dt: float = 0.0
     mass_damping: float = 0.0
     stiffness_damping: float = 0.0
 
@@ -737,25 +741,42 @@ class ModelDefinition:
             changes["overlap"] = overlap
         self._set(**changes)
 
-    def parts(self, mechanical: bool | None = None, hydraulic: bool | None = None, one_way: bool | None = None) -> None:
-        """What is computed: motion of the blocks (on), flow (on); one_way (off): fluid does not push on blocks."""
-        given = {"mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way}
+    def parts(
+        self,
+        mechanical: bool | None = None,
+        hydraulic: bool | None = None,
+        one_way: bool | None = None,
+        thermal: bool | None = None,
+    ) -> None:
+        """What is computed: motion of the blocks (on), flow (on), heat (on); one_way (off): fluid does not push on
+        blocks."""
+        given = {"mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way, "thermal": thermal}
         self._set(**{name: bool(value) for name, value in given.items() if value is not None})
 
     def flow_clock(self, every: int | None = None, steps: int | None = None, dt: float | None = None) -> None:
         """every: steps of the blocks between two cycles of flow; steps: sub-steps of a cycle, 0: as many as are needed;
         dt [s]: of a sub-step, 0: the time in which the blocks move, or without motion a stable one."""
+        self._set(**self._clock(("flow_every", every, 1), ("flow_steps", steps, 0), flow_dt=dt))
+
+    def heat_clock(self, steps: int | None = None, dt: float | None = None) -> None:
+        """steps: sub-steps of a cycle of heat, 0: as many as are needed; dt [s]: of one, as that of flow."""
+        self._set(**self._clock(("heat_steps", steps, 0), heat_dt=dt))
+
+    @staticmethod
+    def _clock(*counts: tuple[str, int | None, int], **steps: float | None) -> dict[str, Any]:
+        """Checked counts (name, number, the least one) and time steps, those that were given."""
         changes: dict[str, Any] = {}
-        for name, number, least in (("flow_every", every, 1), ("flow_steps", steps, 0)):
+        for name, number, least in counts:
             if number is not None:
                 if number < least:
                     raise CommandError(f"a number of sub-steps must be at least {least}, got {number}")
                 changes[name] = int(number)
-        if dt is not None:
-            changes["flow_dt"] = float(finite("a time step", [dt])[0])
-            if changes["flow_dt"] < 0.0:
-                raise CommandError(f"a time step must not be negative, got {dt:g}")
-        self._set(**changes)
+        for name, dt in steps.items():
+            if dt is not None:
+                changes[name] = float(finite("a time step", [dt])[0])
+                if changes[name] < 0.0:
+                    raise CommandError(f"a time step must not be negative, got {dt:g}")
+        return changes
 
     def time_step(
         self,

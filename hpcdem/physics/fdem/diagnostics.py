@@ -42,6 +42,7 @@ QUANTITIES: dict[str, Quantity] = {
     "stress_min": Quantity("element", "Pa", "smaller principal stress in the plane (more compressive)"),
     "kinetic_energy": Quantity("element", "J/m", "kinetic energy"),
     "strain_energy": Quantity("element", "J/m", "elastic energy"),
+    "mean_temperature": Quantity("element", "K", "mean temperature of its corners; NaN without a thermal model"),
     "area": Quantity("element", "m2", "area in the mesh"),
     "element_model": Quantity("element", "1", "row of the table of element models"),
     "plastic_state": Quantity(
@@ -60,6 +61,7 @@ QUANTITIES: dict[str, Quantity] = {
     **_pair("velocity", "node", "m/s", "velocity"),
     **_pair("reaction", "node", "N/m", "force by which conditions act on the node"),
     **_pair("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
+    "temperature": Quantity("node", "K", "temperature; NaN without a thermal model"),
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken"),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken"),
     "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken"),
@@ -164,7 +166,8 @@ def owned_values(sim: Blocks, on: str, names: Sequence[str]) -> dict[str, np.nda
     sim.close_model()
     for name in names:
         belongs = quantity(sim, name).on
-        if belongs != on and not (on == "corner" and name.startswith(("position", "displacement", "velocity"))):
+        of_corners = ("position", "displacement", "velocity", "temperature")
+        if belongs != on and not (on == "corner" and name.startswith(of_corners)):
             raise CommandError(f"{name} belongs to a {belongs}, not to a {on}")
     made = _corner_columns(sim) if on == "corner" else columns_of(sim, on, names)
     return {"number": made["number"], **{name: made[name] for name in names}}
@@ -220,6 +223,9 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
             columns["kinetic_energy"] = 0.5 * np.where(real, local.mass[own][some] * v2, 0.0).sum(axis=1)
+    if "mean_temperature" in wanted:
+        t, n = corner_temperatures(sim)[some], connectivity.corner_counts(mesh.cells[number])
+        columns["mean_temperature"] = _mean(t, np.arange(4) < n[:, None], n)
     if any(name.startswith("plastic") for name in wanted):
         columns |= _plastic_columns(sim, some)
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
@@ -276,6 +282,8 @@ def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = Non
         c = 0 if axis == "x" else 1
         if name.startswith(("reaction", "unbalanced")):
             columns[name] = _whole_point(sim, name, points)
+        elif name == "temperature":
+            columns[name] = corner_temperatures(sim)[row - own.start, k]
         elif kind == "velocity":
             columns[name] = sim.v[row, 2 * k + c]
         else:
@@ -296,7 +304,16 @@ def _corner_columns(sim: Blocks) -> dict[str, np.ndarray]:
         columns[f"position_{axis}"] = place[i, k, c]
         columns[f"displacement_{axis}"] = place[i, k, c] - home[i, k, c]
         columns[f"velocity_{axis}"] = speed[i, k, c]
+    columns["temperature"] = corner_temperatures(sim)[i, k]
     return columns
+
+
+def corner_temperatures(sim: Blocks) -> np.ndarray:
+    """(n_own, 4) temperatures at the corners of the owned elements [K], NaN without a thermal model. Not collective."""
+    known, out = sim.cold.get("temperature"), np.full((sim.n_own, 4), np.nan)
+    if known is not None:
+        out[:, : known.shape[1]] = known
+    return out
 
 
 def corner_values(sim: Blocks, name: str, corners: np.ndarray | None = None) -> np.ndarray:

@@ -93,7 +93,8 @@ class Nodes:
     x: np.ndarray
     v: np.ndarray
     least: float = 0.0
-    """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none."""
+    """Sum of forces [N/m] to which what is unbalanced is compared at least: joints that break may leave none, nor does
+    heat in a body that is free to expand."""
 
 
 def solve_elastic(
@@ -136,6 +137,7 @@ def solve_elastic(
     if not softening:
         _refuse_yielded(sim, int((_lower_states(sim) == YIELDED).sum()), "are behind their peak already")
     nodes = all_nodes(sim)
+    nodes.least = forces_of_heat(sim)
     unknowns = unknowns_of(sim, nodes, cycles)
     refuse_loose_bodies(sim, nodes, unknowns)
     if softening or sim.yielding().any():
@@ -224,6 +226,14 @@ def all_nodes(sim: Blocks) -> Nodes:
     for rank, (numbers, values) in enumerate(sim.comm.allgather((mine, np.column_stack(columns)))):
         found[numbers], owner[numbers] = values, rank
     return Nodes(lead, cells.reshape(-1)[lead], owner, found[:, :2].copy(), found[:, 2:].copy())
+
+
+def forces_of_heat(sim: Blocks) -> float:
+    """Size of the forces [N/m] that thermal stress would take to be held. Collective."""
+    heat = sim.surface_loads.eigenstress(sim)
+    if heat is None:
+        return 0.0
+    return exact_sum(np.abs(heat) * np.sqrt(sim.areas[sim.number[sim.owned]]), sim.comm)
 
 
 def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
@@ -462,7 +472,7 @@ def _follow(
             _flow(sim, x, step)
         if whole > 1:
             missing, _, total = unbalanced(sim, nodes, unknowns, x)
-            nodes.least = total if softening else 0.0
+            nodes.least = max(total, nodes.least) if softening else nodes.least
         while done < whole:
             size = min(size, whole - done)
             left = 1.0 - (done + size) / whole
@@ -478,7 +488,7 @@ def _follow(
             if found.error:
                 raise CommandError(found.error + (_reached(done / whole) if unit > 1 else ""))
             x, done, increments = found.x, done + size, increments + 1
-            nodes.least = max(nodes.least, found.total) if softening else 0.0
+            nodes.least = max(nodes.least, found.total) if softening else nodes.least
             size = min(2 * size if done % (2 * size) == 0 else size, unit)
     finally:
         solver.close()

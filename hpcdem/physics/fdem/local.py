@@ -210,36 +210,53 @@ class Local:
             self.triangle_rows[:count], self.quad_rows, self.true_mass, self.c, self.q,
         )  # fmt: skip
         self.c[count:] = self.c[count - 1] if count else 1.0
-        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 16))
-        if sim.stress0 is not None:
-            self.s0[:count] = sim.initial_stresses(sim.number[self.triangle_rows[:count]])
-            self.quad_s0[:] = np.tile(sim.initial_stresses(sim.number[self.quad_rows]), 4)
         self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
-        if not (self.plastic or self.creeps):
-            return
         rows = self.triangle_rows[:count]
-        self.law = np.zeros(count + 3, np.int32)
-        self.law[:count] = sim.element_row[sim.number[rows]]
         quad_law = sim.element_row[sim.number[self.quad_rows]].astype(np.int32)
-        self.said, self.quad_said = self.s0[:count].copy(), self.quad_s0.copy()
-        self.uncrept, self.quad_uncrept = self.said, self.quad_said
+        if self.plastic or self.creeps:
+            self.law = np.zeros(count + 3, np.int32)
+            self.law[:count] = sim.element_row[sim.number[rows]]
         if self.creeps:
             self.creep_table = creep_table(sim.element_rows)
             self.creep_law, self.quad_creep_law = self.law.copy(), quad_law
             creeping = sim.creeping()[sim.number]
             self.creeping = np.flatnonzero(creeping[rows])
             self.creeping_quads = np.flatnonzero(creeping[self.quad_rows])
-            self._relieve_crept(np.arange(count), np.arange(len(self.quad_rows)), self.s0, self.quad_s0)
-        self.initial, self.quad_initial = self.s0[:count].copy(), self.quad_s0.copy()
         if self.plastic:
             self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
-            self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
             self._make_strength(rows)
+        quads = len(self.quad_rows)
+        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((quads, 16))
+        self.said, self.uncrept, self.initial = (np.zeros((count, 4)) for _ in range(3))
+        self.quad_said, self.quad_uncrept, self.quad_initial = (np.zeros((quads, 16)) for _ in range(3))
+        self._of_initial = np.zeros((count, 4)), np.zeros((quads, 4))
+        if sim.stress0 is not None:
+            self._of_initial = sim.initial_stresses(sim.number[rows]), sim.initial_stresses(sim.number[self.quad_rows])
+        self.heated = self.restress()
+
+    def restress(self) -> bool:
+        """Find the stress without strain of all elements again: what was said of it, and what heat brings, less the
+        part of plastic and creep strain. Returns whether heat brings any."""
+        sim, rows = self.sim, self.triangle_rows[: self.count]
+        heat = sim.surface_loads.eigenstress(sim)
+        build.stress_without_strain(
+            rows, self.quad_rows, sim.n_left, *self._of_initial, np.zeros(0) if heat is None else heat, self.s0,
+            self.quad_s0,
+        )  # fmt: skip
+        if not (self.plastic or self.creeps):
+            return heat is not None
+        self.said[:] = self.uncrept[:] = self.s0[: self.count]
+        self.quad_said[:] = self.quad_uncrept[:] = self.quad_s0
+        if self.creeps:
+            self._relieve_crept(np.arange(self.count), np.arange(len(self.quad_rows)), self.s0, self.quad_s0)
+        self.initial[:], self.quad_initial[:] = self.s0[: self.count], self.quad_s0
+        if self.plastic:
+            self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
-            self.uncrept, self.quad_uncrept = self.said.copy(), self.quad_said.copy()
             self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
             self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
+        return heat is not None
 
     def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
         """Stress without strain of these triangles and quads, less that of their creep strain."""
@@ -609,7 +626,7 @@ class Local:
         self._move: Any = moving.move if one else moving.move_threaded
         self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
         small = not o.large_strain
-        stressed = sim.stress0 is not None or self.plastic or self.creeps
+        stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
             stressed or any(one is not self.law_of_triangles for one in self.laws), small, self.slot_at,
@@ -619,9 +636,8 @@ class Local:
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
             stressed or any(one is not self.law_of_quads for one in self.laws), small, self.slots_of_triangles,
-            self.slot_at,
-            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table, self.joint_beyond,
-            pairs.quad_slot, pairs.pushed,
+            self.slot_at, self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table,
+            self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
     def forces(self) -> None:
@@ -1025,10 +1041,22 @@ class Local:
                 if len(quads):
                     plastic_quads.locked_in(quads, sim.n_left, self.q, of_quads, memory, more)
             energy += more if at is None else more[at]
+        if self.heated and energies:
+            energy += self._energy_of_heat() if at is None else self._energy_of_heat()[at]
         if self.laws and energies:  # what such a law stores is not known
             of_users = user_laws.numbers(sim)[sim.number[sim.owned]] > 0
             energy[of_users if at is None else of_users[at]] = math.nan
         return stress, energy
+
+    def _energy_of_heat(self) -> np.ndarray:
+        """Elastic energy (n_own,) [J/m] that thermal stress p means where there is no strain, beside the mean m of the
+        initial stress: (p^2 + 2 p m) A / (2 K)."""
+        sim, number = self.sim, self.sim.number[self.sim.owned]
+        stress = np.asarray(sim.surface_loads.eigenstress(sim))
+        bulk = np.array(sim.element_rows.column("bulk"))[sim.element_row[number]]
+        said = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
+        mean = said[:, [0, 1, 3]].sum(axis=1) / 3.0
+        return stress * (0.5 * stress + mean) / bulk * sim.areas[number]
 
     def stored_in_joints(self) -> np.ndarray:
         """What the joints of the owned elements give back when they are unloaded, half to each side (n_own,) [J/m]."""

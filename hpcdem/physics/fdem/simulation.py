@@ -278,22 +278,33 @@ class Blocks(State):
         """CommandError for what was said of parts of the calculation that are not there."""
         o = self.options
         flows = o.hydraulic and "fluid" in self.surface_loads
+        heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
-            if not flows:
-                raise CommandError("nothing would happen: model option mechanical is off, and no fluid flows")
+            if not (flows or heated):
+                raise CommandError(
+                    "nothing would happen: model option mechanical is off, and neither fluid nor heat flows"
+                )
             if not o.dynamic:
-                raise CommandError("without mechanics time passes by flow: model option dynamic on comes first")
-            others = [load.name for load in self.surface_loads if load.name != "fluid"]
+                raise CommandError(
+                    "without mechanics time passes by flow and heat: model option dynamic on comes first"
+                )
+            others = [load.name for load in self.surface_loads if load.name not in ("fluid", "heat")]
             if others:
                 raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
             if self.creep.on:
                 raise CommandError("elements creep while blocks move: model creep off, or model option mechanical on")
-        said = {"one-way": o.one_way, "sub-step": (o.flow_every, o.flow_steps) != (1, 0), "time-step": o.flow_dt > 0.0}
+        every = o.flow_every != 1 and "heat" not in self.surface_loads
+        said = {"one-way": o.one_way, "sub-step": every or o.flow_steps > 0, "time-step": o.flow_dt > 0.0}
         lost = [name for name, is_so in said.items() if is_so]
         if lost and "fluid" not in self.surface_loads:
             raise CommandError(
                 f"{lost[0]} of flow was said, but no joint has a hydraulic model: face-joint c-model "
                 "hydraulic-porous-medium"
+            )
+        if (o.heat_steps > 0 or o.heat_dt > 0.0) and "heat" not in self.surface_loads:
+            name = "sub-step" if o.heat_steps > 0 else "time-step"
+            raise CommandError(
+                f"{name} of heat was said, but no element has a thermal model: element c-model thermal-iso-heat"
             )
 
     def _drift(self, first: int, last: int) -> None:

@@ -1,5 +1,5 @@
 """Forces on corners of elements that other physics compute: discs that touch free faces, rock bolts, liners, the ground
-beyond free-field sides, fluid; later heat."""
+beyond free-field sides, fluid; and the stress that heat brings to them."""
 
 from __future__ import annotations
 
@@ -62,6 +62,11 @@ class SurfaceLoad(ABC):
 
     def follow(self) -> None:  # noqa: B027 - most have nothing to do here
         """The elements have moved by a step; their new positions are there, ghosts too. Collective."""
+
+    def eigenstress(self, blocks: Any) -> np.ndarray | None:
+        """(n_own,) stress xx, yy and zz [Pa] that it brings to owned elements without strain; None: none ever. Not
+        collective."""
+        return None
 
     def balance(self) -> tuple[np.ndarray, np.ndarray]:
         """This rank's share of its own unbalanced and contributing forces [N/m], for the ratio of the model."""
@@ -151,6 +156,11 @@ class SurfaceLoads:
             found = load.springs(blocks)
             if found is not None:
                 out += found
+
+    def eigenstress(self, blocks: Any) -> np.ndarray | None:
+        """The sum of what all of them bring, see `SurfaceLoad.eigenstress`; None: none. Not collective."""
+        found = [one for load in self._loads if (one := load.eigenstress(blocks)) is not None]
+        return np.sum(found, axis=0) if len(found) > 1 else next(iter(found), None)
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
         """Largest distance of elements that must be held by one rank because of them [m]. Collective."""

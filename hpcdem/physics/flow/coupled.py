@@ -18,6 +18,7 @@ from hpcdem.physics.fdem import equilibrium, user_laws
 from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.linear import MANY, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.costs import Cost, implicit
 from hpcdem.physics.flow.implicit import Balance, Fluid, Step, reference_pressure
 from hpcdem.physics.flow.model import Flow
 
@@ -123,15 +124,12 @@ class Coupled:
         sim.close_model()
         if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
-        self.nodes = equilibrium.all_nodes(sim)
-        self.x = self.nodes.x
-        self.of_blocks = self._of_blocks()
+        self._take_nodes()
         if self.moves:
             equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)
             sim.before_change()
             sim.close_model()
         self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
-        self.unknowns = self._unknowns()
         self.solver = self._solver()
         if self.moves:
             self._rest = equilibrium.at_rest(sim, self.nodes)
@@ -157,6 +155,22 @@ class Coupled:
                 )
         self.solver.close()
 
+    def _take_nodes(self) -> None:
+        """Nodes, where they are, and what is unknown, of a closed model."""
+        self.nodes = equilibrium.all_nodes(self.sim)
+        self.x = self.nodes.x
+        self.of_blocks = self._of_blocks()
+        self.unknowns = self._unknowns()
+
+    def cost(self, time: float) -> Cost:
+        """Of so much flow time [s]. CommandError for conditions that implicit steps do not know. Collective."""
+        self.sim.close_model()
+        self._take_nodes()
+        kept = self._of_joints()
+        condensed = self.moves and Condensed.suits(self.unknowns, kept) and self.wanted != "petsc"
+        left = int((self.unknowns.number[np.unique(kept)] >= 0).sum()) if condensed else 0
+        return implicit(time, self.longest, self.unknowns.count, left)
+
     def _stress(self) -> float:
         """Mean size of the stress of elements [Pa], 0 if they stand still."""
         if not self.moves:
@@ -177,7 +191,7 @@ class Coupled:
 
     def _unknowns(self) -> Unknowns:
         """Those of the blocks, then the variable of each flow node."""
-        of, n, blocks = self.of_blocks, self.fluid.n, len(self.x)
+        of, n, blocks = self.of_blocks, len(self.flow.network.nodes), len(self.x)
         number = np.full((blocks + n, 2), -1, np.int64)
         number[:blocks] = of.number
         number[blocks:, 0] = of.count + np.arange(n)
@@ -207,12 +221,12 @@ class Coupled:
 
     def _of_joints(self) -> np.ndarray:
         """Nodes of joints and fluid."""
-        sim, cells = self.sim, self.sim.the_mesh().cells
-        lower = np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0))
+        sim, cells, network = self.sim, self.sim.the_mesh().cells, self.flow.network
+        lower = np.union1d(np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0)), network.channels)
         faces = np.concatenate([lower, sim.partner[lower]])
         e, k = faces // 4, faces % 4
         ends = np.concatenate([sim.node[e, k], sim.node[e, (k + 1) % corner_counts(cells[e])]])
-        return np.concatenate([ends, self.fluid.at.reshape(-1), len(self.x) + np.arange(self.fluid.n)])
+        return np.concatenate([ends, len(self.nodes.lead) + np.arange(len(network.nodes))])
 
     # ---- time steps ----------------------------------------------------------------------------------------------
 
@@ -316,13 +330,16 @@ class Coupled:
     # ---- Newton's method -----------------------------------------------------------------------------------------
 
     def _newton(self, step: Step, x: np.ndarray, u: np.ndarray) -> _Found:
+        timers = self.sim.timers
         lack, force, fluid = self._lacking(step, x, u)
         iterations, error, past = 0, "", 0
         while lack > AIM and iterations < MOST:
-            pieces = self._pieces(step, fluid, u, x)
+            with timers.around("matrix"):
+                pieces = self._pieces(step, fluid, u, x)
             try:
-                self.solver.factor(pieces)
-                way = self.solver.solve(force, 0.0)
+                with timers.around("solve"):
+                    self.solver.factor(pieces)
+                    way = self.solver.solve(force, 0.0)
             except CommandError as singular:
                 error = str(singular)
                 break
@@ -374,6 +391,10 @@ class Coupled:
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, 2); the fluid."""
+        with self.sim.timers.around("balance"):
+            return self._evaluated(step, x, u)
+
+    def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.n, 2))
         right[len(x) :, 0] = -now.residual

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 LEAST_PRESSURE = 1e4
 """p0 is at least this [Pa]."""
+ROUNDING = 1e-8
+"""Part of the fluid of a node that counts as flowing: where nothing flows any more the rest is rounding."""
 
 
 @dataclass
@@ -156,9 +158,9 @@ class Fluid:
         q, lost = np.empty(self.m), np.zeros(self.m)
         since = self.flow.since[self.channels]
         leaks = bool(np.isfinite(since).any())
-        kernels.flows(
-            1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, state, q, lost
-        )  # fmt: skip
+        wet = state.copy()
+        wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
+        kernels.flows(1, self.ends, self.law, self.laws, since, leaks, step.before, step.after, table, wet, q, lost)
         volume = np.bincount(self.end, table[self.both, kernels.HALF], self.n)
         fluid = volume * (state[:, kernels.S] + state[:, kernels.P] / self.bulk)
         dt, stored = step.dt, fluid - step.fluid
@@ -174,7 +176,7 @@ class Fluid:
         dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
         held = step.known | out | dry
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
-        sizes = np.abs(stored) + passing + gone + np.abs(rate)
+        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
         return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------
@@ -210,7 +212,9 @@ class Fluid:
         delta, conduct, half = now.table[mine].T
         m, dt = len(ends), step.dt
         p_u, s_u = self._rises(u)
+        s_u = np.where(u > -1.0, s_u, 0.0)
         p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
+        s = np.maximum(s, 0.0)
         head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1])
         mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
         up = np.where(down, s[:, 0], s[:, 1])
@@ -226,12 +230,12 @@ class Fluid:
         at = np.flatnonzero(now.lost[mine] > 0.0)
         if len(at):
             over = 0.5 * p[at].sum(axis=1) - self.laws[self.law[mine][at], kernels.PORE]
-            of_mean_s = mean[at]
-            leak_u[at] = now.lost[mine][at][:, None] * 0.5 * (
-                p_u[ends[at]] / over[:, None]
-                + (6.0 * (1.0 - of_mean_s) / np.maximum(of_mean_s * (3.0 - 2.0 * of_mean_s), 1e-300))[:, None]
-                * s_u[ends[at]]
-            )  # fmt: skip
+            held = mean[at]
+            by_part = now.lost[mine][at] / np.maximum(held * held * (3.0 - 2.0 * held), 1e-300)
+            leak_u[at] = 0.5 * (
+                (now.lost[mine][at] / over)[:, None] * p_u[ends[at]]
+                + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
+            )
         a, b, c, d = (x[self.at[mine, k]] for k in range(4))
         way = 0.5 * ((b + c) - (a + d))
         h = np.hypot(way[:, 0], way[:, 1])

@@ -639,7 +639,7 @@ class Flow(SurfaceLoad):
         if not o.flow_steps and self.sub_steps > MANY:
             raise CommandError(
                 f"flow would need {self.sub_steps} sub-steps of {limit:.3g} s in {o.flow_every} mechanical steps; "
-                "model time-step hydraulic gives it a clock of its own"
+                "model time-step hydraulic gives it a clock of its own, model solve hydraulic takes implicit steps"
             )
         self._tell_step(limit)
 

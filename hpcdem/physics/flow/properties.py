@@ -26,7 +26,7 @@ def _apertures(values: dict[str, Any]) -> None:
         )
     on = np.asarray(values["leak_off"]) > 0.0
     for name in (*MATRIX, "matrix_pore_pressure"):
-        there = np.asarray(values.get(name, 0.0)) > 0.0
+        there = np.asarray(values.get(name, 0.0)) != 0.0
         if np.any(there & ~on):
             raise CommandError(f"{name} goes with leak_off, which is off")
         if np.any(on) and ((name in MATRIX and name not in values) or (name in NEEDED and np.any(on & ~there))):
@@ -53,8 +53,8 @@ POROUS = Model(
         Property("aperature_maximum", "m", "largest hydraulic aperture", math.inf, low_itself=False,
                  otherwise="no limit"),
         Property("leak_off", "1", "broken joints lose fluid to the rock after Carter", 0.0, high=1.0),
-        Property("matrix_pore_pressure", "Pa", "leak-off: pressure in the pores of the rock", optional=True,
-                 otherwise="0"),
+        Property("matrix_pore_pressure", "Pa", "leak-off: pressure in the pores of the rock; negative: suction of rock "
+                 "that is not saturated", low=-math.inf, optional=True, otherwise="0"),
         Property("matrix_permeability", "m2", "leak-off: permeability of the rock", optional=True,
                  otherwise="needed by leak-off"),
         Property("matrix_porosity_compressibility", "1/Pa", "leak-off: compressibility of the pores", optional=True,

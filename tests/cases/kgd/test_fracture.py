@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hpcdem.cases import HydraulicFracture
+from hpcdem.cases import HydraulicFracture, kgd_solutions
 from hpcdem.core.errors import ScriptError
+from tests.cases.kgd import dry_tip
 from tests.cases.ready import results
 
 RING = {"energy": 31.25, "tensile_strength": 2e6, "viscosity": 1e-6, "time": 10.0, "reach": 5.3, "size": 0.05}
@@ -39,6 +40,38 @@ def test_the_closed_forms(launch, tmp_path, given):
     print(vars(done))
     assert abs(done.length_error) < 0.03 and abs(done.opening_error) < 0.02 and abs(done.pressure_error) < 0.05
     assert done.balance < 1e-9
+
+
+@pytest.mark.slow
+def test_the_fluid_lags_behind_the_tip(launch, tmp_path):
+    """Long before the lag time, 9.8 s: neither closed form holds, the tip is dry. With the method of dry_tip.py, of
+    K_Ic: half length and opening 3 %, net pressure 4 %, dry length one and a half joints."""
+    size, time = 0.0125, 0.25
+    case = HydraulicFracture(
+        regime="viscosity", energy=10.0, tensile_strength=2e6, rate=1e-3, viscosity=0.1, confinement=5e6, time=time,
+        reach=0.75, far=8.0, size=size,
+    )  # fmt: skip
+    young = case.young / (1.0 - case.poisson**2)
+    assert kgd_solutions.lag_time(young, 0.1, 5e6) > 30.0 * time
+    rows = dry_tip.grown(young, 10.0, 0.1, 1e-3, 5e6, size, 55)
+    length, front, opening, pressure = (np.interp(time, rows[:, 0], rows[:, k]) for k in range(1, 5))
+    done = results(launch, tmp_path, case, timeout=7200.0)
+    print(vars(done), length, front, opening, pressure)
+    assert done.length == pytest.approx(length, rel=0.03) and done.opening == pytest.approx(opening, rel=0.03)
+    assert done.pressure == pytest.approx(pressure, rel=0.04)
+    assert done.length - done.front == pytest.approx(length - front, abs=1.5 * size) and length - front > 5.0 * size
+    assert done.length_error > 0.05  # the closed form without lag
+
+
+def test_a_dry_tip_in_two_grids():
+    """Elements of 20 and 12.5 mm agree; more confinement makes the dry part shorter."""
+    young = 32e9
+    coarse, fine = (dry_tip.grown(young, 10.0, 0.1, 1e-3, 5e6, size, round(0.6 / size)) for size in (0.02, 0.0125))
+    at = [[np.interp(0.2, rows[:, 0], rows[:, k]) for k in range(1, 5)] for rows in (coarse, fine)]
+    assert at[0] == pytest.approx(at[1], rel=0.02)
+    tight = dry_tip.grown(young, 10.0, 0.1, 1e-3, 10e6, 0.02, 28)
+    dry = [np.interp(0.2, rows[:, 0], rows[:, 1] - rows[:, 2]) for rows in (coarse, tight)]
+    assert dry[1] < 0.7 * dry[0]
 
 
 def test_joints_that_would_snap_are_refused():

@@ -1,0 +1,92 @@
+"""Heat in elements: the thermal model, what is prescribed at nodes and faces, and initial temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from hpcdem.commands.fdem import assignments
+from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.project import Project
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.heat.properties import ISO_HEAT
+
+Number = float | str
+"""A number, or the name of a table over the time of heat."""
+
+
+def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Elements conduct heat, with these properties (physics.heat.properties)."""
+    if project.coupled is not None:
+        raise CommandError("blocks that are coupled to particles have no heat in this version")
+    elements = chosen(project, ELEMENT, where)
+    blocks = project.ready()
+    known = Heat.there(blocks)
+    heat = Heat.of(blocks)
+    try:
+        heat.assign(elements, properties)
+    except CommandError:
+        if known is None:
+            blocks.surface_loads.remove(heat)
+        raise
+
+
+def element_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """Change some properties of elements, mechanical and thermal ones, each of the elements that a range chooses;
+    without a range of all that have them."""
+    thermal = {name: value for name, value in properties.items() if ISO_HEAT.has(name)}
+    others = {name: value for name, value in properties.items() if name not in thermal}
+    if thermal:
+        _heat(project).adjust(chosen(project, ELEMENT, where), thermal)
+    if others:
+        assignments.element_property(project, others, where)
+
+
+def _heat(project: Project) -> Heat:
+    found = Heat.there(project.ready())
+    if found is None:
+        raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
+    return found
+
+
+def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
+    """Temperature of nodes."""
+    _heat(project).prescribe(chosen(project, NODE, where), temperature)
+
+
+def face_condition(
+    project: Project,
+    heat_flux: Number | None = None,
+    transfer_coeficient: float | None = None,
+    environment_temperature: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Heat flux into faces [W/m2], or transfer [W/(m2 K)] from an environment of this temperature; without a
+    coefficient with that of the elements. Without a range: all faces on the surface of the model."""
+    given: dict[str, Any] = {"flux": heat_flux, "transfer": transfer_coeficient, "environment": environment_temperature}
+    said = {name: value for name, value in given.items() if value is not None}
+    if not said:
+        raise CommandError("heat through faces is one of heat_flux, transfer_coeficient, environment_temperature")
+    _heat(project).expose(chosen(project, FACE, (OnBoundary(),) if where is None else where), **said)
+
+
+def remove_conditions(project: Project, where: Range | None = None) -> None:
+    """No temperature of nodes is prescribed any more; without heat there is nothing to do."""
+    found = Heat.there(project.ready())
+    if found is not None:
+        found.remove_conditions(chosen(project, NODE, where))
+
+
+def remove_face_conditions(project: Project, where: Range | None = None) -> None:
+    """Faces are adiabatic again; without heat there is nothing to do."""
+    found = Heat.there(project.ready())
+    if found is not None:
+        found.remove_face_conditions(chosen(project, FACE, where))
+
+
+def initial(project: Project, temperature: float, where: Range | None = None) -> None:
+    """Temperature of nodes now; elements around them are free of thermal stress."""
+    _heat(project).initial(chosen(project, NODE, where), temperature)

@@ -1,0 +1,82 @@
+"""What a time of flow costs by explicit and by implicit steps: estimates, for one core, that do not depend on where and
+on how many ranks they are made (a choice that follows measured times could not be repeated)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hpcdem.physics.flow.model import Flow
+
+SUB_STEP, CHANNEL = 15e-6, 11e-9
+"""Seconds of a sub-step of flow, and per channel of it."""
+STEP, ELEMENT = 20e-6, 70e-9
+"""Seconds of a step of blocks, and per element of it, with its joints."""
+ITERATION, UNKNOWN = 5e-3, 14e-6
+"""Seconds of an iteration of Newton's method, and per unknown of it: forces, matrix, factors."""
+FORCES, DENSE = 4e-6, 3.3e-11
+"""With condensed elements: seconds per unknown for forces and elimination, and per cube of what is left of them."""
+ITERATIONS = 5
+"""Of an implicit step."""
+LONG = 1800.0
+"""Seconds of an explicit run above which a word is said of it before."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """steps of dt [s] of flow, cycles of blocks that go with them (0: they stand still), seconds on one core."""
+
+    steps: float
+    dt: float
+    cycles: float
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.steps:.3g} steps of {self.dt:.3g} s, about {_length(self.seconds)}"
+
+
+def _length(seconds: float) -> str:
+    for unit, name in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 2.0 * unit:
+            return f"{seconds / unit:.3g} {name}"
+    return f"{seconds:.2g} s"
+
+
+def explicit(flow: Flow, time: float) -> Cost | str:
+    """So much flow time [s] by the sub-steps that were said, or are stable now (fractures that open need shorter
+    ones); or why that cannot be. Of a closed model; collective."""
+    o, blocks = flow.blocks.options, flow.blocks
+    if not o.mechanical and not o.dynamic:
+        return "without mechanics time passes by steps of flow in dynamic runs only"
+    if o.mechanical and not o.dynamic:
+        if o.flow_dt == 0.0:
+            return "in static runs model time-step hydraulic says how long a sub-step is, and was not said"
+        stable = 2.0 * flow.limit()
+        if o.flow_dt > time:
+            return f"sub-steps of {o.flow_dt:.3g} s are longer than the time"
+        if o.flow_dt > stable:
+            return f"model time-step hydraulic says {o.flow_dt:.3g} s, more than the {stable:.3g} s that are stable"
+        steps, dt = cycles(flow, time) * max(1, o.flow_steps) / o.flow_every, o.flow_dt
+        of_blocks = float(cycles(flow, time))
+    else:
+        dt = flow.dt
+        if dt > time:
+            return f"sub-steps of {dt:.3g} s are longer than the time"
+        steps, of_blocks = time / dt, time / blocks.clock.dt if o.mechanical else 0.0
+    seconds = steps * (SUB_STEP + CHANNEL * len(flow.network.channels))
+    seconds += of_blocks * (STEP + ELEMENT * len(blocks.the_mesh().cells))
+    return Cost(steps, dt, of_blocks, seconds)
+
+
+def cycles(flow: Flow, time: float) -> int:
+    """Steps of a static run in which so much flow time [s] passes. Not collective."""
+    o = flow.blocks.options
+    return o.flow_every * math.ceil(time / (max(1, o.flow_steps) * o.flow_dt) * (1.0 - 1e-12))
+
+
+def implicit(time: float, dt: float, unknowns: int, kept: int) -> Cost:
+    """So much flow time [s] by steps of at most dt [s], without those that joints need to break one after the other.
+    kept: unknowns that are left by condensation, 0: without it."""
+    steps = math.ceil(time / dt * (1.0 - 1e-12))
+    iteration = ITERATION + (FORCES * unknowns + DENSE * kept**3 if kept else UNKNOWN * unknowns)
+    return Cost(steps, time / steps, 0.0, steps * ITERATIONS * iteration)

@@ -1,0 +1,1 @@
+"""Heat in elements: conduction, exchange with the surroundings, thermal stress."""

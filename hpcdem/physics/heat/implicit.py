@@ -1,0 +1,217 @@
+"""Implicit steps of heat, backward Euler, and the steady state: all nodes at once.
+
+(C / dt + K) (T' - T) = Q(T') with the conductances, capacities and conditions of the explicit steps, at the end of the
+step. Temperatures that are prescribed are put in first; what the others then lack is the right-hand side, so the answer
+is exact to rounding whatever the linear solver leaves: it is solved for twice.
+
+Nodes of heat are known to all ranks meanwhile, as those of the blocks are in the static solve.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import connectivity, equilibrium
+from hpcdem.physics.fdem.linear import Direct, Petsc, Pieces, Unknowns
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
+
+PASSES = 2
+"""Solutions of the linear system in a step: the second one takes what rounding left of the first."""
+
+
+class Implicit:
+    """Heat of a model by implicit steps; with mechanics the blocks are in static equilibrium at the end of each.
+    Methods are collective."""
+
+    def __init__(self, sim: Blocks, solver: str = "auto") -> None:
+        """CommandError for what implicit steps cannot do."""
+        heat = Heat.there(sim)
+        if heat is None or not heat.rows:
+            raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
+        if solver not in equilibrium.SOLVERS:
+            raise CommandError(f"solver is one of {', '.join(equilibrium.SOLVERS)}, got {solver}")
+        if not sim.options.thermal:
+            raise CommandError("the thermal part is switched off: model option thermal on comes first")
+        self.sim, self.heat, self.wanted = sim, heat, solver
+        self.moves = bool(sim.options.mechanical)
+        if self.moves and sim.options.dynamic:
+            raise CommandError(
+                "implicit steps of heat keep blocks in static equilibrium: model option dynamic off comes first, or "
+                "mechanical off for heat alone"
+            )
+        for load in sim.surface_loads:
+            if self.moves and not load.stays:
+                raise CommandError(
+                    f"implicit steps of heat know no {load.name}: model step and model solve step blocks with them"
+                )
+        sim.close_model()
+        heat.check_elements()
+        self.steps = self.factors = self.unknowns = 0
+        self.solver: Direct | Petsc | None = None
+        self._made_for: tuple[Any, ...] = ()
+
+    def close(self) -> None:
+        """Give back what the solver holds."""
+        if self.solver is not None:
+            self.solver.close()
+            self.solver = None
+
+    def advance(self, dt: float) -> None:
+        """One step of dt [s]."""
+        self._solve(dt)
+        self.heat.time += dt
+        self._settle()
+
+    def steady(self) -> None:
+        """The state to which heat goes with the conditions of this moment; no time passes."""
+        self._refuse_loose()
+        self._solve(math.inf)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Blocks come into equilibrium with their new thermal stress."""
+        sim = self.sim
+        self.steps += 1
+        if sim.local.heated:
+            sim.local.restress()
+        if self.moves:
+            joints = bool((sim.joint_row[sim.joint_exists()] > 0).any())
+            try:
+                equilibrium.solve_elastic(sim, solver=self.wanted, softening=joints)
+            except CommandError as error:
+                raise CommandError(
+                    f"heat time {self.heat.time:.6g} s: {error}; temperatures are those of that time, blocks lie where "
+                    "they did before"
+                ) from None
+        else:
+            sim.clock.step += 1
+
+    # ---- the step --------------------------------------------------------------------------------------------------
+
+    def _solve(self, dt: float) -> None:
+        sim, heat = self.sim, self.heat
+        sim.close_model()
+        heat.renew_nodes()
+        after = heat.time + dt if math.isfinite(dt) else heat.time
+        self._prepare(dt)
+        assert self.solver is not None
+        begin, corner, held = heat.nodes
+        flat = heat.t.reshape(-1)
+        old = flat[corner[begin[:-1]]].copy()
+        new = np.where(held >= 0, np.append(heat.held_at(after), 0.0)[held], old)
+        inertia = heat.capacity / dt
+        for _ in range(PASSES):
+            self._spread(new)
+            force = np.zeros((len(heat.leads), 2))
+            lack = np.where(held >= 0, 0.0, self._inflow(after) - inertia * (new - old))
+            for ids, values in sim.comm.allgather((self._ids, lack[self._mine])):
+                force[ids, 0] = values
+            new = new + self.solver.solve(force, 0.0)[heat.node_ids, 0]
+        self._spread(new)
+        self._book(dt, after, old, new)
+
+    def _spread(self, values: np.ndarray) -> None:
+        """Nodes (n,) have these temperatures."""
+        begin, corner, _ = self.heat.nodes
+        self.heat.t.reshape(-1)[corner] = np.repeat(values, np.diff(begin))
+        self.sim.halo.fill(self.heat.t)
+
+    def _inflow(self, time: float, dt: float = 0.0) -> np.ndarray:
+        """Heat (n,) [W/m] that flows to the nodes; what faces bring in dt [s] is booked."""
+        heat = self.heat
+        begin, corner, _ = heat.nodes
+        out = np.empty(len(begin) - 1)
+        kernels.sums(begin, corner, heat.inflow(time, dt).reshape(-1), out)
+        return out
+
+    def _book(self, dt: float, time: float, old: np.ndarray, new: np.ndarray) -> None:
+        """What conditions brought: on the way to a steady state all that has come in."""
+        sim, heat = self.sim, self.heat
+        begin, corner, held = heat.nodes
+        brought = heat.capacity * (new - old)
+        if math.isfinite(dt):
+            brought = np.where(held >= 0, brought - dt * self._inflow(time, dt), 0.0)
+        lead = corner[begin[:-1]][self._mine] - sim.owned.start * heat.t.shape[1]
+        sim.cold[GIVEN].reshape(-1)[lead] += brought[self._mine]
+
+    # ---- the matrix ------------------------------------------------------------------------------------------------
+
+    def _prepare(self, dt: float) -> None:
+        """Who is unknown, and factors of the matrix, if it is another one than before."""
+        sim, heat = self.sim, self.heat
+        begin, corner, _ = heat.nodes
+        width = heat.t.shape[1]
+        row = corner[begin[:-1]] // width
+        lowest = heat.leads[heat.node_ids] // 4
+        self._mine = (row >= sim.owned.start) & (row < sim.owned.stop) & (sim.number[row] == lowest)
+        self._ids = heat.node_ids[self._mine]
+        said = (part.tobytes() for part in (heat.leads, heat.held, heat.face, heat.row))
+        made_for = dt, sim.alive.tobytes(), *said
+        if self.solver is not None and made_for == self._made_for:
+            return
+        self.close()
+        owner = np.zeros(len(heat.leads), np.int64)
+        for rank, ids in enumerate(sim.comm.allgather(self._ids)):
+            owner[ids] = rank
+        there = heat.leads >= 0
+        point = sim.the_mesh().cells.reshape(-1)[np.maximum(heat.leads, 0)]
+        free = there & sim.alive[np.maximum(heat.leads, 0) // 4] & (heat.held[point] == 0)
+        count = len(there)
+        number = np.full((count, 2), -1, np.int64)
+        number[free, 0] = np.arange(int(free.sum()))
+        unknowns = Unknowns(number, np.tile(np.eye(2), (count, 1, 1)), np.zeros((count, 2)), np.zeros(count, bool))
+        nodes = equilibrium.Nodes(heat.leads, point, owner, np.empty(0), np.empty(0))
+        self.solver = equilibrium.linear_solver(sim, self.wanted, unknowns, nodes)
+        self.solver.factor(self._pieces(dt))
+        self.factors += 1
+        self.unknowns = unknowns.count
+        self._made_for = made_for
+
+    def _pieces(self, dt: float) -> list[Pieces]:
+        """Of triangles, quads and faces of this rank."""
+        sim, heat = self.sim, self.heat
+        own, number = sim.owned, sim.number[sim.owned]
+        quad = sim.the_mesh().cells[number, 3] >= 0
+        g, capacity = heat.conductances[own], sim.cold[CAPACITY]
+        found = []
+        for rows, k, pairs in ((~quad, 3, 3), (quad, 4, 6)):
+            at = np.flatnonzero(rows)
+            stiffness = np.zeros((len(at), 2 * k, 2 * k))
+            for p, (a, b) in enumerate(kernels.PAIRS[:pairs].tolist() if len(at) else []):
+                stiffness[:, 2 * a, 2 * b] -= g[at, p]
+                stiffness[:, 2 * b, 2 * a] -= g[at, p]
+                stiffness[:, 2 * a, 2 * a] += g[at, p]
+                stiffness[:, 2 * b, 2 * b] += g[at, p]
+            for c in range(k if len(at) else 0):
+                stiffness[:, 2 * c, 2 * c] += capacity[at, c] / dt
+            order = np.argsort(number[at])
+            found.append(Pieces(number[at][order], heat.node[number[at]][:, :k][order], stiffness[order]))
+        at, ends, transfer = heat.transfers()
+        faces = np.zeros((2 * len(at), 2, 2))
+        faces[:, 0, 0] = np.repeat(transfer, 2)
+        key = np.repeat(at, 2)
+        found.append(Pieces(key, heat.node.reshape(-1)[ends.reshape(-1)][:, None], faces))
+        return found
+
+    def _refuse_loose(self) -> None:
+        """CommandError naming a body whose heat nothing holds."""
+        sim, heat, cells = self.sim, self.heat, self.sim.the_mesh().cells
+        heat.renew_nodes()
+        body = connectivity.bodies(np.where(sim.closed_faces() & np.repeat(sim.alive, 4), sim.partner, -1))
+        holds = np.append(heat.held > 0, False)[cells].any(axis=1) & sim.alive
+        bound = np.zeros(int(body.max()) + 1, bool)
+        bound[body[holds]] = True
+        at, _, transfer = heat.transfers(everywhere=True)
+        bound[body[at[transfer > 0.0] // 4]] = True
+        loose = np.flatnonzero(sim.alive & ~bound[body])
+        if len(loose):
+            raise CommandError(
+                f"heat has no steady state: in the body of element {loose[0]} no temperature is prescribed, and no "
+                "environment"
+            )

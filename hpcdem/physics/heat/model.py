@@ -1,0 +1,708 @@
+"""Heat in the elements of blocks: what is said of it, its clock and its step.
+
+What is said (properties, conditions) is known to all ranks by the numbers of the mesh. Temperatures belong to corners
+of elements and travel with them, as positions do (columns of `State.cold`); corners that hang together through faces
+that are not broken are one node of heat and carry equal copies. Where joints break corners part with the temperature
+that they have: each side of a crack has its own. Every holder of a node adds the heat of all its corners in the
+order of elements, so the bits depend on neither ranks nor threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import build, connectivity, user_laws
+from hpcdem.physics.fdem.properties import ELEMENT
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.properties import ISO_HEAT
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+Number = float | str
+"""A number, or the name of a table over the time of heat."""
+SAFETY = 0.9
+"""Part of the stability limit that an estimated sub-step may be."""
+LOOK = 100
+"""Cycles of heat after which it is looked whether it has blown up."""
+MANY = 100_000
+"""Sub-steps in a cycle that are too many to be meant."""
+SPREAD = 0.1
+"""By how much of the mean edge corners of one node may be apart, in joints that open."""
+TEMPERATURE, GIVEN, CAPACITY, UNSTRESSED = "temperature", "heat_given", "heat_capacity", "unstressed"
+"""Columns of elements: of corners temperature [K], heat that conditions gave [J/m], heat capacity [J/(m K)]; mean
+temperature at which the element is free of thermal stress [K]."""
+_NAMES = tuple(one.name for one in ISO_HEAT.properties)
+
+
+@dataclass(frozen=True)
+class FaceCondition:
+    """Of faces: flux into the element [W/m2]; environment: temperature around it [K], None: none; transfer: heat
+    transfer coefficient to it [W/(m2 K)], None: that of the element."""
+
+    flux: Number = 0.0
+    transfer: float | None = None
+    environment: Number | None = None
+
+
+class Heat(SurfaceLoad):
+    """The heat of a model of blocks. Methods are collective unless they say otherwise; CommandError, alike on all
+    ranks, for what makes no sense.
+
+    row (ne,): of the table of properties, by element, 0: none; held (np,): row of the prescribed temperatures, 0: none;
+    face (4 ne,): row of the conditions of faces. t (n, w): temperatures at the corners of all elements held here.
+    """
+
+    name: ClassVar[str] = "heat"
+    of_mesh: ClassVar[bool] = True
+    stays: ClassVar[bool] = True
+
+    def __init__(self, blocks: Blocks) -> None:
+        self.blocks = blocks
+        mesh = blocks.the_mesh()
+        self.row = np.zeros(len(mesh.cells), np.int32)
+        self.held = np.zeros(len(mesh.points), np.int32)
+        self.face = np.zeros(mesh.cells.size, np.int32)
+        self.rows: list[tuple[float, ...]] = []
+        self.prescribed: list[Number] = [0.0]
+        self.faces: list[FaceCondition] = [FaceCondition()]
+        self.accounts = dict.fromkeys(("given", "commands", "removed"), 0.0)
+        """Heat [J/m]: that conditions gave to elements that are gone, that commands brought, that is gone with
+        elements."""
+        self.time = blocks.clock.time
+        self.cycles = self.waited = self.sub_steps = 0
+        self.dt = 0.0
+        self.t = np.empty((0, 3))
+        self._stale = True
+        self._checked = False
+        self._expands: bool | None = None
+        self._found_for: tuple[float, ...] = ()
+        self._told = 0.0
+        self._limit = math.inf
+
+    @staticmethod
+    def there(blocks: Blocks) -> Heat | None:
+        """That of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, Heat)), None)
+
+    @staticmethod
+    def of(blocks: Blocks) -> Heat:
+        """That of a model, made on the first call. Not collective."""
+        found = Heat.there(blocks)
+        if found is None:
+            found = Heat(blocks)
+            blocks.surface_loads.add(found)
+        return found
+
+    # ---- what is said --------------------------------------------------------------------------------------------
+
+    def assign(self, elements: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Elements (None: all) have this thermal model; at the temperature that they have now they are free of thermal
+        stress."""
+        at = self.blocks.numbers_of_elements(elements)
+        self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, {}, given))
+        self._take_unstressed(at)
+
+    def adjust(self, elements: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Change some properties of elements that have the model; None: of all that have it."""
+        at = np.flatnonzero(self.row) if elements is None else self.blocks.numbers_of_elements(elements)
+        bare = at[self.row[at] == 0]
+        if len(bare):
+            raise CommandError(f"{ELEMENT} {bare[0]} has no thermal model whose properties could be changed")
+        old = np.array(self.rows)[self.row[at] - 1]
+        self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, dict(zip(_NAMES, old.T)), given))
+
+    def _put(self, at: np.ndarray, values: np.ndarray) -> None:
+        """Elements (n,) have these complete properties, (n, k) or (1, k) for all."""
+        blocks, rows, row = self.blocks, list(self.rows), self.row.copy()
+        known = {one: k for k, one in enumerate(rows, 1)}
+        sets, which = np.unique(values, axis=0, return_inverse=True)
+        for one in map(tuple, sets.tolist()):
+            if one not in known:
+                rows.append(one)
+                known[one] = len(rows)
+        row[at] = np.array([known[tuple(one)] for one in sets.tolist()], np.int32)[which.reshape(-1)]
+        blocks.before_change()
+        self.rows, self.row, self._expands = rows, row, None
+        self._make_columns()
+        blocks.changed(stiffness=False)
+
+    def _make_columns(self) -> None:
+        """The columns of elements; the model is open."""
+        cold, n = self.blocks.cold, len(self.blocks.number)
+        if TEMPERATURE not in cold:
+            width = 4 if self.blocks.wide else 3
+            for name in (TEMPERATURE, GIVEN, CAPACITY):
+                cold[name] = np.zeros((n, width))
+            cold[UNSTRESSED] = np.zeros((n, 1))
+
+    def _take_unstressed(self, elements: np.ndarray) -> None:
+        """These elements are free of thermal stress as they are; the model is open. Not collective."""
+        blocks = self.blocks
+        mine = np.flatnonzero(np.isin(blocks.number, elements))
+        blocks.cold[UNSTRESSED][mine, 0] = self._means(blocks.number[mine], blocks.cold[TEMPERATURE][mine])
+
+    def _means(self, number: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Mean temperatures (n,) of elements with these temperatures of corners, as kernels.thermal_stress has them."""
+        quad, out = self.blocks.the_mesh().cells[number, 3] >= 0, np.empty(len(t))
+        kernels.thermal_stress(quad, t, np.full(len(t), -1.0), np.zeros(len(t)), out)
+        return out
+
+    def initial(self, nodes: np.ndarray | None, temperature: float) -> None:
+        """Nodes (None: all) have this temperature now; elements around them are free of thermal stress."""
+        blocks = self.blocks
+        if not math.isfinite(temperature):
+            raise CommandError(f"a temperature must be finite, got {temperature}")
+        at = blocks.numbers_of_nodes(nodes)
+        self._need_model()
+        blocks.before_change()
+        before = self._content()
+        chosen = np.zeros(len(blocks.the_mesh().points) + 1, bool)  # the last one is for the fourth corner of triangles
+        chosen[at] = True
+        t, cells = blocks.cold[TEMPERATURE], blocks.the_mesh().cells
+        corners = chosen[cells[blocks.number, : t.shape[1]]]
+        t[corners] = temperature
+        self.accounts["commands"] += self._content() - before
+        self._take_unstressed(np.flatnonzero(chosen[cells].any(axis=1)))
+        blocks.changed(stiffness=False)
+
+    def prescribe(self, nodes: np.ndarray | None, temperature: Number) -> None:
+        """Nodes (None: all) have this temperature from now on, a number or a table over the time of heat."""
+        at = self.blocks.numbers_of_nodes(nodes)
+        self._need_model()
+        self._check(temperature, "the temperature of a node")
+        self.blocks.before_change()
+        if temperature not in self.prescribed[1:]:
+            self.prescribed.append(temperature)
+        self.held[at] = 1 + self.prescribed[1:].index(temperature)
+        self.blocks.changed(stiffness=False)
+
+    def expose(self, faces: np.ndarray | None, **changes: Any) -> None:
+        """Faces (None: all) have these conditions, fields of `FaceCondition`; the others of theirs stay."""
+        at = self.blocks.numbers_of_faces(faces)
+        self._need_model()
+        for name, value in changes.items():
+            self._check(value, f"{name} of a face")
+        if changes.get("transfer") is not None and changes["transfer"] < 0.0:
+            raise CommandError(f"a transfer coefficient must not be negative, got {changes['transfer']:g}")
+        for row in np.unique(self.face[at]).tolist():
+            wanted = replace(self.faces[row], **changes)
+            if wanted.transfer is not None and wanted.environment is None:
+                raise CommandError("a transfer coefficient of faces goes with environment-temperature")
+            if wanted.environment is not None and wanted.transfer is None:
+                mine = at[self.face[at] == row]
+                h = self.column("transfer_coeficient")[self.row[mine // 4]]
+                if (h == 0.0).any():
+                    raise CommandError(
+                        f"environment-temperature needs a transfer coefficient: face {mine[h == 0.0][0]} has none, nor "
+                        "has its element"
+                    )
+        self.blocks.before_change()
+        self.blocks._change_rows(self.faces, self.face, at, changes)
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray | None) -> None:
+        """Nodes (None: all) are no longer held."""
+        self.blocks.before_change()
+        self.held[slice(None) if nodes is None else nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def remove_face_conditions(self, faces: np.ndarray | None) -> None:
+        """Faces (None: all) are adiabatic."""
+        self.blocks.before_change()
+        self.face[slice(None) if faces is None else faces] = 0
+        self.blocks.changed(stiffness=False)
+
+    def _need_model(self) -> None:
+        if not self.rows:
+            raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
+
+    def _check(self, value: Number | None, what: str) -> None:
+        """CommandError unless it is a finite number or a table."""
+        if isinstance(value, str):
+            if value not in self.blocks.tables:
+                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
+                raise CommandError(f"there is no table '{value}'; there is {known}")
+        elif value is not None and not math.isfinite(value):
+            raise CommandError(f"{what} must be finite, got {value}")
+
+    def uses_table(self, name: str) -> bool:
+        """Whether a node or a face follows this table. Not collective."""
+        of_faces = (asdict(self.faces[row]).values() for row in np.unique(self.face).tolist())
+        return any(self.prescribed[row] == name for row in np.unique(self.held).tolist() if row) or any(
+            name in values for values in of_faces
+        )
+
+    def column(self, name: str) -> np.ndarray:
+        """A property by rows (rows + 1,), 0 where there is no model. Not collective."""
+        k = _NAMES.index(name)
+        return np.array([0.0, *(row[k] for row in self.rows)])
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+
+    def _content(self) -> float:
+        """Heat in all elements [J/m], above the zero of the scale, by the capacities of their columns."""
+        cold = self.blocks.cold
+        return exact_sum((cold[CAPACITY] * cold[TEMPERATURE]).reshape(-1), self.blocks.comm)
+
+    def account(self) -> dict[str, float]:
+        """Heat since there is a thermal model [J/m]: given by conditions, brought by commands (initial temperatures,
+        changes of capacity), stored, above the zero of the scale, removed with elements; closing: what does not add up,
+        relative: that over the largest."""
+        self.blocks.close_model()
+        comm = self.blocks.comm
+        given = np.append(self.blocks.cold[GIVEN].reshape(-1), self.accounts["given"] if comm.rank == 0 else 0.0)
+        found = {
+            "given": exact_sum(given, comm), "commands": self.accounts["commands"], "stored": self._content(),
+            "removed": self.accounts["removed"],
+        }  # fmt: skip
+        largest = max(map(abs, found.values()))
+        found["closing"] = found["given"] + found["commands"] - found["stored"] - found["removed"]
+        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
+        return found
+
+    def element_temperatures(self) -> np.ndarray:
+        """(n_own,) means of the corners [K]; the model is closed. Not collective."""
+        own = self.blocks.owned
+        return self._means(self.blocks.number[own], self.blocks.cold[TEMPERATURE])
+
+    # ---- thermal stress ------------------------------------------------------------------------------------------
+
+    def eigenstress(self, blocks: Any) -> np.ndarray | None:
+        if not self.expands or TEMPERATURE not in blocks.cold:
+            return None
+        alpha = self.column("expansion_coeficient")
+        number, out = blocks.number[blocks.owned], np.empty(blocks.n_own)
+        kernels.thermal_stress(
+            self._quads(number), blocks.cold[TEMPERATURE], self._stiffness(number, alpha),
+            blocks.cold[UNSTRESSED].reshape(-1), out,
+        )  # fmt: skip
+        return out
+
+    @property
+    def expands(self) -> bool:
+        """Elements have thermal stress. Not collective."""
+        if self._expands is None:
+            self._expands = bool(self.column("expansion_coeficient")[self.row[self.blocks.alive]].any())
+        return self._expands
+
+    def _quads(self, number: np.ndarray) -> np.ndarray:
+        return self.blocks.the_mesh().cells[number, 3] >= 0
+
+    def _stiffness(self, number: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+        """3 K alpha [Pa/K] of elements."""
+        blocks = self.blocks
+        bulk = np.array(blocks.element_rows.column("bulk"))
+        return 3.0 * bulk[blocks.element_row[number]] * alpha[self.row[number]]
+
+    # ---- tables of this rank -------------------------------------------------------------------------------------
+
+    @property
+    def on(self) -> bool:
+        """Heat flows. Not collective."""
+        return self.blocks.options.thermal and bool(self.rows)
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        return np.zeros((blocks.n_own, 4), bool)
+
+    def add_to(self, applied: np.ndarray) -> None:
+        """Thermal stress is in the elements."""
+
+    def reach(self, blocks: Any, middle: np.ndarray) -> float:
+        """Elements around a node of heat."""
+        cells = blocks.the_mesh().cells[blocks.number]
+        far = np.zeros(1)
+        for k in range(4):
+            there = cells[:, k] >= 0
+            if there.any():
+                way = blocks.x[there, 2 * k : 2 * k + 2] - middle[there]
+                far[0] = max(far[0], float((way * way).sum(axis=1).max()))
+        return 2.0 * math.sqrt(float(blocks.comm.max_into(far)[0])) + SPREAD * float(blocks.mean_edge)
+
+    def storage_rebuilt(self) -> None:
+        """Elements have other rows or owners, or something was said."""
+        blocks, halo = self.blocks, self.blocks.halo
+        self._make_columns()
+        cold, own = blocks.cold, blocks.owned
+        width = cold[TEMPERATURE].shape[1]
+        before = self._content()
+        was = cold[TEMPERATURE].copy()
+        self.t, weight = (np.zeros((len(blocks.number), width)) for _ in range(2))
+        self.t[own], weight[own] = cold[TEMPERATURE], cold[CAPACITY]
+        halo.fill(self.t)
+        halo.fill(weight)
+        heat = self.column("capacity")[self.row[blocks.number]]
+        self._corner_capacity = heat[:, None] * blocks.local.true_mass[:, :width]
+        changed = not np.array_equal(cold[CAPACITY], self._corner_capacity[own])
+        cold[CAPACITY] = self._corner_capacity[own].copy()
+        cold[TEMPERATURE] = self.t[own]  # one place for both
+        self._make_conductances()
+        self._make_nodes()
+        kernels.unite(self._begin, self._corner, weight.reshape(-1), self.t.reshape(-1))
+        united = blocks.comm.any(not np.array_equal(was, cold[TEMPERATURE]))
+        if united:
+            halo.fill(self.t)
+            blocks.local.restress()
+        if blocks.comm.any(changed) or united:
+            self.accounts["commands"] += self._content() - before
+        self._checked = False
+        self._find_step()
+        if not blocks.options.mechanical and not self._beside_flow():
+            blocks.clock.dt = self.sub_steps * self.dt
+
+    def _make_conductances(self) -> None:
+        blocks, number = self.blocks, self.blocks.number
+        along, across, angle = (
+            self.column(name)[self.row[number]]
+            for name in ("conductivity", "conductivity_across", "conductivity_angle")
+        )
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        same = along == across  # no rounding where the angle has no meaning
+        c, s = np.where(same, 1.0, c), np.where(same, 0.0, s)
+        k = np.column_stack([
+            along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * c * s,
+        ])  # fmt: skip
+        self._g = np.empty((len(number), 6 if blocks.wide else 3))
+        mesh = blocks.reference
+        kernels.conductances(number, mesh.points, mesh.cells, k, self._g)
+        self._q = np.zeros_like(self.t)
+
+    def _make_nodes(self) -> None:
+        """Nodes of heat that this rank's elements have, and the faces that are exposed, as faces hang together now."""
+        blocks, mesh, own = self.blocks, self.blocks.the_mesh(), self.blocks.owned
+        dead = np.repeat(~blocks.alive, 4)
+        node, lead = connectivity.corner_clusters(mesh.cells, blocks.partner, blocks.open | dead)
+        node[~blocks.alive] = -1
+        self.node, self.leads = node, lead
+        sizes = np.bincount(node[node >= 0], minlength=len(lead))
+        member_begin = np.zeros(len(lead) + 1, np.int64)
+        member = np.empty(int(sizes[sizes > 1].sum()), np.int64)
+        build.cluster_members(node, sizes, member_begin, member)
+        real = node[blocks.number[own]] >= 0
+        nothing, scratch = np.empty(0, np.int64), np.full(len(lead), -1, np.int64)
+        args = blocks.number, blocks.n_left, blocks.n_own, real, node, member_begin, scratch
+        n = build.special_nodes(*args, nothing, nothing, nothing)
+        first, start, one = (np.empty(n, np.int64) for _ in range(3))
+        build.special_nodes(*args, first, start, one)
+        width, total = self.t.shape[1], int(one.sum())
+        begin, corner, place, again = np.zeros(n + 1, np.int64), *(np.empty(total, np.int64) for _ in range(3))
+        lost = build.place_nodes(
+            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], blocks.local.true_mass, begin,
+            corner, place, again, np.empty(n),
+        )  # fmt: skip
+        lost = int(blocks.comm.max_into(np.array([lost], np.int64))[0])
+        if lost >= 0:
+            raise PhysicsError(
+                f"step {blocks.clock.step}: the node of heat at corner {lost} spans more than a column of "
+                f"{blocks.rebuild_state.side:g} m: joints that are not broken have opened too far"
+            )
+        self._begin, self._corner = begin, corner // 8 * width + corner % 8 // 2
+        self.node_ids = node[first // 4, first % 4]
+        self.capacity = np.empty(n)
+        kernels.sums(begin, self._corner, self._corner_capacity.reshape(-1), self.capacity)
+        lead_point = mesh.cells[first // 4, first % 4]
+        self._held = self.held[lead_point].astype(np.int64) - 1
+        self._make_faces()
+        self._find_limit()
+        self._stale = False
+
+    def renew_nodes(self) -> None:
+        """Nodes are those of the joints that hold now; the model is closed."""
+        if self._stale:
+            self._make_nodes()
+
+    @property
+    def nodes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """begin, corner and held of kernels.warm, of the nodes that this rank's elements have; `node_ids`: their
+        numbers among those of the model, whose lowest corners are `leads`. Not to be changed. Not collective."""
+        return self._begin, self._corner, self._held
+
+    @property
+    def conductances(self) -> np.ndarray:
+        """Of the elements held here, see `kernels.conductances`. Not to be changed. Not collective."""
+        return self._g
+
+    def transfers(self, everywhere: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Exposed faces (m,), ascending, their ends as corners (m, 2), element * 4 + k, and what each passes on per
+        degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
+        at, ends, half = self._exposed()
+        if not everywhere:
+            row = self.blocks.where[at // 4]
+            mine = (row >= self.blocks.owned.start) & (row < self.blocks.owned.stop)
+            at, ends, half = at[mine], ends[mine], half[mine]
+        h = self.column("transfer_coeficient")[self.row[at // 4]]
+        own = np.array([math.nan if one.transfer is None else one.transfer for one in self.faces])[self.face[at]]
+        there = np.array([one.environment is not None for one in self.faces])[self.face[at]]
+        transfer = half * np.where(there, np.where(np.isnan(own), h, own), 0.0)
+        return at, 4 * (at // 4)[:, None] + ends, transfer
+
+    def _exposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Free faces with a condition, of all ranks: numbers (m,), their two corners (m, 2) and half lengths [m]."""
+        blocks, mesh = self.blocks, self.blocks.reference
+        at = np.flatnonzero((self.face > 0) & blocks.face_exists() & ~blocks.closed_faces())
+        e, k = at // 4, at % 4
+        ends = np.column_stack([k, (k + 1) % connectivity.corner_counts(mesh.cells[e])])
+        points = mesh.points[np.take_along_axis(mesh.cells[e], ends, axis=1)]
+        way = points[:, 1] - points[:, 0]
+        return at, ends, 0.5 * np.hypot(way[:, 0], way[:, 1])
+
+    def _make_faces(self) -> None:
+        """Exposed faces of the elements held here, by their numbers."""
+        blocks = self.blocks
+        at, ends, half = self._exposed()
+        held = blocks.where[at // 4] >= 0
+        at, ends, self._half = at[held], ends[held], half[held]
+        e = at // 4
+        self._face_corner = blocks.where[e][:, None] * self.t.shape[1] + ends
+        # One row for each condition and coefficient of the element.
+        h = self.column("transfer_coeficient")[self.row[e]]
+        pairs, which = np.unique(np.column_stack([self.face[at].astype(float), h]), axis=0, return_inverse=True)
+        self._face_row, self._face_pairs = which.reshape(-1).astype(np.int64), pairs
+
+    def _faces_at(self, time: float) -> np.ndarray:
+        """The table of conditions (rows, 3) at a time of heat."""
+        table = np.zeros((len(self._face_pairs), 3))
+        for row, (condition, h) in enumerate(self._face_pairs):
+            one = self.faces[int(condition)]
+            table[row, kernels.FLUX] = self._now(one.flux, time)
+            if one.environment is not None:
+                table[row, kernels.TRANSFER] = h if one.transfer is None else one.transfer
+                table[row, kernels.ENVIRONMENT] = self._now(one.environment, time)
+        return table
+
+    def held_at(self, time: float) -> np.ndarray:
+        """Prescribed temperatures (rows,) at a time of heat."""
+        return np.array([self._now(one, time) for one in self.prescribed[1:]], np.float64)
+
+    def _now(self, value: Number, time: float) -> float:
+        if isinstance(value, str):
+            table = self.blocks.tables.get(value)  # nobody follows one that is gone
+            return table(time) if table is not None else 0.0
+        return value
+
+    # ---- the clock -----------------------------------------------------------------------------------------------
+
+    def _find_limit(self) -> None:
+        """Longest stable sub-step of nodes that are not held [s], by Gershgorin's circles: C over half the sum of
+        conductances and of their sizes, and of the transfer at faces; infinite where there is none."""
+        g, width = self._g, self.t.shape[1]
+        each = 0.5 * (g + np.abs(g))
+        corner = np.zeros((len(g), width))
+        for pair, (a, b) in enumerate(kernels.PAIRS[: g.shape[1]]):
+            corner[:, a] += each[:, pair]
+            corner[:, b] += each[:, pair]
+        h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
+        np.add.at(corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, 2))
+        total = np.empty(len(self.capacity))
+        kernels.sums(self._begin, self._corner, corner.reshape(-1), total)
+        free = (self._held < 0) & (total > 0.0)
+        least = float((self.capacity[free] / total[free]).min(initial=math.inf))
+        self._limit = float(self.blocks.comm.min_into(np.array([least]))[0])
+
+    def limit(self) -> float:
+        """The stability limit of a sub-step [s]."""
+        return self._limit
+
+    def _beside_flow(self) -> bool:
+        """Without motion of blocks it is fluid that sets the pace."""
+        return self.blocks.options.hydraulic and "fluid" in self.blocks.surface_loads
+
+    def _given(self) -> tuple[float, ...]:
+        """What the length of a sub-step follows from, beside the limit."""
+        o, clock = self.blocks.options, self.blocks.clock
+        period = o.mechanical or self._beside_flow()
+        return (
+            float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.heat_steps), o.heat_dt,
+            clock.dt if period else 0.0, self._limit,
+        )  # fmt: skip
+
+    def _find_step(self) -> None:
+        """Sub-steps of a cycle and their length, from what was said and what is stable."""
+        blocks, o = self.blocks, self.blocks.options
+        self._found_for = self._given()
+        if not self.on:
+            return
+        limit = SAFETY * self._limit
+        if o.mechanical:
+            period = o.flow_every * blocks.clock.dt if o.dynamic else 0.0
+        else:
+            period = blocks.clock.dt if self._beside_flow() else 0.0
+        if o.heat_dt > 0.0:
+            self.sub_steps, self.dt = max(1, o.heat_steps), o.heat_dt
+        elif period == 0.0:
+            if not math.isfinite(limit) and not o.mechanical:
+                raise CommandError("no heat can flow: all nodes are held; model time-step thermal gives it a clock")
+            self.sub_steps, self.dt = max(1, o.heat_steps), limit
+        else:
+            self.sub_steps = o.heat_steps or max(1, math.ceil(period / limit))
+            self.dt = period / self.sub_steps
+        if not o.heat_steps and self.sub_steps > MANY:
+            raise CommandError(
+                f"heat would need {self.sub_steps} sub-steps of {limit:.3g} s in a cycle of {period:.3g} s; model "
+                "time-step thermal gives it a clock of its own"
+            )
+        self._tell_step()
+
+    def _tell_step(self) -> None:
+        log = self.blocks.log
+        if log is None or abs(self.dt - self._told) <= 0.1 * self._told:
+            return
+        self._told = self.dt
+        log.info(f"heat: {self.sub_steps} sub-steps of {self.dt:.4g} s per cycle; stability limit {self._limit:.4g} s")
+        if self.dt > self._limit:
+            log.warn_once(
+                "heat step",
+                f"the thermal time step {self.dt:g} s is {self.dt / self._limit:.2f} of the stability limit "
+                f"{self._limit:.4g} s; a run that blows up should be repeated with a smaller one, or with model solve "
+                "thermal",
+            )
+
+    def check_elements(self) -> None:
+        """CommandError if an element lacks a thermal model, or has a law that knows no temperature. Not collective."""
+        blocks = self.blocks
+        bare = np.flatnonzero((self.row == 0) & blocks.alive)
+        if len(bare):
+            raise CommandError(
+                f"element {bare[0]} has no thermal model ({len(bare)} in all), but others have: element c-model "
+                "thermal-iso-heat for all"
+            )
+        if self.expands and user_laws.in_use(blocks):
+            raise CommandError(
+                f"{user_laws.some(blocks)} has a law of the user, which knows no temperature: expansion-coeficient "
+                "must be 0 with it"
+            )
+
+    def check_start(self) -> None:
+        o = self.blocks.options
+        if not self.rows or self._checked:
+            return
+        self.check_elements()
+        if self.on and o.mechanical and not o.dynamic and o.heat_dt == 0.0:
+            raise CommandError(
+                "in static runs time of heat passes by model time-step thermal, which comes first; or model option "
+                "thermal off leaves temperatures as they are"
+            )
+        self._checked = True
+
+    def joints_opened(self) -> None:
+        """Joints broke: no heat is conducted across them any more."""
+        self._stale = True
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        """Their heat is gone with them."""
+        blocks = self.blocks
+        self._expands = None
+        if TEMPERATURE not in blocks.cold:
+            return
+        mine = np.isin(blocks.number, elements)
+        t, c, given = (blocks.cold[name][mine].reshape(-1) for name in (TEMPERATURE, CAPACITY, GIVEN))
+        self.accounts["removed"] += exact_sum(t * c, blocks.comm)
+        self.accounts["given"] += exact_sum(given, blocks.comm)
+
+    def mesh_replaced(self) -> None:
+        """There is another mesh: `of_mesh` says that this is gone with the one before."""
+
+    def follow(self) -> None:
+        """Heat flows for as long as the step that the elements have moved by."""
+        blocks, o = self.blocks, self.blocks.options
+        if not self.on:
+            return
+        self.waited += 1
+        if o.mechanical and self.waited < o.flow_every:
+            return
+        self.waited = 0
+        with blocks.timers("heat"):
+            self.renew_nodes()
+            if self._found_for != self._given():
+                self._find_step()
+            if blocks.budget is not None and o.dynamic and self.expands:
+                blocks.budget.pause(blocks, by_heat=True)
+            for _ in range(self.sub_steps):
+                self._sub_step()
+            self.cycles += 1
+            if blocks.local.heated:
+                blocks.local.restress()
+        if self.cycles % LOOK == 0:
+            self._check_finite()
+
+    def _own_corners(self) -> tuple[int, int]:
+        """From where to where this rank's corners lie in t, flat."""
+        width, own = self.t.shape[1], self.blocks.owned
+        return width * own.start, width * own.stop
+
+    def inflow(self, time: float, dt: float) -> np.ndarray:
+        """Heat (n, w) [W/m] that flows to the corners of the elements held here, with the conditions of faces of a time
+        of heat; what these bring in dt [s] is booked. Not collective."""
+        threads = self.blocks.threads
+        (kernels.conduct if threads == 1 else kernels.conduct_threaded)(threads, self.t, self._g, self._q)
+        if len(self._face_row):
+            t, q, given = (part.reshape(-1) for part in (self.t, self._q, self.blocks.cold[GIVEN]))
+            kernels.through_faces(
+                self._face_corner, self._half, self._face_row, self._faces_at(time), *self._own_corners(), t, q, dt,
+                given,
+            )  # fmt: skip
+        return self._q
+
+    def _sub_step(self) -> None:
+        blocks, threads = self.blocks, self.blocks.threads
+        q = self.inflow(self.time, self.dt).reshape(-1)
+        self.time += self.dt
+        first, last = self._own_corners()
+        t, given = self.t.reshape(-1), blocks.cold[GIVEN].reshape(-1)
+        (kernels.warm if threads == 1 else kernels.warm_threaded)(
+            threads, self._begin, self._corner, self.capacity, self._held, self.held_at(self.time), first, last,
+            self.dt, q, t, given,
+        )  # fmt: skip
+        blocks.halo.fill(self.t)
+
+    def _check_finite(self) -> None:
+        """Stop on all ranks if the heat has blown up."""
+        blocks = self.blocks
+        bad = ~np.isfinite(blocks.cold[TEMPERATURE]).all(axis=1)
+        n = len(self.row)
+        first = int(blocks.comm.min_into(np.array([blocks.number[blocks.owned][bad].min(initial=n)], np.int64))[0])
+        if first < n:
+            raise PhysicsError(
+                f"step {blocks.clock.step}: the temperature of element {first} is not finite; the thermal time step "
+                f"{self.dt:g} s is probably too large (stable: {self._limit:g} s)"
+            )
+
+    # ---- state on disk -------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        """All but the columns, as JSON values; those of elements are saved with these."""
+        return {
+            "rows": [list(row) for row in self.rows], "prescribed": self.prescribed,
+            "faces": [asdict(one) for one in self.faces], "accounts": self.accounts, "time": self.time,
+            "cycles": self.cycles, "waited": self.waited,
+        }  # fmt: skip
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Elements with their properties, prescribed nodes and faces, of all ranks."""
+        found = {}
+        for name, rows in (("elements", self.row), ("points", self.held), ("faces", self.face)):
+            at = np.flatnonzero(rows)
+            found[f"heat_{name}"] = {"number": at, "row": rows[at].astype(np.int64)}
+        return found
+
+    @staticmethod
+    def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse of these: the blocks have this heat."""
+        made = Heat.of(blocks)
+        made.rows = [tuple(row) for row in state["rows"]]
+        made.prescribed = list(state["prescribed"])
+        made.faces = [FaceCondition(**one) for one in state["faces"]]
+        made.accounts, made.time = dict(state["accounts"]), state["time"]
+        made.cycles, made.waited = state["cycles"], state["waited"]
+        for name, rows in (("elements", made.row), ("points", made.held), ("faces", made.face)):
+            table = tables[f"heat_{name}"]
+            rows[table["number"]] = table["row"]

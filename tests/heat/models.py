@@ -1,0 +1,112 @@
+"""Blocks that are heated, break and fly: models for tests/parallel/test_models.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hpcdem.physics.fdem import changes, creep, diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.heat.model import Heat
+from tests.blocks.models import COHESIVE, WEAK
+from tests.blocks.support import ROCK, rectangle, shaken
+from tests.flow.support import inner
+from tests.heat.support import GRANITE
+from tests.parallel.model import Found, Model
+
+HOT = {**GRANITE, "expansion_coeficient": 2e-5, "transfer_coeficient": 50.0}
+
+
+def cracking(sim: Blocks) -> None:
+    """A jointed block is heated from inside until it breaks, while it flies to the right through the strips of the
+    ranks; heat has a clock that runs ahead."""
+    sim.take_mesh(shaken(rectangle(16, 6, 1.6, 0.6, kind="mixed"), 0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    sim.joint_model(inner(sim.mesh), COHESIVE, WEAK)
+    sim.gravity(3.0, -9.81)
+    x = sim.mesh.points[:, 0]
+    for one in np.unique(np.round(x, 1)):
+        changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
+    heat = Heat.of(sim)
+    heat.assign(None, {**HOT, "conductivity_across": 1.0, "conductivity_angle": 20.0})
+    heat.initial(None, 20.0)
+    sim.table("oven", [(0.0, 20.0), (3e4, 320.0), (1e5, 120.0)])
+    heat.prescribe(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.15), "oven")
+    heat.expose(None, environment="oven", transfer=20.0)
+    heat.expose(np.flatnonzero(sim.face_exists())[::7], flux=400.0)
+    sim.heat_clock(dt=100.0)
+
+
+def more(sim: Blocks) -> None:
+    """What happens to it."""
+    heat = Heat.of(sim)
+    if sim.clock.step == 300:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 1] < 0.1)[3:9])
+    if sim.clock.step == 600:
+        heat.adjust(np.flatnonzero(sim.alive)[:20], {"capacity": 700.0})
+        heat.initial(np.flatnonzero(sim.node_exists())[5:9], 90.0)
+        sim.heat_clock(steps=2)
+        sim.flow_clock(every=3)
+
+
+def warming(sim: Blocks) -> None:
+    """Clay that creeps and yields is warmed at rest, then moves."""
+    sim.take_mesh(shaken(rectangle(20, 6, 2.0, 0.6), 0.2))
+    solid = {"density": 2000.0, "young": 1e9, "poisson_ratio": 0.3}
+    changes.element_model(sim, None, "mech_mohr_coulomb",
+                          {**solid, "friction": 20.0, "cohesion": 2e5, "tensile": 1e5})  # fmt: skip
+    right = np.flatnonzero(sim.mesh.centroids()[:, 0] > 1.0)
+    changes.element_model(sim, right, "mech_burgers", {**solid, "maxwell_viscosity": 1e8})
+    heat = Heat.of(sim)
+    heat.assign(None, HOT)
+    x = sim.mesh.points[:, 0]
+    heat.prescribe(np.flatnonzero(x == 0.0), 300.0)
+    heat.prescribe(np.flatnonzero(x == 2.0), 100.0)
+    sim.parts(mechanical=False)
+
+
+def move(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 400:
+        sim.parts(mechanical=True)
+        creep.switch(sim, True)
+        sim.heat_clock(dt=300.0)
+        sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
+
+
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks."""
+    names = ("position_x", "velocity_y", "stress_xx", "stress_zz", "temperature", "mean_temperature",
+             "plastic_shear_strain", "creep_strain_xx")  # fmt: skip
+    found = {name: diagnostics.values(sim, name) for name in names}
+    heat = Heat.of(sim)
+    found.update({f"account_{name}": np.array(value) for name, value in heat.account().items()})
+    found["counts"] = np.array(diagnostics.joint_counts(sim))
+    found["clock"] = np.array([heat.time, heat.dt, heat.sub_steps, heat.cycles, sim.clock.time])
+    return found
+
+
+def it_is_hot(found: Found) -> None:
+    assert (
+        np.nanmax(found["temperature"]) > 100.0
+        and np.nanmax(found["temperature"]) - np.nanmin(found["temperature"]) > 40.0
+    )
+    assert found["account_relative"] < 1e-12 and found["account_given"] > 0.0
+
+
+def it_cracks(found: Found) -> None:
+    it_is_hot(found)
+    assert found["counts"][2] > 20 and found["account_removed"] > 0.0
+
+
+def it_flows(found: Found) -> None:
+    assert np.nanmax(found["temperature"]) > 100.0 and found["account_relative"] < 1e-12
+    assert np.nanmax(found["plastic_shear_strain"]) > 1e-5 and np.nanmax(np.abs(found["creep_strain_xx"])) > 1e-6
+
+
+# Checkpoints after excavation, and after the blocks have begun to move.
+MODELS = {
+    "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
+    "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503),
+}

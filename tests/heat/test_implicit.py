@@ -1,0 +1,215 @@
+"""Implicit steps of heat: explicit ones and closed forms, steady states, blocks in equilibrium, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hpcdem.commands import fdem
+from hpcdem.core.errors import CommandError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.bolts.model import Bolts
+from hpcdem.physics.fdem import changes, diagnostics, equilibrium
+from hpcdem.physics.fdem.groups import Span
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.heat.implicit import Implicit
+from hpcdem.physics.heat.model import Heat
+from tests.blocks.models import COHESIVE
+from tests.blocks.support import JOINT, ROCK, model, rectangle, shaken
+from tests.flow.support import at, inner
+from tests.heat import exact
+from tests.heat.support import DIFFUSIVITY, GRANITE, faces_at, standing, temperatures
+
+DAY = 86400.0
+
+
+def over(sim: Blocks, time: float, steps: int, solver: str = "auto") -> Implicit:
+    """So much time [s] in so many equal steps."""
+    run = Implicit(sim, solver)
+    for _ in range(steps):
+        run.advance(time / steps)
+    run.close()
+    return run
+
+
+@pytest.mark.parametrize("kind", ["tri", "mixed"])
+def test_a_step_is_backward_euler(kind: str) -> None:
+    """(T' - T) C / dt is the inflow of the explicit kernels at T'; one factor for all steps; the account closes."""
+    mesh = shaken(rectangle(6, 4, 1.2, 0.8, kind=kind), 0.2)
+    sim, heat = standing(mesh, conductivity_across=1.0, conductivity_angle=30.0)
+    sim.table("ramp", [(0.0, 10.0), (1e6, 90.0)])
+    heat.prescribe(at(sim, x=0.0), "ramp")
+    heat.expose(faces_at(mesh, 1.2), environment=40.0, transfer=7.0, flux=12.0)
+    sim.close_model()
+    run = Implicit(sim)
+    for _ in range(3):
+        before = temperatures(sim)
+        run.advance(1e5)
+        after = temperatures(sim)
+    sim.heat_clock(dt=1e-3)  # an explicit step shows the inflow
+    sim.step()
+    rate = (temperatures(sim) - after) / 1e-3
+    free = np.setdiff1d(np.arange(len(mesh.points)), at(sim, x=0.0))
+    assert (after - before)[free] / 1e5 == pytest.approx(rate[free], rel=1e-4)
+    assert after[at(sim, x=0.0)] == pytest.approx(34.0, rel=1e-14)
+    assert run.factors == 1 and run.steps == 3 and heat.account()["relative"] < 1e-12
+    assert heat.time == pytest.approx(3e5 + 1e-3) and run.unknowns == len(free)
+
+
+def test_days_in_few_steps_follow_the_series_with_order_one() -> None:
+    """A year in a slab of 10 m: two thousand times the stable explicit step."""
+    errors = []
+    for steps in (25, 50, 100):
+        mesh = rectangle(64, 1, 10.0, 10.0 / 64)
+        sim, heat = standing(mesh)
+        heat.prescribe(at(sim, x=0.0), 100.0)
+        over(sim, 365.0 * DAY, steps)
+        wanted = 100.0 * exact.slab(mesh.points[:, 0], 365.0 * DAY, 10.0, DIFFUSIVITY)
+        errors.append(float(np.abs(temperatures(sim) - wanted).max()))
+        assert heat.account()["relative"] < 1e-12
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert errors[-1] < 0.5 and (np.abs(orders - 1.0) < 0.15).all(), (errors, orders)
+
+
+def test_steady_states_are_found_at_once() -> None:
+    """Between two temperatures, and between one and an environment; anisotropic rock carries heat to the side."""
+    mesh = shaken(rectangle(10, 4, 2.0, 0.8), 0.2)
+    sim, heat = standing(mesh)
+    heat.prescribe(at(sim, x=0.0), 100.0)
+    heat.prescribe(at(sim, x=2.0), 20.0)
+    run = Implicit(sim)
+    run.steady()
+    assert temperatures(sim) == pytest.approx(100.0 - 40.0 * mesh.points[:, 0], abs=1e-10)
+    assert heat.time == 0.0 and heat.account()["relative"] < 1e-13
+    heat.remove_conditions(at(sim, x=2.0))
+    heat.expose(faces_at(mesh, 2.0), environment=20.0, transfer=GRANITE["conductivity"])
+    run.steady()  # half of the resistance of 2 m of rock is that of the transfer
+    run.close()
+    assert temperatures(sim)[at(sim, x=2.0)] == pytest.approx(20.0 + 80.0 / 3.0, rel=1e-9)
+    heat.remove_face_conditions(None)
+    heat.remove_conditions(None)
+    with pytest.raises(CommandError, match="in the body of element 0 no temperature is prescribed"):
+        Implicit(sim).steady()
+
+
+def test_cracks_part_the_heat() -> None:
+    mesh = rectangle(8, 2, 2.0, 0.5)
+    sim, heat = standing(mesh)
+    middle = [j for j in inner(mesh) if np.allclose(mesh.points[_ends(mesh, j)][:, 0], 1.0)]
+    changes.crack(sim, np.array(middle))
+    heat.initial(None, 7.0)
+    heat.prescribe(at(sim, x=0.0), 100.0)
+    with pytest.raises(CommandError, match="has no steady state"):
+        Implicit(sim).steady()
+    over(sim, 1e9, 10)
+    assert temperatures(sim)[at(sim, x=2.0)] == pytest.approx(7.0, rel=1e-12)
+    assert temperatures(sim)[at(sim, x=0.75)] == pytest.approx(100.0, rel=1e-6)
+
+
+def _ends(mesh, joint: int) -> np.ndarray:
+    e, k = joint // 4, joint % 4
+    return mesh.cells[e, [k, (k + 1) % (4 if mesh.cells[e, 3] >= 0 else 3)]]
+
+
+def test_blocks_are_in_equilibrium_at_the_end_of_each_step() -> None:
+    """Between walls, in static mode: the stress follows the temperature."""
+    sim = model(rectangle(6, 4, 1.2, 0.8))
+    sim.option(dynamic=False, collision=False)
+    for x in (0.0, 1.2):
+        sim.velocity_condition(at(sim, x=x), vx=0.0)
+    sim.velocity_condition(at(sim, y=0.0), vy=0.0)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 1e-5})
+    sim.table("ramp", [(0.0, 0.0), (4e6, 40.0)])
+    heat.prescribe(None, "ramp")
+    for k in range(1, 5):
+        over(sim, 1e6, 1)
+        assert temperatures(sim) == pytest.approx(10.0 * k)
+        wanted = -ROCK["young"] * 1e-5 * 10.0 * k / (1.0 - ROCK["poisson_ratio"])
+        assert diagnostics.values(sim, "stress_xx") == pytest.approx(wanted, rel=2e-3)
+        assert diagnostics.unbalanced_ratio(sim) < 1e-6
+    assert sim.clock.step == 4
+
+
+def test_heat_breaks_joints_on_the_way() -> None:
+    """A bar between walls is cooled until its joints break, and is then free of stress, and insulated."""
+    sim = model(rectangle(6, 1, 0.6, 0.1, kind="quad"))
+    sim.option(dynamic=False, collision=False)
+    for x in (0.0, 0.6):
+        sim.velocity_condition(at(sim, x=x), vx=0.0)
+    sim.velocity_condition(at(sim, y=0.0), vy=0.0)
+    weak = [j for j in inner(sim.mesh) if np.allclose(sim.mesh.points[_ends(sim.mesh, j)][:, 0], 0.3)]
+    sim.joint_model(np.array(weak), COHESIVE, {**JOINT, "tensile_strength": 1e6, "gf1": 5.0, "gf2": 5.0})
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 1e-5})
+    sim.table("ramp", [(0.0, 0.0), (4e6, -40.0)])
+    heat.prescribe(at(sim, x=0.0), "ramp")
+    over(sim, 4e6, 20)
+    assert diagnostics.joint_counts(sim)[2] == 1
+    assert np.abs(diagnostics.values(sim, "stress_xx")).max() < 1e4
+    cold = temperatures(sim)
+    assert cold[at(sim, x=0.0)] == pytest.approx(-40.0) and cold[at(sim, x=0.6)].min() > -35.0
+    assert heat.account()["relative"] < 1e-12
+
+
+def test_what_implicit_steps_cannot_do_is_refused() -> None:
+    sim = model(rectangle(2, 2, 1.0, 1.0))
+    with pytest.raises(CommandError, match="there is no heat yet"):
+        Implicit(sim)
+    heat = Heat.of(sim)
+    heat.assign(np.arange(3), GRANITE)
+    with pytest.raises(CommandError, match="dynamic off comes first, or mechanical"):
+        Implicit(sim)
+    sim.option(dynamic=False)
+    with pytest.raises(CommandError, match="element 3 has no thermal model"):
+        Implicit(sim)
+    heat.assign(None, GRANITE)
+    with pytest.raises(CommandError, match="solver is one of auto, direct, petsc"):
+        Implicit(sim, "fast")
+    sim.parts(thermal=False)
+    with pytest.raises(CommandError, match="thermal on comes first"):
+        Implicit(sim)
+    sim.parts(thermal=True)
+    bolts = Bolts.of(sim)
+    bolts.create([(0.2, 0.2), (0.8, 0.8)])
+    with pytest.raises(CommandError, match="know no bolts"):
+        Implicit(sim)
+
+
+def test_the_command_says_how_it_ended(tmp_path) -> None:
+    """Steps of equal length, a steady state, histories, what is refused."""
+    project = fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
+    fdem.meshes.rectangle(project, (0.0, 0.0), (2.0, 1.0), (4, 2))
+    fdem.assignments.element_model(project, "mech_iso_elastic", ROCK)
+    fdem.heat.model(project, GRANITE)
+    fdem.settings.option(project, mechanical=False)
+    fdem.heat.condition(project, 50.0, (Span(0, 0.0, 0.0),))
+    fdem.histories.create(project, "given", "model", "heat_given")
+    fdem.steps.solve_thermal(project, time=10.0 * DAY, dt=3.0 * DAY)
+    assert project.solved == {"reason": "time", "ratio": pytest.approx(np.nan, nan_ok=True), "steps": 4}
+    assert fdem.queries.heat(project)["relative"] < 1e-12 and len(project.histories["given"].rows) == 4
+    assert Heat.of(project.blocks).time == pytest.approx(10.0 * DAY)
+    fdem.steps.solve_thermal(project, time=DAY)
+    assert project.solved["steps"] == 100
+    fdem.steps.solve_thermal(project, steady=True)
+    assert project.solved["reason"] == "steady"
+    assert fdem.queries.values(project, "node", "temperature") == pytest.approx(50.0)
+    for given, text in (
+        ({}, "time or steady, one of them"), ({"time": 1.0, "steady": True}, "time or steady, one of them"),
+        ({"steady": True, "dt": 1.0}, "dt goes with time"), ({"time": 1.0, "dt": -1.0}, "must be positive"),
+    ):  # fmt: skip
+        with pytest.raises(CommandError, match=text):
+            fdem.steps.solve_thermal(project, **given)
+
+
+def test_equilibrium_keeps_temperatures() -> None:
+    """The static solve takes blocks with heat as they are."""
+    sim = model(rectangle(4, 2, 1.0, 0.5))
+    sim.option(dynamic=False, collision=False)
+    sim.velocity_condition(at(sim, x=0.0), vx=0.0, vy=0.0)
+    heat = Heat.of(sim)
+    heat.assign(None, GRANITE)
+    heat.initial(None, 30.0)
+    sim.gravity(0.0, -9.81)
+    equilibrium.solve_elastic(sim)
+    assert (temperatures(sim) == 30.0).all() and heat.time == 0.0
