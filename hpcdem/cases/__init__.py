@@ -26,7 +26,7 @@ CASES = {
     "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar", "creep": "Creep",
     "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
-    "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing",
+    "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]

@@ -43,9 +43,10 @@ _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the pa
 
 @dataclass(frozen=True)
 class Looks:
-    """panels: of PANELS, none: cracks, stress, and plastic strain, temperature and pressure of fluid where there is
-    some; page: width [cm]; font and lines in points; dpi: dots per inch; title: in the corner, with {step} and {time};
-    ranges: of the colours of panels, SI; those that are not given are those of the frame."""
+    """panels: of PANELS, none: cracks, stress, and plastic strain and pressure of fluid where there is some, with heat
+    cracks, or without joints stress, and temperature; page: width [cm]; font and lines in points; dpi: dots per inch;
+    title: in the corner, with {step} and {time}; ranges: of the colours of panels, SI; those that are not given are
+    those of the frame."""
 
     panels: tuple[str, ...] = ()
     page: float = 17.0
@@ -157,6 +158,8 @@ class Contours:
 def panels_of(state: MeshState) -> tuple[str, ...]:
     """The panels that show what there is."""
     wet = (TEMPERATURE,) * ("temperature" in state.of_points) + ("pressure",) * fluid.there(state)
+    if wet[:1] == (TEMPERATURE,) and plastic_range(state)[1] == 0.0:
+        return (CRACKS if len(state.joints) else STRESS), *wet
     if plastic_range(state)[1] > 0.0:
         return ((CRACKS,) if len(state.joints) else ()) + (STRESS, PLASTIC, *wet)
     return CRACKS, STRESS, *wet

@@ -85,6 +85,8 @@ class Heat(SurfaceLoad):
         self._stale = True
         self._checked = False
         self._expands: bool | None = None
+        self._stiffness_of: np.ndarray | None = None
+        self._stiffness, self._quad = np.empty(0), np.empty(0, bool)
         self._found_for: tuple[float, ...] = ()
         self._told = 0.0
         self._limit = math.inf
@@ -280,11 +282,14 @@ class Heat(SurfaceLoad):
     def eigenstress(self, blocks: Any) -> np.ndarray | None:
         if not self.expands or TEMPERATURE not in blocks.cold:
             return None
-        alpha = self.column("expansion_coeficient")
-        number, out = blocks.number[blocks.owned], np.empty(blocks.n_own)
+        if self._stiffness_of is not blocks.number:  # whatever changes it makes storage of its own
+            number = blocks.number[blocks.owned]
+            bulk = np.array(blocks.element_rows.column("bulk"))[blocks.element_row[number]]
+            self._stiffness = 3.0 * bulk * self.column("expansion_coeficient")[self.row[number]]
+            self._quad, self._stiffness_of = blocks.the_mesh().cells[number, 3] >= 0, blocks.number
+        out = np.empty(blocks.n_own)
         kernels.thermal_stress(
-            self._quads(number), blocks.cold[TEMPERATURE], self._stiffness(number, alpha),
-            blocks.cold[UNSTRESSED].reshape(-1), out,
+            self._quad, blocks.cold[TEMPERATURE], self._stiffness, blocks.cold[UNSTRESSED].reshape(-1), out
         )  # fmt: skip
         return out
 
@@ -294,15 +299,6 @@ class Heat(SurfaceLoad):
         if self._expands is None:
             self._expands = bool(self.column("expansion_coeficient")[self.row[self.blocks.alive]].any())
         return self._expands
-
-    def _quads(self, number: np.ndarray) -> np.ndarray:
-        return self.blocks.the_mesh().cells[number, 3] >= 0
-
-    def _stiffness(self, number: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-        """3 K alpha [Pa/K] of elements."""
-        blocks = self.blocks
-        bulk = np.array(blocks.element_rows.column("bulk"))
-        return 3.0 * bulk[blocks.element_row[number]] * alpha[self.row[number]]
 
     # ---- tables of this rank -------------------------------------------------------------------------------------
 

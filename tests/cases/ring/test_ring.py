@@ -1,4 +1,4 @@
-"""Case of a ring with heat, `hpcdem case thermal-ring`, against the closed form that its script draws
+"""Cases of rings with heat, `hpcdem case thermal-ring|cracking-ring`, against the closed form that their scripts draw
 (9.13; Timoshenko & Goodier 1970, 151: plane strain)."""
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from hpcdem.cases import ThermalRing
+from hpcdem.cases import CrackingRing, ThermalRing
 from tests.cases.ready import results
 
 
@@ -21,3 +21,13 @@ def test_temperature_and_stress_in_a_ring(launch, tmp_path):
     for r, temperature, _, _ in done.profile:
         assert temperature == pytest.approx(100.0 * math.log(0.5 / r) / math.log(5.0), abs=2.0)
     assert (tmp_path / "data" / "thermal-ring.png").stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_a_ring_cracks_by_heat(launch, tmp_path):
+    """7.6.10: the rim cracks first, at 11.2 K within 15 %."""
+    done = results(launch, tmp_path, CrackingRing())
+    print(vars(done))
+    assert done.exact == pytest.approx(11.15, rel=1e-3) and done.first == pytest.approx(11.2, rel=0.15)
+    assert done.radius > 0.45 and done.broken > 5
+    assert all(count == 0.0 for warmer, count in done.curve if warmer < done.first)
