@@ -39,7 +39,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import properties as known
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
 from hpcdem.physics.user_files import (
     MARK,
@@ -119,7 +121,7 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
     def take(text: str, path: str, name: str, function: str) -> UserLaw:
         found = MODELS.get(name) or _made(text, path, name, function)
         assert isinstance(found, UserLaw)
-        _compile(found, sim.threads)
+        _compile(found, sim)
         MODELS[name] = found
         return found
 
@@ -212,13 +214,10 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
 
 
-def _compile(law: UserLaw, threads: int, quads: bool = False) -> None:
-    """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model."""
-    from hpcdem.halo.comm import SerialComm
-    from hpcdem.physics.fdem.mesh import Mesh
-    from hpcdem.physics.fdem.simulation import Blocks
-
-    sim = Blocks(SerialComm(), threads)
+def _compile(law: UserLaw, blocks: State, quads: bool = False) -> None:
+    """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model of the
+    class and the threads of `blocks`."""
+    sim: Any = type(blocks)(SerialComm(), blocks.threads)
     corners = [0, 1, 2, 3] if quads else [0, 1, 2, -1]
     sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][: 4 if quads else 3], [corners]))
     sim.set_element_model(None, "mech_iso_elastic", {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0})
@@ -280,7 +279,7 @@ def compile_for_quads(sim: State) -> None:
         known = law.name, sim.threads
         if not (quads & sim.alive & (number == 1 + k)).any() or not sim.comm.any(known not in _FOR_QUADS):
             continue
-        spent = in_turn(sim.comm, lambda law=law: _compile(law, sim.threads, quads=True))  # type: ignore[misc]
+        spent = in_turn(sim.comm, lambda law=law: _compile(law, sim, quads=True))  # type: ignore[misc]
         _FOR_QUADS.add(known)
         if spent and sim.log is not None:
             sim.log.info(f"law {law.title} is compiled for quads: {spent:.1f} s")
