@@ -29,6 +29,7 @@ from hpcdem.runtime.kernels import cache_folder, turn_of
 from hpcdem.runtime.launch import patient_barrier
 
 if TYPE_CHECKING:
+    from hpcdem.halo.comm import SerialComm
     from hpcdem.physics.model import Model
 
 TOLD = 0.1
@@ -79,10 +80,7 @@ class UnknownLaw(CommandError):
 
 def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, str, str, str], Made]) -> Made:
     """What `take` makes of (text, path, name with digest, function) of 'file.py:function', on all ranks from the text
-    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective.
-
-    One rank of each machine type goes first, then one of each host, then the rest: what the first ones compile is kept
-    for the others (`made_of`)."""
+    that rank 0 reads. kind: what it is, in messages. CommandError with file and line. Collective."""
     file, _, function = what.rpartition(":")
     if not file.endswith(".py") or not function.isidentifier():
         raise CommandError(f"a {kind} is named 'file.py:function', got '{what}'")
@@ -96,26 +94,40 @@ def agreed(sim: Model, path: Path, what: str, kind: str, take: Callable[[str, st
     if problem:
         raise CommandError(problem)
     name = f"{Path(file).name}:{function}{MARK}{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-    from numba.core import event
+    message, made = None, []
 
-    began, message, made = time.perf_counter(), None, []
-    turn = turn_of(sim.comm.allgather((socket.gethostname(), cache_folder()[0].name)), sim.comm.rank)
-    with event.install_recorder("numba:compile") as compiling:
-        for now in range(3):
-            if now == turn:
-                try:
-                    made.append(take(text, str(path), name, function))
-                except Wrong as wrong:
-                    message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
-            patient_barrier(sim.comm)
+    def act() -> None:
+        nonlocal message
+        try:
+            made.append(take(text, str(path), name, function))
+        except Wrong as wrong:
+            message = f"{file}:{wrong.line}: {wrong}" if wrong.line else f"{file}: {wrong}"
+
+    spent = in_turn(sim.comm, act)
     try:
         sim.comm.agree(message)
     except HpcdemError as error:
         raise CommandError(str(error)) from None
-    spent = time.perf_counter() - began
-    if compiling.buffer and spent > TOLD and sim.log is not None:
+    if spent and sim.log is not None:
         sim.log.info(f"{kind} {Path(file).name}:{function} is compiled: {spent:.1f} s")
     return made[0]
+
+
+def in_turn(comm: SerialComm, act: Callable[[], None]) -> float:
+    """One rank of each machine type acts first, then one of each host, then the rest: what the first ones compile is
+    kept for the others (`made_of`). Returns the seconds that this took if it compiled something and took long enough to
+    be told, else 0. Collective."""
+    from numba.core import event
+
+    began = time.perf_counter()
+    turn = turn_of(comm.allgather((socket.gethostname(), cache_folder()[0].name)), comm.rank)
+    with event.install_recorder("numba:compile") as compiling:
+        for now in range(3):
+            if now == turn:
+                act()
+            patient_barrier(comm)
+    spent = time.perf_counter() - began
+    return spent if compiling.buffer and spent > TOLD else 0.0
 
 
 def made_of(function: Callable[..., Any], path: str) -> str | None:

@@ -107,8 +107,8 @@ def yield_more(sim: Blocks) -> None:
 
 
 def obeying(sim: Blocks) -> None:
-    """The same blocks with laws of the user (laws/rock.py), which come to rest first."""
-    one = shaken(rectangle(10, 5, 1.0, 0.5), 0.2)
+    """The same blocks with laws of the user (laws/rock.py), one of them with quads, which come to rest first."""
+    one = shaken(rectangle(10, 5, 1.0, 0.5, kind="mixed"), 0.2)
     two = shaken(rectangle(8, 3, 0.8, 0.3, x0=1.001, y0=0.13), 0.2, seed=2)
     sim.take_mesh(joined(one, two))
     rock = {**ROCK, "friction": 25.0, "damp_factor": 0.05}
@@ -213,8 +213,9 @@ def fill_up(sim: Blocks) -> None:
 
 
 def creeping(sim: Blocks) -> None:
-    """A specimen under load at rest, the left of it creeps, joints in the elastic right break in mid-creep."""
-    mesh = shaken(rectangle(14, 8, 1.4, 0.8), 0.2)
+    """A specimen of triangles and quads under load at rest, the left of it creeps, joints in the elastic right break in
+    mid-creep."""
+    mesh = shaken(rectangle(14, 8, 1.4, 0.8, kind="mixed"), 0.2)
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05, "friction": 20.0})
     soft = {**ROCK, "maxwell_viscosity": 4e6, "kelvin_shear": 1e10, "kelvin_viscosity": 1e6, "damp_factor": 0.05}

@@ -60,7 +60,9 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
             del MODELS[name]
         sim = Blocks()
         law = user_laws.load(sim, path, "law.py:stiff")
-        told.append((sum(law.loop.stats.cache_hits.values()), sum(law.loop.stats.cache_misses.values())))
+        told.append(
+            (sum(law.loops.triangles.stats.cache_hits.values()), sum(law.loops.triangles.stats.cache_misses.values()))
+        )
         return law
 
     first = stresses(load())
@@ -69,22 +71,22 @@ def test_a_law_is_compiled_once(tmp_path, monkeypatch):
     assert told == [(0, 1), (1, 0)]
     (folder,) = (tmp_path / "cache").iterdir()
     files = sorted(file.name.partition("-")[0] for file in folder.iterdir())
-    assert files == ["evaluate", "loop"]
+    assert files == ["evaluate", "look", "triangles"]
     law = load()
-    (signature,) = law.loop.overloads
-    loop = next(folder.glob("loop-*"))
+    (signature,) = law.loops.triangles.overloads
+    loop = next(folder.glob("triangles-*"))
     whole = loop.read_bytes()
-    files_ = law.loop._cache
-    assert files_.load_overload(signature, law.loop.targetctx) is not None
+    files_ = law.loops.triangles._cache
+    assert files_.load_overload(signature, law.loops.triangles.targetctx) is not None
     if hasattr(kept.os, "getuid"):
         with monkeypatch.context() as somebody:
             somebody.setattr(kept.os, "getuid", lambda: 987654)
-            assert files_.load_overload(signature, law.loop.targetctx) is None
+            assert files_.load_overload(signature, law.loops.triangles.targetctx) is None
     for damage in (whole[:-100], whole[:50] + b"?" + whole[51:], b""):
         loop.write_bytes(damage)
-        assert files_.load_overload(signature, law.loop.targetctx) is None
+        assert files_.load_overload(signature, law.loops.triangles.targetctx) is None
     loop.write_bytes(whole)
-    assert files_.load_overload(signature, law.loop.targetctx) is not None
+    assert files_.load_overload(signature, law.loops.triangles.targetctx) is not None
     monkeypatch.setenv("STIFF", "0.5")  # the same text, which stands for something else
     assert not np.array_equal(stresses(load()), first) and told[-1] == (0, 1)
     monkeypatch.delenv("STIFF")

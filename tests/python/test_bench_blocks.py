@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT / "scripts" / "lib"))
 
 from bench import blocks
 
-from hpcdem.physics.fdem import convergence, diagnostics
+from hpcdem.physics.fdem import convergence, diagnostics, user_laws
 
 
 def made(kind: str, side: int = 8) -> Blocks:
@@ -39,6 +39,9 @@ def test_workloads_are_what_they_say():
     quads = made("quads")
     assert len(quads.mesh.cells) == 64 and (quads.mesh.cells[:, 3] >= 0).all()
     assert np.abs(diagnostics.values(quads, "stress_xx")).max() > 1e3
+    for kind in ("intact", "quads"):
+        own = made(kind.replace("intact", "own").replace("quads", "own-quads"))
+        assert blocks.digest(own) == blocks.digest(made(kind)) and user_laws.in_use(own)
     for work in blocks.WORKLOADS.values():
         assert work.kind in blocks.RATES and work.kind in blocks.MAKERS
 

@@ -221,7 +221,7 @@ _PARAMETER = Option(
     repeated=True,
 )
 USER = Model(
-    "user", "", "A law in a Python file of the user, see docs/user_laws.md. For triangles.",
+    "user", "", "A law in a Python file of the user, see docs/user_laws.md.",
     (*declared(properties.USER, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "d{amp}-f{actor}",
                "fri{ction}", "pen{alty}"), _PARAMETER),
     one_of=_PAIRS, of=properties.USER, leading=(_LAW,),
@@ -229,7 +229,7 @@ USER = Model(
 BURGERS = Model(
     "mech{anical}-bur{gers}", "3",
     "Elastic in its volume, creeping in its shape after Burgers while model creep is on, for large rotations. Strain "
-    "of the Kelvin unit goes with a stress that was there before. For triangles.",
+    "of the Kelvin unit goes with a stress that was there before.",
     declared(
         properties.MECH_BURGERS, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "b{ulk}", "k{elvin}-s{hear}",
         "k{elvin}-v{iscosity}", "m{axwell}-s{hear}", "m{axwell}-v{iscosity}", "k{elvin}-s{train}-xx",

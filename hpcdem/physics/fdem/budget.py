@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.numerics.exact_sum import exact_sum, from_integer
-from hpcdem.physics.fdem.kernels import creep, energy, plasticity
+from hpcdem.physics.fdem.kernels import energy, plasticity
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -160,7 +160,7 @@ class Budget:
             if local.plastic:
                 half[:, WORK.index("plastic")] = -local.plastic_columns(slice(None))[:, plasticity.WORK]
             if local.creeps:
-                half[:, WORK.index("creep")] = -local.crept()[0][:, creep.LOST]
+                half[:, WORK.index("creep")] = -local.lost_by_creep()
             self._book(sim, sim.v, sim.v, 0.5, 0.0, seen.of_joints, seen.pushed, seen.felt, seen.outside, half)
             stored = dict(zip(STORED, (exact_sum(part, sim.comm) for part in (kinetic, strain, in_joints))))
             return stored, {name: exact_sum(half[:, k], sim.comm) for k, name in enumerate(WORK)}

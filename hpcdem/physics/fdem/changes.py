@@ -11,6 +11,7 @@ from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
 from hpcdem.physics.fdem.kernels.creep import K11, K12, K22
+from hpcdem.physics.fdem.kernels.creep import MEMORY as CREEP_MEMORY
 from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
 from hpcdem.physics.fdem.properties import ELEMENT, MECH_BURGERS, model
@@ -71,8 +72,6 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
     asked = np.flatnonzero(sim.alive)
     if elements is not None:
         asked = sim.existing(elements, np.ones(len(sim.alive), bool), "element")
-    if (name == MECH_BURGERS.name or MARK in name) and len(quads := asked[sim.the_mesh().cells[asked, 3] >= 0]):
-        raise CommandError(f"element {quads[0]} is a quad: {name.partition(MARK)[0]} is for triangles")
     if MARK in name and sim.budget is not None:
         raise CommandError(
             f"an energy budget is kept, but what the law {name.partition(MARK)[0]} stores and loses is not known: "
@@ -330,8 +329,10 @@ def reset_kelvin_strain(sim: Blocks, elements: Numbers = None) -> None:
         )
     sim.before_change()
     if "creep" in sim.cold:
-        for column in (K11, K22, K12):
-            sim.cold["creep"][np.isin(sim.number, at), column] = 0.0
+        mine, memory = np.isin(sim.number, at), sim.cold["creep"]
+        for part in range(0, memory.shape[1], CREEP_MEMORY):
+            for column in (K11, K22, K12):
+                memory[mine, part + column] = 0.0
     sim.changed(stiffness=False)
 
 

@@ -97,7 +97,7 @@ def begin(sim: Blocks, end: float) -> None:
     """A creep step begins, which goes to the creep time `end` [s] at most. Collective."""
     clock = sim.creep
     sim.close_model()
-    sim.local.creep(sim.cold["creep"], sim.local.s0, keep=True)
+    sim.local.creep(sim.cold["creep"], sim.local.s0, sim.local.quad_s0, keep=True)
     left = end - clock.time
     clock.passed = left if left * FULL <= clock.dt else clock.dt
     _warn_of_long_step(sim)
@@ -110,7 +110,7 @@ def finish(sim: Blocks, end: float) -> None:
     if sim.comm.any(bool(local.tally[:, elements.NEW_BROKEN].any())):
         sim._renew_lists()  # joints that broke did so in this creep step
     before = sim.cold["creep"].copy()
-    local.creep(sim.cold["creep"], local.s0, keep=True)
+    local.creep(sim.cold["creep"], local.s0, local.quad_s0, keep=True)
     whole = end - clock.time <= clock.passed
     done, clock.time = clock.passed, end if whole else clock.time + clock.passed
     clock.passed = 0.0
@@ -126,16 +126,21 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     that is done, over the largest deviator of all. Equal on all ranks. Collective."""
     local, after = sim.local, sim.cold["creep"]
     found = np.zeros(2)
-    at = local.triangle_rows[local.creeping] - sim.n_left
-    if len(at):
-        old, new = before[at], after[at]
-        table = local.creep_table[local.creep_law[local.creeping]]
+    for rows, parts, law in (
+        (local.triangle_rows[local.creeping], 1, local.creep_law[local.creeping]),
+        (local.quad_rows[local.creeping_quads], 4, local.quad_creep_law[local.creeping_quads]),
+    ):
+        if not len(rows):
+            continue
+        at, columns = rows - sim.n_left, parts * kernels.MEMORY
+        old, new = (memory[at, :columns].reshape(-1, kernels.MEMORY) for memory in (before, after))
+        table = np.repeat(local.creep_table[law], parts, axis=0)
         stress, kelvin = slice(kernels.S11, kernels.S12 + 1), slice(kernels.K11, kernels.K12 + 1)
         way = new[:, stress] - old[:, stress]
         unit = table[:, kernels.PER_KELVIN, None] > 0.0
         rest = np.where(unit, way - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0)
-        found[0] = max(_size(way).max(), _size(rest).max())
-        found[1] = max(_size(new[:, stress]).max(), _size(old[:, stress]).max())
+        found[0] = max(found[0], _size(way).max(), _size(rest).max())
+        found[1] = max(found[1], _size(new[:, stress]).max(), _size(old[:, stress]).max())
     change, largest = sim.comm.max_into(found).tolist()
     return change / largest if largest > 0.0 else 0.0
 

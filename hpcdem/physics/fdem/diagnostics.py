@@ -12,7 +12,7 @@ from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
 from hpcdem.physics.fdem.definition import Numbers
-from hpcdem.physics.fdem.kernels import creep, elements, plasticity
+from hpcdem.physics.fdem.kernels import elements, plasticity
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
@@ -231,7 +231,7 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
     if any(name.startswith(("creep", "kelvin_strain")) for name in wanted):
         columns |= _creep_columns(sim, some)
     if of_laws := [name for name in wanted if name.startswith(user_laws.OF_LAW)]:
-        memory = local.obeyed(local.s0.copy()) if local.laws else sim.cold[user_laws.COLUMN]
+        memory = local.law_states()
         columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
@@ -266,7 +266,7 @@ def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarra
     """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
     strains, lost = np.zeros((sim.n_own, 6)), np.zeros(sim.n_own)
     if "creep" in sim.cold:
-        strains, lost = sim.local.creep_strains(), sim.local.crept()[0][:, creep.LOST]
+        strains, lost = sim.local.creep_strains(), sim.local.lost_by_creep()
     names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy")]
     return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 

@@ -754,14 +754,15 @@ def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     local, small, number = sim.local, not sim.options.large_strain, sim.number
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows
     triangles, quads = np.empty((len(rows), 6, 6)), np.empty((len(quad_rows), 8, 8))
-    (c, s0), quad_s0 = local.linear(), local.quad_s0
+    c, s0, q, quad_s0 = local.linear()
     if local.yields:
-        _, flowed, quad_s0 = local.flowed()
-        held = local.creeping if local.creeps else np.empty(0, np.int64)
-        flowed[held] = s0[held]
-        s0 = flowed
+        _, flowed, quads_flowed = local.flowed()
+        if local.creeps:
+            flowed[local.creeping] = s0[local.creeping]
+            quads_flowed[local.creeping_quads] = quad_s0[local.creeping_quads]
+        s0, quad_s0 = flowed, quads_flowed
     stiffness.triangles(rows, sim.x, c, s0, small, triangles)
-    stiffness.quads(quad_rows, sim.x, local.q, quad_s0, small, quads)
+    stiffness.quads(quad_rows, sim.x, q, quad_s0, small, quads)
     if local.yields and flows:
         sim.prepare_kernels("plastic-tangent")
         table = local.yield_table

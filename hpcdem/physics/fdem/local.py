@@ -135,6 +135,27 @@ class Evaluation:
     """Velocities after this moment's kick (n, w) [m/s]."""
 
 
+@dataclass(frozen=True)
+class LawHere:
+    """A law of the user on this rank: its table of properties, which blocks of triangles have an element with it, how
+    many triangles and quads have it."""
+
+    law: user_laws.UserLaw
+    table: np.ndarray
+    some: np.ndarray
+    triangles: int
+    quads: int
+
+    def obeying(self, local: Local, memory: np.ndarray, quads: bool) -> tuple:
+        """What its kernels need, of triangles or of quads; memory: see `user_laws.begin`."""
+        from hpcdem.physics.fdem.kernels.user_laws import Obeying
+
+        sim = local.sim
+        dt = sim.clock.dt if sim.options.dynamic else 0.0
+        row = local.quad_law_row if quads else local.law_row
+        return Obeying(self.some, row, self.table, dt, sim.n_left, memory, (memory.shape[1] - 1) // sim.element_parts)
+
+
 class Local:
     """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
 
@@ -192,20 +213,24 @@ class Local:
         self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
         rows = self.triangle_rows[:count]
+        quad_law = sim.element_row[sim.number[self.quad_rows]].astype(np.int32)
         if self.plastic or self.creeps:
             self.law = np.zeros(count + 3, np.int32)
             self.law[:count] = sim.element_row[sim.number[rows]]
         if self.creeps:
-            self.creep_table, self.creep_law = creep_table(sim.element_rows), self.law.copy()
-            self.creeping = np.flatnonzero(sim.creeping()[sim.number[rows]])
+            self.creep_table = creep_table(sim.element_rows)
+            self.creep_law, self.quad_creep_law = self.law.copy(), quad_law
+            creeping = sim.creeping()[sim.number]
+            self.creeping = np.flatnonzero(creeping[rows])
+            self.creeping_quads = np.flatnonzero(creeping[self.quad_rows])
         if self.plastic:
-            own = sim.number[self.quad_rows]
-            self.quad_law = np.repeat(sim.element_row[own].astype(np.int32)[:, None], 4, axis=1)
+            self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
             self._make_strength(rows)
-        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((len(self.quad_rows), 16))
+        quads = len(self.quad_rows)
+        self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((quads, 16))
         self.said, self.uncrept, self.initial = (np.zeros((count, 4)) for _ in range(3))
-        self.quad_initial = np.zeros((len(self.quad_rows), 4))
-        self._of_initial = np.zeros((count, 4)), np.zeros((len(self.quad_rows), 4))
+        self.quad_said, self.quad_uncrept, self.quad_initial = (np.zeros((quads, 16)) for _ in range(3))
+        self._of_initial = np.zeros((count, 4)), np.zeros((quads, 4))
         if sim.stress0 is not None:
             self._of_initial = sim.initial_stresses(sim.number[rows]), sim.initial_stresses(sim.number[self.quad_rows])
         self.heated = self.restress()
@@ -222,24 +247,30 @@ class Local:
         if not (self.plastic or self.creeps):
             return heat is not None
         self.said[:] = self.uncrept[:] = self.s0[: self.count]
+        self.quad_said[:] = self.quad_uncrept[:] = self.quad_s0
         if self.creeps:
-            self._relieve_crept(np.arange(self.count))
-        self.initial[:] = self.s0[: self.count]
+            self._relieve_crept(np.arange(self.count), np.arange(len(self.quad_rows)), self.s0, self.quad_s0)
+        self.initial[:], self.quad_initial[:] = self.s0[: self.count], self.quad_s0
         if self.plastic:
-            c, memory = self.c[: self.count], sim.cold["plastic"]
-            plasticity.relieve_all(rows, sim.n_left, c, self.initial, memory, self.s0)
-            self.quad_initial[:] = self.quad_s0[:, :4]
-            if len(self.quad_rows):
-                plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, self.quad_s0)
+            self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
-            plasticity.relieve_all(rows, sim.n_left, c, self.said, memory, self.uncrept)
-            self._relieve_crept(self.creeping)
+            self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
+            self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
         return heat is not None
 
-    def _relieve_crept(self, who: np.ndarray) -> None:
-        """Stress without strain of the triangles `who`, less that of their creep strain."""
-        sim = self.sim
-        creep.relieve_all(who, self.triangle_rows, sim.n_left, self.c, self.uncrept, sim.cold["creep"], self.s0)
+    def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
+        """Stress without strain of these triangles and quads, less that of their creep strain."""
+        sim, memory, rows = self.sim, self.sim.cold["creep"], self.triangle_rows
+        creep.relieve_all(who, rows, sim.n_left, self.c, self.uncrept, memory, s0)
+        if len(quads):
+            creep.relieve_quads(quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, memory, quad_s0)
+
+    def _relieve_flowed(self, base: np.ndarray, quad_base: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
+        """Stress without strain of all, that of their plastic strain less than base."""
+        sim, memory, rows = self.sim, self.sim.cold["plastic"], self.triangle_rows[: self.count]
+        plasticity.relieve_all(rows, sim.n_left, self.c[: self.count], base, memory, s0)
+        if len(self.quad_rows):
+            plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, quad_base, memory, quad_s0)
 
     def _make_strength(self, rows: np.ndarray) -> None:
         """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
@@ -263,30 +294,71 @@ class Local:
             strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
     def _make_laws(self) -> None:
-        """Elements with a law of the user have no moduli in the table of forces, see kernels/user_laws.py; stiff: the
-        table by which the time step is found, with moduli in the ratio of those of the element."""
-        sim, count = self.sim, self.count
-        self.stiff, self.laws = self.c, []
-        numbers = user_laws.numbers(sim)[sim.number[self.triangle_rows[:count]]]
-        if not user_laws.of_rows(sim.element_rows):
+        """Elements with a law of the user have no moduli in the tables of forces, see kernels/user_laws.py; stiff,
+        stiff_q: the tables by which the time step is found, with moduli in the ratio of those of the element."""
+        sim, rows = self.sim, self.sim.element_rows
+        self.stiff, self.stiff_q = self.c, self.q
+        self.laws: list[LawHere] = []
+        self.law_of_triangles: LawHere | None = None
+        self.law_of_quads: LawHere | None = None
+        if not user_laws.of_rows(rows):
             return
-        of, models = np.flatnonzero(numbers), element_table(sim.element_rows)
-        self.law_row = np.zeros(count + 3, np.int32)
-        self.law_row[:count] = sim.element_row[sim.number[self.triangle_rows[:count]]]
-        self.law_base = np.zeros((count + 3, 4))
+        owned = self.triangle_rows[: self.count], self.quad_rows
+        numbers = [user_laws.numbers(sim)[sim.number[of]] for of in owned]
+        self.law_row = np.zeros(self.count + 3, np.int32)
+        self.law_row[: self.count] = sim.element_row[sim.number[owned[0]]]
+        self.quad_law_row = np.zeros(len(self.quad_rows) + 3, np.int32)
+        self.quad_law_row[: len(self.quad_rows)] = sim.element_row[sim.number[owned[1]]]
+        self.law_base, self.quad_law_base = np.zeros((self.count + 3, 4)), np.zeros((len(self.quad_rows), 16))
         if sim.stress0 is not None:
-            self.law_base[of] = sim.initial_stresses(sim.number[self.triangle_rows[of]])
-        self.stiff = self.c.copy()
-        bound, row = sim.element_rows.column(user_laws.BOUND), self.law_row[of]
-        part = bound[row] / (models[row, build.LAME] + models[row, build.MU2])
-        self.stiff[of, elements.LAMBDA] *= part
-        self.stiff[of, elements.TWO_MU] *= part
-        self.c[of, elements.LAMBDA] = self.c[of, elements.TWO_MU] = 0.0
-        for k, law in enumerate(user_laws.of_rows(sim.element_rows)):
-            at = np.flatnonzero(numbers == 1 + k)
-            if len(at):
-                which = np.concatenate([at, np.repeat(at[-1:], 3)]).astype(np.int32)
-                self.laws.append((law, which, law.table(sim.element_rows)))
+            self.law_base[: self.count] = sim.initial_stresses(sim.number[owned[0]])
+            self.quad_law_base[:] = np.tile(sim.initial_stresses(sim.number[owned[1]]), 4)
+        self.stiff, self.stiff_q = self.c.copy(), self.q.copy()
+        models, bound = element_table(rows), np.array(rows.column(user_laws.BOUND))
+        modulus = models[:, build.LAME] + models[:, build.MU2]
+        for table, stiff, number, row, columns, s0, base in (
+            (
+                self.c, self.stiff, numbers[0], self.law_row, np.array([elements.LAMBDA, elements.TWO_MU]), self.s0,
+                self.law_base,
+            ),
+            (
+                self.q, self.stiff_q, numbers[1], self.quad_law_row, np.array([elements.Q_LAMBDA, elements.Q_TWO_MU]),
+                self.quad_s0, self.quad_law_base,
+            ),
+        ):  # fmt: skip
+            at = np.flatnonzero(number)
+            stiff[np.ix_(at, columns)] *= (bound[row[at]] / modulus[row[at]])[:, None]
+            table[np.ix_(at, columns)] = 0.0
+            s0[at] = base[at]  # what such an element has flowed or crept, with another model, is not of the law
+        blocks = np.arange(self.count) // elements.BLOCK
+        for k, law in enumerate(user_laws.of_rows(rows)):
+            triangles, quads = (number == 1 + k for number in numbers)
+            some = np.zeros(-(-self.count // elements.BLOCK), bool)
+            some[blocks[triangles]] = True
+            if triangles.any() or quads.any():
+                self.laws.append(LawHere(law, law.table(rows), some, int(triangles.sum()), int(quads.sum())))
+        # One law runs in the loop over forces, that of most elements; of the others stress is found before it.
+        for one in self.laws:
+            if one.triangles > (self.law_of_triangles.triangles if self.law_of_triangles else 0):
+                self.law_of_triangles = one
+            if one.quads > (self.law_of_quads.quads if self.law_of_quads else 0) and not self.yields:
+                self.law_of_quads = one
+
+    def try_law(self, law: user_laws.UserLaw) -> None:
+        """Call the kernels of a law as steps and looks will: those of quads where there are some, else those of
+        triangles. No element has it."""
+        sim, quads = self.sim, len(self.quad_rows) > 0
+        self.law_row, self.quad_law_row = (np.zeros(n + 3, np.int32) for n in (self.count, len(self.quad_rows)))
+        self.law_base, self.quad_law_base = self.s0, self.quad_s0
+        one = LawHere(law, np.zeros(len(law.columns)), np.zeros(len(self.head), bool), int(not quads), int(quads))
+        sim.cold[user_laws.COLUMN] = np.zeros((sim.n_own, 1 + sim.element_parts * len(law.states)))
+        self.laws, self.law_of_triangles, self.law_of_quads = [one], None, None
+        if quads:
+            self.law_of_quads = one
+        else:
+            self.law_of_triangles = one
+        self._elements(self.triangle_special, self.block_special, self.force, self.of_joints, False)
+        self.obeyed(self.s0, self.quad_s0)
 
     def _make_joints(self) -> None:
         """Slots of the edges: three per triangle, then four per quad."""
@@ -496,7 +568,8 @@ class Local:
         if not o.dynamic:
             return math.inf
         least = limits.time_step(
-            self.stiff, self.q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start, *self.springs(),
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start,
+            *self.springs(),
             o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
         )  # fmt: skip
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
@@ -515,7 +588,7 @@ class Local:
         own = sim.owned
         if not o.dynamic or not o.mechanical:
             limits.static_masses(
-                self.stiff, self.q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
+                self.stiff, self.stiff_q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
             )  # fmt: skip
             sim.clock.dt = 1.0
         else:
@@ -553,17 +626,17 @@ class Local:
         self._move: Any = moving.move if one else moving.move_threaded
         self.of_joints = np.zeros((len(sim.number) if sim.budget is not None else 1, elements.FORCE))
         small = not o.large_strain
+        stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         self._triangle_args = (
             sim.threads, self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c, self.s0,
-            sim.stress0 is not None or self.plastic or self.creeps or bool(self.laws) or self.heated, small,
-            self.slot_at,
+            stressed or any(one is not self.law_of_triangles for one in self.laws), small, self.slot_at,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, pairs.block_begin, pairs.lane, pairs.slot, pairs.pushed,
         )  # fmt: skip
         self._quad_args = (
             sim.threads, len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q, self.quad_s0,
-            sim.stress0 is not None or self.plastic or self.heated, small, self.slots_of_triangles, self.slot_at,
-            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table,
+            stressed or any(one is not self.law_of_quads for one in self.laws), small, self.slots_of_triangles,
+            self.slot_at, self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.joint_table,
             self.joint_beyond, pairs.quad_slot, pairs.pushed,
         )  # fmt: skip
 
@@ -591,25 +664,30 @@ class Local:
         if self.yields:
             self._flow_triangles(self.plastic_state(), step)
         if self._creeps_now():
-            self.creep(sim.cold["creep"], self.s0, keep=o.dynamic)
+            self.creep(sim.cold["creep"], self.s0, self.quad_s0, keep=o.dynamic)
         if self.laws:
-            self._obey(sim.cold[user_laws.COLUMN], self.s0)
-        self._triangles(
-            *self._triangle_args, special, block_special, force, of_joints, keep, o.gx, o.gy, o.mass_damping,
-            o.stiffness_damping, alpha, step, self.tally,
-        )  # fmt: skip
-        if len(self.quad_rows):
-            args = (
-                *self._quad_args, force, of_joints, keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping, step,
-                self.tally,
+            memory = sim.cold[user_laws.COLUMN]
+            self._obey(memory, self.s0, self.quad_s0, every=False)
+        what = (keep, o.gx, o.gy, o.mass_damping, o.stiffness_damping)
+        args: tuple[Any, ...] = *self._triangle_args, special, block_special, force, of_joints, *what, alpha, step
+        if (one := self.law_of_triangles) is not None:
+            loop = one.law.loops.triangles if sim.threads == 1 else one.law.loops.triangles_threaded
+            loop(args[0], one.obeying(self, memory, False), *args[1:], self.tally)
+        else:
+            self._triangles(*args, self.tally)
+        if not len(self.quad_rows):
+            return
+        args = *self._quad_args, force, of_joints, *what, step
+        if (one := self.law_of_quads) is not None:
+            loop = one.law.loops.quads if sim.threads == 1 else one.law.loops.quads_threaded
+            loop(args[0], one.obeying(self, memory, True), *args[1:], self.tally)
+        elif self.yields:
+            self._yielding_quads(
+                *args, self.tally, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],
+                self.yield_table,
             )  # fmt: skip
-            if self.yields:
-                self._yielding_quads(
-                    *args, sim.n_left, self.quad_initial, self.quad_law, self.strength, sim.cold["plastic"],
-                    self.yield_table,
-                )  # fmt: skip
-            else:
-                self._quads(*args)
+        else:
+            self._quads(*args, self.tally)
 
     def open_joints(self) -> None:
         """Joints remember the present positions: those beyond their peak pass it, or break. Elements do not flow."""
@@ -651,65 +729,106 @@ class Local:
             self.strength._replace(history=history), not sim.options.large_strain, step, memory, s0, table,
         )  # fmt: skip
 
-    def _obey(self, memory: np.ndarray, s0: np.ndarray) -> None:
-        """Laws of the user at the present positions: memory (n_own, 1 + states) becomes that after it, s0
-        (count + 3, 4) [Pa] the stress."""
-        sim = self.sim
-        dt = sim.clock.dt if sim.options.dynamic else 0.0
-        for law, which, table in self.laws:
-            loop = law.loop if sim.threads == 1 else law.loop_threaded
-            loop(
-                sim.threads, len(which) - 3, which, self.triangle_rows, sim.n_left, sim.wide, sim.x, self.c,
-                self.law_base, self.law_row, table, dt, not sim.options.large_strain, memory, s0,
-            )  # fmt: skip
+    def _obey(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, every: bool) -> None:
+        """Laws of the user at the present positions: memory, see `user_laws.begin`, becomes that after it, s0
+        (count + 3, 4) and quad_s0 (quads, 16) [Pa] the stress. every: those too that run in the loop over forces."""
+        sim, small = self.sim, not self.sim.options.large_strain
+        for one in self.laws:
+            if one.triangles and (every or one is not self.law_of_triangles):
+                one.law.loops.look(
+                    one.obeying(self, memory, False), self.count, self.triangle_rows, sim.wide, sim.x, sim.v, self.c,
+                    self.law_base, small, s0,
+                )  # fmt: skip
+            if one.quads and (every or one is not self.law_of_quads):
+                one.law.loops.look_quads(
+                    one.obeying(self, memory, True), len(self.quad_rows), self.quad_rows, sim.x, sim.v, self.q,
+                    self.quad_law_base, small, quad_s0,
+                )  # fmt: skip
 
-    def obeyed(self, s0: np.ndarray) -> np.ndarray:
-        """State variables of laws of the user (n_own, 1 + states) after this moment, which the next forces will see;
-        s0 (count + 3, 4) [Pa] becomes their stress. The model stays as it is."""
+    def obeyed(self, s0: np.ndarray, quad_s0: np.ndarray) -> np.ndarray:
+        """State variables of laws of the user, see `user_laws.begin`, after this moment, which the next forces will
+        see; s0 (count + 3, 4) and quad_s0 (quads, 16) [Pa] become their stress. The model stays as it is."""
         memory = self.sim.cold[user_laws.COLUMN].copy()
-        self._obey(memory, s0)
+        self._obey(memory, s0, quad_s0, every=True)
         return memory
+
+    def law_states(self) -> np.ndarray:
+        """The same (n_own, 1 + states); of quads the mean of their triangles by area."""
+        sim = self.sim
+        memory = self.obeyed(self.s0.copy(), self.quad_s0.copy()) if self.laws else sim.cold[user_laws.COLUMN]
+        found = memory[:, : 1 + (memory.shape[1] - 1) // sim.element_parts].copy()
+        quads = self.quad_rows - sim.n_left
+        if len(quads) and found.shape[1] > 1:
+            found[quads, 1:] = self._mean_of_parts(memory[quads, 1:].reshape(len(quads), 4, -1))
+        return found
+
+    def _mean_of_parts(self, parts: np.ndarray) -> np.ndarray:
+        """Mean by area of columns (quads, 4, n) of the triangles of quads."""
+        areas = self.q[:, elements.Q_AREA : elements.Q_AREA + 4, None]
+        return (areas * parts).sum(axis=1) / areas.sum(axis=1)
 
     def _creeps_now(self) -> bool:
         """The next forces are those after some creep, or begin it."""
         sim = self.sim
         return self.creeps and sim.creep.on and (sim.options.dynamic or sim.creep.passed > 0.0)
 
-    def creep(self, memory: np.ndarray, s0: np.ndarray, keep: bool) -> None:
-        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10), if they keep it, and s0
-        (count + 3, 4) [Pa] become those after it."""
-        sim = self.sim
-        kernel = creep.creep if sim.threads == 1 else creep.creep_threaded
+    def creep(self, memory: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray, keep: bool) -> None:
+        """Elements creep for the time that has passed, see `creep.creep`: memory (n_own, 10 or 40), if they keep it,
+        s0 (count + 3, 4) and quad_s0 (quads, 16) [Pa] become those after it."""
+        sim, one = self.sim, self.sim.threads == 1
+        how = self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory
+        kernel = creep.creep if one else creep.creep_threaded
         kernel(
             sim.threads, self.creeping, self.triangle_rows, sim.n_left, sim.x, self.c, self.uncrept, self.creep_law,
-            self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory, s0,
+            *how, s0,
         )  # fmt: skip
+        if len(self.creeping_quads):
+            kernel = creep.creep_quads if one else creep.creep_quads_threaded
+            kernel(
+                sim.threads, self.creeping_quads, self.quad_rows, sim.n_left, sim.x, self.q, self.quad_uncrept,
+                self.quad_creep_law, *how, quad_s0,
+            )  # fmt: skip
 
-    def crept(self, s0: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The same of what elements remember of creep (n_own, 10), into s0 or a copy."""
+    def crept(
+        self, s0: np.ndarray | None = None, quad_s0: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of what elements remember of creep (n_own, 10 or 40), into s0 and quad_s0 or copies."""
         memory, s0 = self.sim.cold["creep"].copy(), self.s0.copy() if s0 is None else s0
+        quad_s0 = self.quad_s0.copy() if quad_s0 is None else quad_s0
         if self._creeps_now():
-            self.creep(memory, s0, keep=True)
-        return memory, s0
+            self.creep(memory, s0, quad_s0, keep=True)
+        return memory, s0, quad_s0
 
-    def linear(self) -> tuple[np.ndarray, np.ndarray]:
+    def lost_by_creep(self) -> np.ndarray:
+        """What owned elements have lost by creep (n_own,) [J/m]."""
+        return self.crept()[0].reshape(self.sim.n_own, -1, creep.MEMORY)[:, :, creep.LOST].sum(axis=1)
+
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Constants (count + 3, 12) and stress without strain (count + 3, 4) [Pa] of the elastic triangles that those
-        that creep are within this creep step. Not to be changed."""
+        that creep are within this creep step, and (quads, 32), (quads, 16) of quads. Not to be changed."""
         sim = self.sim
         if not (self.creeps and sim.creep.passed > 0.0):
-            return self.c, self.s0
-        c, s0 = self.c.copy(), self.s0.copy()
+            return self.c, self.s0, self.q, self.quad_s0
+        c, s0, q, quad_s0 = (one.copy() for one in (self.c, self.s0, self.q, self.quad_s0))
+        how = self.creep_table, sim.creep.passed, sim.cold["creep"]
         creep.as_elastic(
-            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, self.creep_table,
-            sim.creep.passed, sim.cold["creep"], c, s0,
-        )  # fmt: skip
-        return c, s0
+            self.creeping, self.triangle_rows, sim.n_left, self.c, self.uncrept, self.creep_law, *how, c, s0
+        )
+        if len(self.creeping_quads):
+            creep.quads_as_elastic(
+                self.creeping_quads, self.quad_rows, sim.n_left, self.q, self.quad_uncrept, self.quad_creep_law, *how,
+                q, quad_s0,
+            )  # fmt: skip
+        return c, s0, q, quad_s0
 
     def creep_strains(self) -> np.ndarray:
-        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space."""
+        """Creep strain and strain of the Kelvin unit, xx, yy, xy each (n_own, 6), along the axes of space; of quads the
+        mean over their triangles by area."""
         sim, out = self.sim, np.zeros((self.sim.n_own, 6))
-        small = not sim.options.large_strain
-        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, self.crept()[0], out)
+        small, memory = not sim.options.large_strain, self.crept()[0]
+        creep.strains(self.triangle_rows[: self.count], sim.n_left, sim.x, self.c, small, memory, out)
+        if len(self.quad_rows):
+            creep.strains_of_quads(self.quad_rows, sim.n_left, sim.x, self.q, small, memory, out)
         return out
 
     def flowed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -729,8 +848,7 @@ class Local:
         quads = self.quad_rows - self.sim.n_left
         if len(quads):
             parts = memory[quads].reshape(len(quads), 4, plasticity.MEMORY)
-            areas = self.q[:, elements.Q_AREA : elements.Q_AREA + 4, None]
-            found[quads] = (areas * parts).sum(axis=1) / areas.sum(axis=1)
+            found[quads] = self._mean_of_parts(parts)
             latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]
             found[np.ix_(quads, latest)] = parts[:, :, latest].max(axis=1)
             found[quads, plasticity.WORK] = parts[:, :, plasticity.WORK].sum(axis=1)
@@ -796,7 +914,7 @@ class Local:
                 *(self.plastic_state() if self.yields else ()),
                 *((sim.cold["creep"],) if self._creeps_now() else ()),
                 *((sim.cold[user_laws.COLUMN],) if self.laws else ()),
-                *((self.s0,) if self.laws or self._creeps_now() else ()),
+                *((self.s0, self.quad_s0) if self.laws or self._creeps_now() else ()),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -883,10 +1001,12 @@ class Local:
         forces will see; without it, which looks at all elements, after that of the last step."""
         sim = self.sim
         memory, s0, quad_s0 = self.flowed() if self.plastic and flow else (None, self.s0, self.quad_s0)
-        crept, s0 = self.crept(None if memory is None else s0) if self.creeps else (None, s0)
+        crept = None
+        if self.creeps:
+            crept, s0, quad_s0 = self.crept(*(() if memory is None else (s0, quad_s0)))
         if self.laws:
-            s0 = s0.copy()
-            self.obeyed(s0)
+            s0, quad_s0 = s0.copy(), quad_s0.copy()
+            self.obeyed(s0, quad_s0)
         if at is None:
             rows = sim.x, self.triangle_rows[: self.count], self.quad_rows, self.c, self.q, s0, quad_s0
             n, first = sim.n_own, sim.n_left
@@ -901,18 +1021,25 @@ class Local:
         stress, energy = np.zeros((n, 4)), np.zeros(n if energies else 0)
         build.stresses(*rows, not sim.options.large_strain, first, stress, energy)
         if energies and (memory is not None or crept is not None):
-            more, triangles = np.zeros(sim.n_own), self.triangle_rows[: self.count]
+            more, triangles, quads = np.zeros(sim.n_own), self.triangle_rows[: self.count], self.quad_rows
             if crept is not None:
-                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, self.creep_table, crept, more)
+                table = self.creep_table
+                creep.stored(triangles, sim.n_left, self.c, self.said, self.creep_law, table, crept, more)
+                if len(quads):
+                    creep.stored_in_quads(
+                        quads, sim.n_left, self.q, self.quad_said, self.quad_creep_law, table, crept, more
+                    )
             if memory is not None:
-                initial = self.initial
+                initial, of_quads = self.initial, self.quad_initial
                 if crept is not None:
-                    initial = self.said.copy()
-                    every = np.arange(self.count)
+                    initial, of_quads = self.said.copy(), self.quad_said.copy()
+                    every, all_quads = np.arange(self.count), np.arange(len(quads))
                     creep.relieve_all(every, triangles, sim.n_left, self.c, self.said, crept, initial)
+                    if len(quads):
+                        creep.relieve_quads(all_quads, quads, sim.n_left, self.q, self.quad_said, crept, of_quads)
                 plasticity.locked_in(triangles, sim.n_left, self.c, initial, memory, more)
-                if len(self.quad_rows):
-                    plastic_quads.locked_in(self.quad_rows, sim.n_left, self.q, self.quad_initial, memory, more)
+                if len(quads):
+                    plastic_quads.locked_in(quads, sim.n_left, self.q, of_quads, memory, more)
             energy += more if at is None else more[at]
         if self.heated and energies:
             energy += self._energy_of_heat() if at is None else self._energy_of_heat()[at]

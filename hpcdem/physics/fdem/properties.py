@@ -255,7 +255,7 @@ MECH_MOHR_COULOMB = Model(
 USER = Model(
     "user",
     ELEMENT,
-    "a law of the user, in a Python file: what its elements have beside what the law declares; triangles",
+    "a law of the user, in a Python file: what its elements have beside what the law declares",
     MECH_ISO_ELASTIC.properties,
     _elastic,
 )  # fmt: skip
@@ -264,7 +264,7 @@ KELVIN_STRAIN = ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy")
 MECH_BURGERS = Model(
     "mech_burgers",
     ELEMENT,
-    "elastic in its volume, creeping in its shape after Burgers; triangles",
+    "elastic in its volume, creeping in its shape after Burgers",
     (
         *(one for one in _SOLID if one.name not in ("shear", "bulk")),
         Property("bulk", "Pa", "bulk modulus; in the place of the one that E and Poisson's ratio give", optional=True,

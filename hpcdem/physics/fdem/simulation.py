@@ -124,7 +124,7 @@ class Blocks(State):
         if self.options.dynamic:
             self.close_model()
             if self.local.creeps:
-                self.local.creep(self.cold["creep"], self.local.s0, keep=True)
+                self.local.creep(self.cold["creep"], self.local.s0, self.local.quad_s0, keep=True)
             self.creep.passed = 0.0
 
     def drop_creep_step(self) -> None:
@@ -170,9 +170,10 @@ class Blocks(State):
             if "creep" not in self.cold:
                 if not value[at].any():
                     continue
-                self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
-            mine = np.isin(self.number, at)
-            self.cold["creep"][mine, creeping.K11 + KELVIN_STRAIN.index(name)] = value[self.number[mine]]
+                self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY * self.element_parts))
+            mine, memory = np.isin(self.number, at), self.cold["creep"]
+            for column in range(creeping.K11 + KELVIN_STRAIN.index(name), memory.shape[1], creeping.MEMORY):
+                memory[mine, column] = value[self.number[mine]]
 
     def remove_table(self, name: str) -> None:
         if any(load.uses_table(name) for load in self.surface_loads):
@@ -196,6 +197,13 @@ class Blocks(State):
         super().option(dynamic, collision, large_strain, overlap)
         if self.options.dynamic != before:
             self.v[:] = 0.0
+
+    def _remember(self, name: str, columns: int) -> None:
+        """Owned elements remember so much for each of their triangles. (In files from before quads could yield or
+        creep it is that of one.)"""
+        known, wanted = self.cold.get(name, np.empty((len(self.number), 0))), columns * self.element_parts
+        if known.shape[1] < wanted:
+            self.cold[name] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
 
     # ---- one step ------------------------------------------------------------------------------------------------
 
@@ -496,18 +504,14 @@ class Blocks(State):
         self._check_ready()
         mesh = self.the_mesh()
         if self.yielding().any():
-            known = self.cold.get("plastic", np.empty((len(self.number), 0)))
-            wanted = plasticity.MEMORY * (4 if self.wide else 1)
-            if known.shape[1] < wanted:  # those of a file from before quads could yield have nine columns
-                self.cold["plastic"] = np.pad(known, ((0, 0), (0, wanted - known.shape[1])))
-            if "softening" not in self.cold and self.softens():
-                columns = STRENGTH_HISTORY * (4 if self.wide else 1)
-                self.cold["softening"] = np.zeros((len(self.number), columns))
+            self._remember("plastic", plasticity.MEMORY)
+            if self.softens():
+                self._remember("softening", STRENGTH_HISTORY)
         creeps = self.creeping().any()
         if self.creep.on and not creeps and self.log is not None:
             self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
-        if "creep" not in self.cold and creeps:
-            self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY))
+        if creeps or "creep" in self.cold:
+            self._remember("creep", creeping.MEMORY)
         for kind, needed in (("yielding", "plastic" in self.cold), ("creep", "creep" in self.cold)):
             if needed:
                 self.prepare_kernels(kind)
@@ -515,6 +519,7 @@ class Blocks(State):
             if load.kernel_kind:
                 self.prepare_kernels(load.kernel_kind)
         user_laws.begin(self)
+        user_laws.compile_for_quads(self)
         with self.timers("neighbour"):
             if self._topology_stale:
                 self.renew_topology()

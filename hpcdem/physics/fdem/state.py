@@ -150,6 +150,11 @@ class State(ModelDefinition, Model):
         """There are quads: rows of positions and velocities have twelve columns."""
         return self.x.shape[1] == 12
 
+    @property
+    def element_parts(self) -> int:
+        """Triangles for which a row of what elements remember has columns: quads have four."""
+        return 4 if self.wide else 1
+
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""
         return self._mesh()

@@ -13,14 +13,16 @@
 A law is compiled by numba. It takes numbers by these names and returns the stress [Pa] that belongs to them, tension
 positive, and then its state variables in the order in which they were declared:
 
-- e11, e22, e12: strain U - 1 in the frame that turns with the element (with small strains: that of the plane);
+- e11, e22, e12: strain U - 1 in the frame that turns with the element (with small strains: that of the plane); evol:
+  its volume strain, e11 + e22, in a quad that of the overlay, which the built-in laws take;
 - its state variables, as they are after the step before;
 - what it needs of the properties that every solid has (density, damp_factor, young, poisson_ratio, shear, bulk,
   friction, penalty) and of its own;
 - i11, i22, i12, i33: initial stress [Pa], which is added to what the law returns; dt: time step [s], 0 in static runs.
 
-It is called once per step and element. The time step follows from `stiffness`: a number [Pa], or a function of
-properties, that the slope of the law is never above; without it lambda + 2 mu of the moduli.
+It is called once per step and element, of a quad for each of its four triangles. The time step follows from
+`stiffness`: a number [Pa], or a function of properties, that the slope of the law is never above; without it
+lambda + 2 mu of the moduli.
 
 Only the file is known by its text: a law has the name FILE:FUNCTION and a digest of the text, which stands in
 checkpoints. What a checkpoint names is never looked for: the script names the file.
@@ -37,7 +39,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import properties as known
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
 from hpcdem.physics.user_files import (
     MARK,
@@ -48,6 +52,7 @@ from hpcdem.physics.user_files import (
     agreed,
     check_what_returns,
     checked,
+    in_turn,
     law_of,
     made_of,
     numba_message,
@@ -61,12 +66,17 @@ if TYPE_CHECKING:
 
 BOUND = "stiffness bound"
 """The property of a law's elements that the time step follows; a name that no law can declare."""
-STRAIN, INITIAL, STEP = ("e11", "e22", "e12"), ("i11", "i22", "i12", "i33"), "dt"
+STRAIN, VOLUME, INITIAL, STEP = ("e11", "e22", "e12"), "evol", ("i11", "i22", "i12", "i33"), "dt"
 STRESS = ("s11", "s22", "s12", "s33")
 COLUMN = "law"
-"""Of `State.cold`: 1 + the place of the element's law among `names`, then its state variables."""
+"""Of `State.cold`: 1 + the place of the element's law in `of_rows`, then its state variables; where there are quads,
+those of each of their four triangles, triangles have the first."""
+OWN = "own"
+"""Of the tables of properties, see kernels/user_laws.py."""
 STEP_OF_STRAIN = 1e-9
 """For the slope of a law at zero strain."""
+_FOR_QUADS: set[tuple[str, int]] = set()
+"""Laws whose loops over quads are compiled in this process, for so many threads."""
 OF_LAW = "law_"
 """How state variables are called as quantities."""
 
@@ -77,19 +87,19 @@ class _Declared(Declared):
 
 @dataclass(frozen=True)
 class UserLaw(Model):
-    """A law of a file. title: FILE:FUNCTION; names: arguments of its function, in their order; columns: of the table of
-    properties; kernel, loop, loop_threaded, evaluate: compiled, see kernels/user_laws.py."""
+    """A law of a file. title: FILE:FUNCTION; columns: of the table of properties; loops: compiled, see
+    kernels/user_laws.py."""
 
     title: str = ""
     states: tuple[StateVariable, ...] = ()
-    names: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
-    loop: Any = None
-    loop_threaded: Any = None
+    loops: Any = None
 
     def table(self, rows: Rows) -> np.ndarray:
-        """The table of properties of the kernels."""
-        return np.ascontiguousarray(np.array([rows.column(name) for name in self.columns]).T)
+        """The table of properties of the kernels, flat; elements with other models have rows of zeros."""
+        own = np.array([rows.name(row) == self.name for row in range(len(rows))])
+        columns = [own if name == OWN else np.where(own, rows.column(name), 0.0) for name in self.columns]
+        return np.ascontiguousarray(np.array(columns, float).T).reshape(-1)
 
 
 def element_law(
@@ -111,7 +121,7 @@ def load(sim: State, path: Path, law: str) -> UserLaw:
     def take(text: str, path: str, name: str, function: str) -> UserLaw:
         found = MODELS.get(name) or _made(text, path, name, function)
         assert isinstance(found, UserLaw)
-        _compile(found, sim.threads)
+        _compile(found, sim)
         MODELS[name] = found
         return found
 
@@ -122,7 +132,7 @@ def _made(text: str, path: str, name: str, function: str) -> UserLaw:
     """The law of a text. Wrong."""
     declared = law_of(text, path, name, function, _Declared, "element_law")
     base = [p.name for p in USER.properties]
-    arguments = checked(declared, Property, base, (*STRAIN, *INITIAL, STEP), STRAIN)
+    arguments = checked(declared, Property, base, (*STRAIN, VOLUME, *INITIAL, STEP), STRAIN)
     return _compiled(declared, name, path, tuple(arguments), declared.line)
 
 
@@ -134,15 +144,15 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
     from hpcdem.physics.fdem.kernels import user_laws as kernels
 
     wanted = [*STRESS, *(s.name for s in declared.state)]
-    columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names]
-    columns += columns[:1] * (-len(columns) % 4) or ["density"] * (4 if not columns else 0)
+    columns = [p.name for p in (*USER.properties, *declared.properties) if p.name in names] + [OWN]
+    columns += [OWN] * (-len(columns) % 4)
     states = [s.name for s in declared.state]
     evaluate = kernels.at_strain(kernel, names, states, columns)
-    one, several = kernels.loops(kernel, names, states, columns)
+    loops = kernels.loops(kernel, names, states, columns)
     values, place = made_of(kernel, path), None
     if values is not None:
         place = kept.folder(name, values, repr((names, states, columns)))
-        for what, made in (("evaluate", evaluate), ("loop", one), ("loop_threaded", several)):
+        for what, made in {"evaluate": evaluate, **loops._asdict()}.items():
             kept.keep(made, place, what)
     if place is None or not kept.knows(place, "evaluate"):  # what is kept has passed this
         check_what_returns(kernel, len(names), wanted, path, line)
@@ -161,7 +171,7 @@ def _compiled(declared: _Declared, name: str, path: str, names: tuple[str, ...],
 
     return UserLaw(
         name, ELEMENT, f"the law of {title}", (*USER.properties, *declared.properties, bound), derive, title=title,
-        states=declared.state, names=names, columns=tuple(columns), loop=one, loop_threaded=several,
+        states=declared.state, columns=tuple(columns), loops=loops,
     )  # fmt: skip
 
 
@@ -174,7 +184,7 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     modulus = full["bulk"] + 4.0 / 3.0 * full["shear"]
     said = stiffness_of(declared, law, full, "Pa")
     bound = modulus if said is None else said
-    table = np.ascontiguousarray(np.array([full[name] for name in columns]).T)
+    table = np.ascontiguousarray(np.array([full.get(name, np.ones(n)) for name in columns]).T)
     begin = np.array([state.initial for state in declared.state])
     width = len(STRESS) + len(begin)
     what = (*STRESS, *(state.name for state in declared.state))
@@ -189,7 +199,7 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     wrong = ~np.isfinite(rest)
     if wrong.any():
         i, k = np.argwhere(wrong)[0]
-        told = ", ".join(f"{name} {full[name][i]:g}" for name in dict.fromkeys(columns))
+        told = ", ".join(f"{name} {full[name][i]:g}" for name in columns if name != OWN)
         raise CommandError(f"{law}: {what[k]} is {rest[i, k]:g} at zero strain with {told}")
     for k in range(2):
         for way in (STEP_OF_STRAIN, -STEP_OF_STRAIN):
@@ -204,13 +214,15 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
     values[BOUND] = bound.reshape(shape) if shape else float(bound[0])
 
 
-def _compile(law: UserLaw, threads: int) -> None:
-    """The loop over elements, with arguments of the types that it will have."""
-    nothing, places = np.zeros((0, 4)), np.zeros(3, np.int32)
-    (law.loop if threads == 1 else law.loop_threaded)(
-        threads, 0, places, places, 0, False, np.zeros((0, 8)), np.zeros((0, 12)), nothing, places,
-        np.zeros((1, len(law.columns))), 0.0, False, np.zeros((0, 1 + len(law.states))), nothing,
-    )  # fmt: skip
+def _compile(law: UserLaw, blocks: State, quads: bool = False) -> None:
+    """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model of the
+    class and the threads of `blocks`."""
+    sim: Any = type(blocks)(SerialComm(), blocks.threads)
+    corners = [0, 1, 2, 3] if quads else [0, 1, 2, -1]
+    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][: 4 if quads else 3], [corners]))
+    sim.set_element_model(None, "mech_iso_elastic", {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0})
+    sim.close_model()
+    sim.local.try_law(law)
 
 
 # ---- of a model ------------------------------------------------------------------------------------------------------
@@ -244,17 +256,33 @@ def begin(sim: State) -> None:
     laws = of_rows(sim.element_rows)
     if not laws:
         return
-    width = 1 + max(len(law.states) for law in laws)
-    before = sim.cold.get(COLUMN, np.zeros((len(sim.number), width)))
-    memory = np.zeros((len(sim.number), max(width, before.shape[1])))
-    memory[:, : before.shape[1]] = before
+    n, parts = len(sim.number), sim.element_parts
+    width = max(len(law.states) for law in laws)
+    before = sim.cold.get(COLUMN, np.zeros((n, 1)))
+    then = before[:, 1:].reshape(n, parts, -1) if before.shape[1] > 1 else np.zeros((n, parts, 0))
+    states = np.zeros((n, parts, max(width, then.shape[2])))
+    states[:, :, : then.shape[2]] = then
     now = numbers(sim)[sim.number].astype(np.float64)
     for k, law in enumerate(laws):
-        new = (now == 1 + k) & (memory[:, 0] != now)
-        memory[new, 1:] = 0.0
-        memory[np.ix_(new, np.arange(1, 1 + len(law.states)))] = [state.initial for state in law.states]
-    memory[:, 0] = now
-    sim.cold[COLUMN] = memory
+        new = (now == 1 + k) & (before[:, 0] != now)
+        states[new] = 0.0
+        states[new, :, : len(law.states)] = [state.initial for state in law.states]
+    sim.cold[COLUMN] = np.column_stack([now, states.reshape(n, -1)])
+
+
+def compile_for_quads(sim: State) -> None:
+    """The loops over quads of laws that some have, if they are not compiled yet. Collective."""
+    if not sim.wide:
+        return
+    number, quads = numbers(sim), sim.the_mesh().cells[:, 3] >= 0
+    for k, law in enumerate(of_rows(sim.element_rows)):
+        known = law.name, sim.threads
+        if not (quads & sim.alive & (number == 1 + k)).any() or not sim.comm.any(known not in _FOR_QUADS):
+            continue
+        spent = in_turn(sim.comm, lambda law=law: _compile(law, sim, quads=True))  # type: ignore[misc]
+        _FOR_QUADS.add(known)
+        if spent and sim.log is not None:
+            sim.log.info(f"law {law.title} is compiled for quads: {spent:.1f} s")
 
 
 def forget(sim: State, mine: np.ndarray) -> None:
@@ -287,7 +315,7 @@ def unit(name: str) -> str:
 
 def values(sim: State, name: str, memory: np.ndarray) -> np.ndarray:
     """Such a quantity of the owned elements (n_own,), NaN for those whose law has no such variable; memory (n_own, 1 +
-    states): see `begin`."""
+    states): see `begin`, of quads the mean of their triangles."""
     out = np.full(len(memory), math.nan)
     for k, law in enumerate(of_rows(sim.element_rows)):
         names = [OF_LAW + state.name for state in law.states]

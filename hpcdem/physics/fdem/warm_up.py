@@ -117,12 +117,10 @@ def creeping(threads: int = 1) -> None:
 
 
 def _creep(mesh: Mesh, threads: int) -> None:
-    """Some of them beside elastic ones."""
+    """In motion, then in a static creep step."""
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
-    at = np.flatnonzero(mesh.cells[:, 3] < 0)
-    changes.element_model(sim, at, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    changes.element_model(sim, None, "mech_burgers", {**ROCK, "kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
     sim.initial_stress(None, yy=1e3)
     sim.option(collision=False)
     creep.switch(sim, True)

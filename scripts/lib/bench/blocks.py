@@ -6,7 +6,9 @@
 | plastic-20k | intact-20k of a rock that can yield and does not: beside intact-20k the price of looking |
 | flowing-20k | the same so weak that two thirds of it flow in a step |
 | yielded-20k | the same with joints behind their peak |
+| own-20k | intact-20k with the elastic law in a Python file of the user |
 | quads-20k | quads as one body, contact armed, in vibration |
+| own-quads-20k | the same with the elastic law in a Python file of the user |
 | plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: none of it does, all of it flows |
 | wet-20k | intact-20k with a channel in every joint, half of them full, and one sub-step of flow per step |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
@@ -18,6 +20,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,12 +29,12 @@ from bench import launch
 from bench.launch import Layout
 from bench.runs import say
 from bench.tables import Lines, Spread
-from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem import changes, convergence, diagnostics, user_laws
 from hpcdem.physics.flow.model import Flow
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "wet": 6e6, "pairs": 3e6, "shattered": 1e6,
+    "flowing-quads": 3e6, "wet": 6e6, "pairs": 3e6, "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
@@ -58,7 +61,9 @@ WORKLOADS = {
         Workload("plastic-20k", "plastic", 100),
         Workload("flowing-20k", "flowing", 100),
         Workload("yielded-20k", "yielded", 100),
+        Workload("own-20k", "own", 100),
         Workload("quads-20k", "quads", 141),
+        Workload("own-quads-20k", "own-quads", 141),
         Workload("plastic-quads-20k", "plastic-quads", 141),
         Workload("flowing-quads-20k", "flowing-quads", 141),
         Workload("wet-20k", "wet", 100),
@@ -214,6 +219,25 @@ def flowing(sim: Any, side: int) -> None:
     plastic(sim, side, 1e3)
 
 
+def _obeys(sim: Any) -> None:
+    """The elastic law, of a file."""
+    file = Path(__file__).with_name("elastic.py")
+    changes.element_model(sim, None, user_laws.load(sim, file, "elastic.py:elastic").name, ROCK)
+    sim.close_model()
+
+
+def own(sim: Any, side: int) -> None:
+    """The intact rock, with the same law of a file."""
+    intact(sim, side)
+    _obeys(sim)
+
+
+def own_quads(sim: Any, side: int) -> None:
+    """The quads, with the same law of a file."""
+    quads(sim, side)
+    _obeys(sim)
+
+
 def yielded(sim: Any, side: int) -> None:
     """The same with joints so weak, and tough, that they soften throughout."""
     intact(sim, side)
@@ -297,4 +321,5 @@ def _swell(sim: Any, factor: float) -> None:
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
     "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "pairs": pairs, "shattered": shattered,
+    "own": own, "own-quads": own_quads,
 }  # fmt: skip

@@ -6,10 +6,10 @@ from hpcdem import Property, StateVariable, element_law
 
 
 @element_law()
-def elastic(e11, e22, e12, bulk, shear):
+def elastic(e11, e22, e12, evol, bulk, shear):
     """That of mech-iso-elastic."""
     lame, two_mu = bulk - 2.0 / 3.0 * shear, 2.0 * shear
-    p = lame * (e11 + e22)
+    p = lame * evol
     return p + two_mu * e11, p + two_mu * e22, two_mu * e12, p
 
 
@@ -33,6 +33,10 @@ def tresca(e11, e22, e12, g11, g12, slip, i11, i22, i12, bulk, shear, limit):
         g11, g12, slip = g11 + d11, g12 + d12, slip + math.sqrt(d11 * d11 + d12 * d12)
         s11, s22, s12 = s11 - over * half, s22 + over * half, s12 - over * across
     return s11, s22, s12, p, g11, g12, slip
+
+
+tresca_again = element_law(properties=tresca.properties, state=tresca.state)(tresca.function)
+"""The same as another law."""
 
 
 def lift(y):

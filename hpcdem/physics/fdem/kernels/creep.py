@@ -28,15 +28,29 @@ from __future__ import annotations
 from numba import njit, prange
 
 from hpcdem.physics.fdem.kernels import laws
-from hpcdem.physics.fdem.kernels.elements import LAMBDA, TRIANGLE, TWO_MU
+from hpcdem.physics.fdem.kernels.elements import (
+    LAMBDA,
+    Q_AREA,
+    Q_LAMBDA,
+    Q_TWO_MU,
+    QUAD,
+    TRIANGLE,
+    TWO_MU,
+    mean_trace,
+    part_stretch,
+    triangle_stretch,
+)
 
 # Columns of the table of element models (rows, 3): G_K [Pa], 1 / eta_K, 1 / eta_M [1/(Pa s)]; zero: there is none.
 KELVIN, PER_KELVIN, PER_MAXWELL = range(3)
 LAW = 3
-# Columns of what an element remembers (n, 10), deviators 11, 22, 12 in the frame that turns with it (33 = -11 - 22):
+# Columns of what an element remembers (n, 10), or (n, 40) where there are quads: for each of their four triangles
+# (triangles have the first ten); deviators 11, 22, 12 in the frame that turns with it (33 = -11 - 22):
 # creep strain, strain of the Kelvin unit, stress [Pa] at the beginning of the creep step; then what was lost [J/m].
 C11, C22, C12, K11, K22, K12, S11, S22, S12, LOST = range(10)
 MEMORY = 10
+SHARED = 1e-12
+"""Difference of pressures in a quad, over its stresses, that is put down to rounding."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -64,26 +78,76 @@ def stress_then(e, start, creep, kelvin, s, two_mu, back, of_both, x):
 
 
 @njit(cache=True, error_model="numpy")
-def relieve(i, c, base, e11, e22, e12, s0):
-    """Into row i of s0 the stress [Pa] of a triangle without strain: base less 2 G_M e_c."""
-    two_mu = c[i, TWO_MU]
-    s0[i, 0] = base[i, 0] - two_mu * e11
-    s0[i, 1] = base[i, 1] - two_mu * e22
-    s0[i, 2] = base[i, 2] - two_mu * e12
-    s0[i, 3] = base[i, 3] + two_mu * (e11 + e22)
+def relieve(i, o, two_mu, base, e11, e22, e12, s0):
+    """Into row i of s0, from column o on, the stress [Pa] of a triangle without strain: base there less 2 G_M e_c."""
+    s0[i, o] = base[i, o] - two_mu * e11
+    s0[i, o + 1] = base[i, o + 1] - two_mu * e22
+    s0[i, o + 2] = base[i, o + 2] - two_mu * e12
+    s0[i, o + 3] = base[i, o + 3] + two_mu * (e11 + e22)
+
+
+@njit(cache=True, error_model="numpy")
+def _share(i, o, one, two, s0):
+    """Two triangles of a quad (areas one, two) have one pressure in the plane, that of their overlay, in row i of s0
+    from column o on. Their strains have the same volume and their deviators 33 the same history, so this does nothing,
+    unless they yielded before, each for itself, with another model. What is rounded stays."""
+    p, q = 0.5 * (s0[i, o] + s0[i, o + 1]), 0.5 * (s0[i, o + 4] + s0[i, o + 5])
+    size = abs(s0[i, o]) + abs(s0[i, o + 1]) + abs(s0[i, o + 4]) + abs(s0[i, o + 5])
+    if abs(p - q) > SHARED * size:
+        mean = (one * p + two * q) / (one + two)
+        for k in range(2):
+            s0[i, o + k] += mean - p
+            s0[i, o + 4 + k] += mean - q
+
+
+@njit(cache=True, error_model="numpy")
+def _deviator(e11, e22):
+    """11, 22 of a strain in the plane."""
+    third = (e11 + e22) / 3.0
+    return e11 - third, e22 - third
 
 
 @njit(cache=True, error_model="numpy")
 def _strain(xy, c, small):
     """Deviator of the strain (11, 22, 12) of a triangle with the corners xy (6,)."""
-    ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
-    f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
-    f21, f22 = uy * c[0] + wy * c[2], uy * c[1] + wy * c[3]
-    cs, sn = laws.rotation(f11, f12, f21, f22)
-    cs, sn = (1.0 if small else cs), (0.0 if small else sn)
-    e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
-    third = (e11 + e22) / 3.0
-    return e11 - third, e22 - third, e12
+    _, _, e11, e22, e12 = triangle_stretch(xy, c, small)
+    e11, e22 = _deviator(e11, e22)
+    return e11, e22, e12
+
+
+@njit(cache=True, error_model="numpy")
+def _part(i, j, p, e11, e22, e12, two_mu, base, row, table, dt, keep, memory):
+    """Creep strain (11, 22, 12) of triangle p of an element (of a triangle: 0) after dt, and what it loses [J/m3]; e:
+    deviator of its strain. i, j, row: rows of base, memory and table; it remembers this if it keeps it."""
+    g, per_kelvin, per_maxwell = table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
+    back, kelvin, maxwell, div, ratio = factors(dt, two_mu, g, per_kelvin, per_maxwell)
+    both, o, b = kelvin + maxwell, p * MEMORY, 4 * p
+    mean = (base[i, b] + base[i, b + 1] + base[i, b + 3]) / 3.0
+    b11, b22, b12 = base[i, b] - mean, base[i, b + 1] - mean, base[i, b + 2]
+    k11, k22, k12 = memory[j, o + K11], memory[j, o + K22], memory[j, o + K12]
+    s11, s22, s12 = memory[j, o + S11], memory[j, o + S22], memory[j, o + S12]
+    t11 = stress_then(e11, b11, memory[j, o + C11], k11, s11, two_mu, back, both, div)
+    t22 = stress_then(e22, b22, memory[j, o + C22], k22, s22, two_mu, back, both, div)
+    t12 = stress_then(e12, b12, memory[j, o + C12], k12, s12, two_mu, back, both, div)
+    s11, s22, s12 = s11 + t11, s22 + t22, s12 + t12
+    n11, n22, n12 = ratio * k11 + s11 * kelvin, ratio * k22 + s22 * kelvin, ratio * k12 + s12 * kelvin
+    d11, d22, d12 = n11 - k11, n22 - k22, n12 - k12
+    c11 = memory[j, o + C11] + (d11 + s11 * maxwell)
+    c22 = memory[j, o + C22] + (d22 + s22 * maxwell)
+    c12 = memory[j, o + C12] + (d12 + s12 * maxwell)
+    if not keep:
+        return c11, c22, c12, 0.0
+    memory[j, o + C11], memory[j, o + C22], memory[j, o + C12] = c11, c22, c12
+    memory[j, o + K11], memory[j, o + K22], memory[j, o + K12] = n11, n22, n12
+    # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
+    memory[j, o + S11], memory[j, o + S22] = b11 + two_mu * (e11 - c11), b22 + two_mu * (e22 - c22)
+    memory[j, o + S12] = b12 + two_mu * (e12 - c12)
+    if dt == 0.0:
+        return c11, c22, c12, 0.0
+    lost = 0.5 * squares(s11, s22, s12) * maxwell
+    if per_kelvin > 0.0:
+        lost += 2.0 * squares(d11, d22, d12) / (per_kelvin * dt)
+    return c11, c22, c12, lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -91,39 +155,32 @@ def _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, 
     n = len(who)
     for k in range(n * t // threads, n * (t + 1) // threads):
         i = who[k]
-        r = rows[i]
-        j = r - first_row
-        e11, e22, e12 = _strain(x[r], c[i], small)
-        two_mu, row = c[i, TWO_MU], law[i]
-        g, per_kelvin, per_maxwell = table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
-        back, kelvin, maxwell, div, ratio = factors(dt, two_mu, g, per_kelvin, per_maxwell)
-        both = kelvin + maxwell
-        mean = (base[i, 0] + base[i, 1] + base[i, 3]) / 3.0
-        b11, b22, b12 = base[i, 0] - mean, base[i, 1] - mean, base[i, 2]
-        k11, k22, k12 = memory[j, K11], memory[j, K22], memory[j, K12]
-        s11, s22, s12 = memory[j, S11], memory[j, S22], memory[j, S12]
-        t11 = stress_then(e11, b11, memory[j, C11], k11, s11, two_mu, back, both, div)
-        t22 = stress_then(e22, b22, memory[j, C22], k22, s22, two_mu, back, both, div)
-        t12 = stress_then(e12, b12, memory[j, C12], k12, s12, two_mu, back, both, div)
-        s11, s22, s12 = s11 + t11, s22 + t22, s12 + t12
-        n11, n22, n12 = ratio * k11 + s11 * kelvin, ratio * k22 + s22 * kelvin, ratio * k12 + s12 * kelvin
-        d11, d22, d12 = n11 - k11, n22 - k22, n12 - k12
-        c11 = memory[j, C11] + (d11 + s11 * maxwell)
-        c22 = memory[j, C22] + (d22 + s22 * maxwell)
-        c12 = memory[j, C12] + (d12 + s12 * maxwell)
-        relieve(i, c, base, c11, c22, c12, s0)
-        if not keep:
-            continue
-        memory[j, C11], memory[j, C22], memory[j, C12] = c11, c22, c12
-        memory[j, K11], memory[j, K22], memory[j, K12] = n11, n22, n12
-        # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
-        memory[j, S11], memory[j, S22] = b11 + two_mu * (e11 - c11), b22 + two_mu * (e22 - c22)
-        memory[j, S12] = b12 + two_mu * (e12 - c12)
-        if dt > 0.0:
-            lost = 0.5 * squares(s11, s22, s12) * maxwell
-            if per_kelvin > 0.0:
-                lost += 2.0 * squares(d11, d22, d12) / (per_kelvin * dt)
+        j = rows[i] - first_row
+        e11, e22, e12 = _strain(x[rows[i]], c[i], small)
+        two_mu = c[i, TWO_MU]
+        c11, c22, c12, lost = _part(i, j, 0, e11, e22, e12, two_mu, base, law[i], table, dt, keep, memory)
+        relieve(i, 0, two_mu, base, c11, c22, c12, s0)
+        if keep:
             memory[j, LOST] += lost * 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _creep_quads(t, threads, who, rows, first_row, x, q, base, law, table, small, dt, keep, memory, s0):
+    n = len(who)
+    for k in range(n * t // threads, n * (t + 1) // threads):
+        i = who[k]
+        j, xy, two_mu = rows[i] - first_row, x[rows[i]], q[i, Q_TWO_MU]
+        for overlay in range(2):
+            mean = mean_trace(overlay, xy, q[i], small)
+            for p in (2 * overlay, 2 * overlay + 1):
+                _, _, _, _, _, _, e11, e22, e12 = part_stretch(p, xy, q[i], small)
+                shift = 0.5 * (mean - (e11 + e22))
+                e11, e22 = _deviator(e11 + shift, e22 + shift)
+                c11, c22, c12, lost = _part(i, j, p, e11, e22, e12, two_mu, base, law[i], table, dt, keep, memory)
+                relieve(i, 4 * p, two_mu, base, c11, c22, c12, s0)
+                if keep:
+                    memory[j, p * MEMORY + LOST] += lost * 0.5 * q[i, Q_AREA + p]
+            _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -140,11 +197,27 @@ def creep(threads, *args):
         _creep(t, threads, *args)
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def creep_quads(threads, *args):
+    """The same of quads, by mixed discretisation: the volume of the strain is the mean of the overlay, each of the four
+    triangles creeps for itself. x (n, 12); q (count, 32), see `elements.QUAD`, takes the place of c; base (count, 16),
+    law (count,), memory (n_own, 40), s0 (count, 16): of their four triangles, one behind the other."""
+    for t in range(threads):
+        _creep_quads(t, threads, *args)
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def creep_threaded(threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0):
     """The same on several threads."""
     for t in prange(threads):
         _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def creep_quads_threaded(threads, who, rows, first_row, x, q, base, law, table, small, dt, keep, memory, s0):
+    """The same on several threads."""
+    for t in prange(threads):
+        _creep_quads(t, threads, who, rows, first_row, x, q, base, law, table, small, dt, keep, memory, s0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -153,7 +226,39 @@ def relieve_all(who, rows, first, c, base, memory, s0):
     for k in range(len(who)):
         i = who[k]
         j = rows[i] - first
-        relieve(i, c, base, memory[j, C11], memory[j, C22], memory[j, C12], s0)
+        relieve(i, 0, c[i, TWO_MU], base, memory[j, C11], memory[j, C22], memory[j, C12], s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def relieve_quads(who, rows, first, q, base, memory, s0):
+    """The same of quads, with one pressure in each overlay."""
+    for k in range(len(who)):
+        i = who[k]
+        j = rows[i] - first
+        for p in range(4):
+            o = p * MEMORY
+            relieve(i, 4 * p, q[i, Q_TWO_MU], base, memory[j, o + C11], memory[j, o + C22], memory[j, o + C12], s0)
+        for overlay in range(2):
+            _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
+
+
+@njit(cache=True, error_model="numpy")
+def _elastic(i, j, p, two_mu, base, row, table, dt, memory, s0):
+    """Stress [Pa] without strain of triangle p of an element within this creep step, into row i of s0, and its 2 G."""
+    back, kelvin, maxwell, div, _ = factors(
+        dt, two_mu, table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
+    )
+    both, o, b = kelvin + maxwell, p * MEMORY, 4 * p
+    mean = (base[i, b] + base[i, b + 1] + base[i, b + 3]) / 3.0
+    for k in range(3):
+        start = base[i, b + k] - (mean if k < 2 else 0.0)
+        s0[i, b + k] = stress_then(
+            0.0, start, memory[j, o + C11 + k], memory[j, o + K11 + k], memory[j, o + S11 + k], two_mu, back, both, div
+        )
+    s0[i, b + 3] = mean - (s0[i, b] + s0[i, b + 1])
+    s0[i, b] += mean
+    s0[i, b + 1] += mean
+    return 1.0 / div
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -162,25 +267,38 @@ def as_elastic(who, rows, first, c, base, law, table, dt, memory, like, s0):
     (count + 3, 4) [Pa] its stress without strain; other arguments as for `creep`."""
     for k in range(len(who)):
         i = who[k]
-        j = rows[i] - first
-        two_mu, row = c[i, TWO_MU], law[i]
-        back, kelvin, maxwell, div, _ = factors(
-            dt, two_mu, table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
-        )
-        both = kelvin + maxwell
-        mean = (base[i, 0] + base[i, 1] + base[i, 3]) / 3.0
-        for q in range(3):
-            start = base[i, q] - (mean if q < 2 else 0.0)
-            s0[i, q] = stress_then(
-                0.0, start, memory[j, C11 + q], memory[j, K11 + q], memory[j, S11 + q], two_mu, back, both, div
-            )
-        s0[i, 3] = mean - (s0[i, 0] + s0[i, 1])
-        s0[i, 0] += mean
-        s0[i, 1] += mean
-        for q in range(TRIANGLE):
-            like[i, q] = c[i, q]
-        like[i, TWO_MU] = 1.0 / div
-        like[i, LAMBDA] = c[i, LAMBDA] + (two_mu - 1.0 / div) / 3.0
+        two_mu = c[i, TWO_MU]
+        for m in range(TRIANGLE):
+            like[i, m] = c[i, m]
+        like[i, TWO_MU] = _elastic(i, rows[i] - first, 0, two_mu, base, law[i], table, dt, memory, s0)
+        like[i, LAMBDA] = c[i, LAMBDA] + (two_mu - like[i, TWO_MU]) / 3.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def quads_as_elastic(who, rows, first, q, base, law, table, dt, memory, like, s0):
+    """The same of quads: like (count, 32), s0 (count, 16) [Pa]; other arguments as for `creep_quads`."""
+    for k in range(len(who)):
+        i = who[k]
+        two_mu = q[i, Q_TWO_MU]
+        for m in range(QUAD):
+            like[i, m] = q[i, m]
+        for p in range(4):
+            like[i, Q_TWO_MU] = _elastic(i, rows[i] - first, p, two_mu, base, law[i], table, dt, memory, s0)
+        like[i, Q_LAMBDA] = q[i, Q_LAMBDA] + (two_mu - like[i, Q_TWO_MU]) / 3.0
+        for overlay in range(2):
+            _share(i, 8 * overlay, q[i, Q_AREA + 2 * overlay], q[i, Q_AREA + 2 * overlay + 1], s0)
+
+
+@njit(cache=True, error_model="numpy")
+def _stored(i, j, p, two_mu, base, row, table, memory):
+    """Of triangle p of an element, see `stored` [J/m3]."""
+    o, b = p * MEMORY, 4 * p
+    e11, e22, e12 = memory[j, o + C11], memory[j, o + C22], memory[j, o + C12]
+    density = 0.5 * two_mu * squares(e11, e22, e12)
+    density -= base[i, b] * e11 + base[i, b + 1] * e22 + 2.0 * base[i, b + 2] * e12 - base[i, b + 3] * (e11 + e22)
+    if table[row, PER_KELVIN] > 0.0:
+        density += table[row, KELVIN] * squares(memory[j, o + K11], memory[j, o + K22], memory[j, o + K12])
+    return density
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -190,29 +308,43 @@ def stored(rows, first, c, base, law, table, memory, out):
     [Pa]: initial stress."""
     for i in range(len(rows)):
         j = rows[i] - first
-        e11, e22, e12 = memory[j, C11], memory[j, C22], memory[j, C12]
-        density = 0.5 * c[i, TWO_MU] * squares(e11, e22, e12)
-        density -= base[i, 0] * e11 + base[i, 1] * e22 + 2.0 * base[i, 2] * e12 - base[i, 3] * (e11 + e22)
-        if table[law[i], PER_KELVIN] > 0.0:
-            density += table[law[i], KELVIN] * squares(memory[j, K11], memory[j, K22], memory[j, K12])
+        density = _stored(i, j, 0, c[i, TWO_MU], base, law[i], table, memory)
         out[j] += density * 0.5 / (c[i, 0] * c[i, 3] - c[i, 1] * c[i, 2])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def strains(rows, first, x, c, small, memory, out):
-    """Creep strain and Kelvin strain, xx, yy, xy each, along the axes of space: into out (n_own, 6)."""
+def stored_in_quads(rows, first, q, base, law, table, memory, out):
+    """The same of quads: the triangles count half; base (count, 16) [Pa]."""
     for i in range(len(rows)):
-        r = rows[i]
-        j = r - first
-        xy = x[r]
-        ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
-        cs, sn = laws.rotation(
-            ux * c[i, 0] + wx * c[i, 2], ux * c[i, 1] + wx * c[i, 3], uy * c[i, 0] + wy * c[i, 2],
-            uy * c[i, 1] + wy * c[i, 3],
-        )  # fmt: skip
-        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
-        for q in range(2):
-            at = 3 * q
-            out[j, at], out[j, at + 1], out[j, at + 2] = laws.turned(
-                memory[j, at], memory[j, at + 1], memory[j, at + 2], cs, sn
-            )
+        j = rows[i] - first
+        for p in range(4):
+            out[j] += 0.5 * q[i, Q_AREA + p] * _stored(i, j, p, q[i, Q_TWO_MU], base, law[i], table, memory)
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(j, o, share, cs, sn, memory, out):
+    """A share of the creep strain and of the Kelvin strain in row j of memory, from column o on, along the axes of
+    space, is added to row j of out."""
+    for k in (0, 3):
+        xx, yy, xy = laws.turned(memory[j, o + k], memory[j, o + k + 1], memory[j, o + k + 2], cs, sn)
+        out[j, k] += share * xx
+        out[j, k + 1] += share * yy
+        out[j, k + 2] += share * xy
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def strains(rows, first, x, c, small, memory, out):
+    """Creep strain and Kelvin strain, xx, yy, xy each, along the axes of space: added to out (n_own, 6)."""
+    for i in range(len(rows)):
+        cs, sn, _, _, _ = triangle_stretch(x[rows[i]], c[i], small)
+        _turned(rows[i] - first, 0, 1.0, cs, sn, memory, out)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def strains_of_quads(rows, first, x, q, small, memory, out):
+    """The same of quads: the mean over their triangles by area."""
+    for i in range(len(rows)):
+        areas = q[i, Q_AREA] + q[i, Q_AREA + 1] + q[i, Q_AREA + 2] + q[i, Q_AREA + 3]
+        for p in range(4):
+            _, _, _, _, cs, sn, _, _, _ = part_stretch(p, x[rows[i]], q[i], small)
+            _turned(rows[i] - first, p * MEMORY, q[i, Q_AREA + p] / areas, cs, sn, memory, out)

@@ -5,7 +5,8 @@ does the same on its side, with the same numbers: see joints.py), and takes thos
 sent to a neighbour, so neither threads nor ranks meet. Triangles go through in blocks of `BLOCK`:
 
 1. rows of triangle and partners' edges are turned into lanes (numerics/lanes.py);
-2. stress and joints before their peak are plain loops over lanes, which become vector instructions;
+2. stress and joints before their peak are plain loops over lanes, which become vector instructions; the loop over
+   stresses is made for a law, so that a law of the user (user_laws.py) runs in the place of the elastic one;
 3. joints behind their peak, of which each block has a list, go through lanes of their own (softening.py) and overwrite
    what step 2 found for them;
 4. contact forces are added, and corners that move by themselves are kicked: v += f dt / m. For the others the forces
@@ -61,7 +62,7 @@ _B = lane(2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gather(n, first, rows, wide, x, v, c, s0, stressed, lanes):
+def gather(n, first, rows, wide, x, v, c, s0, stressed, lanes):
     """Rows of the triangles first : first + n into lanes, in groups of four (rows is long enough)."""
     wx, wv = U(12 if wide else 8), U(12 if wide else 6)
     for e in range(U(0), U(n), _FOUR):
@@ -95,34 +96,60 @@ def _gather_edge(n, first, k, x, partner, law, table, lanes):
         four_columns(lanes, COHESION + e, table, (w0 + _FOUR, w1 + _FOUR, w2 + _FOUR, w3 + _FOUR))
 
 
+@njit(cache=True, error_model="numpy")
+def elastic(e, e11, e22, e12, trace, dt, lanes):
+    """Stress 11, 22, 12, 33 [Pa] of a strain, without the initial one; trace: e11 + e22."""
+    p, m = lanes[LAM + e] * trace, lanes[MU2 + e]
+    return p + m * e11, p + m * e22, m * e12, p
+
+
+def stress_loop(law, keep=None):
+    """The loop that makes corner forces of strain, viscous parts included: f_l = sigma n s / 2, n s of the face
+    opposite to l. law: a kernel like `elastic`; keep: first of four lanes for the stress without the viscous part."""
+    keeps = keep is not None
+    k11, k22, k12, k33 = (lane((keep or 0) + k) for k in range(4))
+
+    @njit(nogil=True, error_model="numpy")
+    def loop(n, small, beta, dt, lanes):
+        for e in range(U(n)):
+            x1, y1 = lanes[X1 + e], lanes[Y1 + e]
+            ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
+            a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
+            f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
+            cs, sn = laws.rotation(f11, f12, f21, f22)
+            cs, sn = (1.0 if small else cs), (0.0 if small else sn)
+            e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
+            vx1, vy1 = lanes[VX1 + e], lanes[VY1 + e]
+            dux, duy, dwx, dwy = lanes[VX2 + e] - vx1, lanes[VY2 + e] - vy1, lanes[VX3 + e] - vx1, lanes[VY3 + e] - vy1
+            g11, g12, g21, g22 = dux * a + dwx * c, dux * b + dwx * d, duy * a + dwy * c, duy * b + dwy * d
+            s11, s22, s12, s33 = law(e, e11, e22, e12, e11 + e22, dt, lanes)
+            s11, s22, s12 = lanes[S11 + e] + s11, lanes[S22 + e] + s22, lanes[S12 + e] + s12
+            if keeps:
+                lanes[k11 + e], lanes[k22 + e] = s11, s22
+                lanes[k12 + e], lanes[k33 + e] = s12, lanes[S33 + e] + s33
+            d11, d22, eta = cs * g11 + sn * g21, cs * g22 - sn * g12, lanes[VISC + e] + beta * lanes[MU2 + e]
+            swell = beta * lanes[LAM + e] * (d11 + d22)
+            s11, s22 = s11 + (eta * d11 + swell), s22 + (eta * d22 + swell)
+            s12 = s12 + 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
+            xx, yy, xy = laws.turned(s11, s22, s12, cs, sn)
+            if small:
+                inverse = 1.0 / (a * d - b * c)
+                ux, wx, uy, wy = d * inverse, -b * inverse, -c * inverse, a * inverse
+            fx1, fy1 = 0.5 * (xx * (wy - uy) - xy * (wx - ux)), 0.5 * (xy * (wy - uy) - yy * (wx - ux))
+            fx2, fy2 = 0.5 * (xy * wx - xx * wy), 0.5 * (yy * wx - xy * wy)
+            lanes[FX1 + e], lanes[FY1 + e], lanes[FX2 + e], lanes[FY2 + e] = fx1, fy1, fx2, fy2
+            lanes[FX3 + e], lanes[FY3 + e] = -fx1 - fx2, -fy1 - fy2
+
+    return loop
+
+
+elastic_stress = stress_loop(elastic)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stress(n, small, beta, lanes):
-    """Corner forces from the stress, viscous parts included: f_l = sigma n s / 2, n s of the face opposite to l."""
-    for e in range(U(n)):
-        x1, y1 = lanes[X1 + e], lanes[Y1 + e]
-        ux, uy, wx, wy = lanes[X2 + e] - x1, lanes[Y2 + e] - y1, lanes[X3 + e] - x1, lanes[Y3 + e] - y1
-        a, b, c, d = lanes[CA + e], lanes[CB + e], lanes[CC + e], lanes[CD + e]
-        f11, f12, f21, f22 = ux * a + wx * c, ux * b + wx * d, uy * a + wy * c, uy * b + wy * d
-        cs, sn = laws.rotation(f11, f12, f21, f22)
-        cs, sn = (1.0 if small else cs), (0.0 if small else sn)
-        e11, e22, e12 = laws.stretch(f11, f12, f21, f22, cs, sn)
-        vx1, vy1 = lanes[VX1 + e], lanes[VY1 + e]
-        dux, duy, dwx, dwy = lanes[VX2 + e] - vx1, lanes[VY2 + e] - vy1, lanes[VX3 + e] - vx1, lanes[VY3 + e] - vy1
-        g11, g12, g21, g22 = dux * a + dwx * c, dux * b + dwx * d, duy * a + dwy * c, duy * b + dwy * d
-        p, m = lanes[LAM + e] * (e11 + e22), lanes[MU2 + e]
-        d11, d22, eta = cs * g11 + sn * g21, cs * g22 - sn * g12, lanes[VISC + e] + beta * m
-        swell = beta * lanes[LAM + e] * (d11 + d22)
-        s11 = lanes[S11 + e] + (p + m * e11) + (eta * d11 + swell)
-        s22 = lanes[S22 + e] + (p + m * e22) + (eta * d22 + swell)
-        s12 = lanes[S12 + e] + m * e12 + 0.5 * eta * ((cs * g12 + sn * g22) + (cs * g21 - sn * g11))
-        xx, yy, xy = laws.turned(s11, s22, s12, cs, sn)
-        if small:
-            inverse = 1.0 / (a * d - b * c)
-            ux, wx, uy, wy = d * inverse, -b * inverse, -c * inverse, a * inverse
-        fx1, fy1 = 0.5 * (xx * (wy - uy) - xy * (wx - ux)), 0.5 * (xy * (wy - uy) - yy * (wx - ux))
-        fx2, fy2 = 0.5 * (xy * wx - xx * wy), 0.5 * (yy * wx - xy * wy)
-        lanes[FX1 + e], lanes[FY1 + e], lanes[FX2 + e], lanes[FY2 + e] = fx1, fy1, fx2, fy2
-        lanes[FX3 + e], lanes[FY3 + e] = -fx1 - fx2, -fy1 - fy2
+def _elastic_block(b, n, first, rows, small, beta, law, lanes):
+    """Corner forces of a block of elastic triangles."""
+    elastic_stress(n, small, beta, 0.0, lanes)
 
 
 def _edge_loop(a, b, out, left_of):
@@ -313,41 +340,51 @@ def _store_joints(n, first, rows, force, lanes):
             force[r, c + _FOUR] = lanes[A2 + way] + lanes[A1 + _B + way]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _triangles(
-    t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head, follow,
-    table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
-    of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
-):  # fmt: skip
-    lanes = np.zeros(LANES * CAPACITY)
-    x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
-    room = softening.lanes_and_lists()
-    blocks = len(head)
-    for b in range(blocks * t // threads, blocks * (t + 1) // threads):
-        first = b * BLOCK
-        n = min(BLOCK, count - first)
-        _gather(n, first, rows, wide, x, v, c, s0, stressed, lanes)
-        _stress(n, small, beta, lanes)
-        _gather_edge(n, first, 0, x, partner, law, flat_table, lanes)
-        _edge_loop_0(n, lanes)
-        _gather_edge(n, first, 1, x, partner, law, flat_table, lanes)
-        _edge_loop_1(n, lanes)
-        _gather_edge(n, first, 2, x, partner, law, flat_table, lanes)
-        _edge_loop_2(n, lanes)
-        if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
-            _slow_joints(
-                b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, flat_table, flat_beyond,
-                step, lanes, room, tally[t],
-            )  # fmt: skip
-        if keep_joints:
-            _store_joints(n, first, rows, of_joints, lanes)
-        _sum(n, gx, gy, drag, lanes)
-        _add_contacts(b, contact_begin, contact_lane, contact_slot, pushed, lanes)
-        if some_special[b]:
-            _store(n, first, rows, special, force, lanes)
-        _kick(n, alpha, lanes)
-        _put_velocities(n, first, rows, wide, v, lanes)
+def triangle_blocks(stress, more=0):
+    """The work on all blocks of triangles. stress: a kernel like `_elastic_block`, which is handed the first argument;
+    more: lanes that it needs besides."""
+    size = (LANES + more) * CAPACITY
+
+    @njit(nogil=True, error_model="numpy")
+    def work(
+        obeys, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
+        follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
+        of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
+    ):  # fmt: skip
+        lanes = np.zeros(size)
+        x, v, c, s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
+        flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
+        room = softening.lanes_and_lists()
+        blocks = len(head)
+        for b in range(blocks * t // threads, blocks * (t + 1) // threads):
+            first = b * BLOCK
+            n = min(BLOCK, count - first)
+            gather(n, first, rows, wide, x, v, c, s0, stressed, lanes)
+            stress(b, n, first, rows, small, beta, obeys, lanes)
+            _gather_edge(n, first, 0, x, partner, law, flat_table, lanes)
+            _edge_loop_0(n, lanes)
+            _gather_edge(n, first, 1, x, partner, law, flat_table, lanes)
+            _edge_loop_1(n, lanes)
+            _gather_edge(n, first, 2, x, partner, law, flat_table, lanes)
+            _edge_loop_2(n, lanes)
+            if head[b] >= 0 or _any_past_peak(n, lanes) < 0:
+                _slow_joints(
+                    b, n, first, rows, wide, x, partner, law, kind, state, history, head, follow, flat_table,
+                    flat_beyond, step, lanes, room, tally[t],
+                )  # fmt: skip
+            if keep_joints:
+                _store_joints(n, first, rows, of_joints, lanes)
+            _sum(n, gx, gy, drag, lanes)
+            _add_contacts(b, contact_begin, contact_lane, contact_slot, pushed, lanes)
+            if some_special[b]:
+                _store(n, first, rows, special, force, lanes)
+            _kick(n, alpha, lanes)
+            _put_velocities(n, first, rows, wide, v, lanes)
+
+    return work
+
+
+_triangles = triangle_blocks(_elastic_block)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -364,7 +401,7 @@ def triangles(threads, *args):
     (n, 8) [N/m]; drag [1/s], beta [s]: Rayleigh damping; alpha: local damping; tally (threads, 8) i8.
     """
     for t in range(threads):
-        _triangles(t, threads, *args)
+        _triangles(None, t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -376,7 +413,7 @@ def triangles_threaded(
     """The same on several threads."""
     for t in prange(threads):
         _triangles(
-            t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
+            None, t, threads, count, rows, wide, x, v, c, s0, stressed, small, partner, law, kind, state, history, head,
             follow, table, beyond, contact_begin, contact_lane, contact_slot, pushed, special, some_special, force,
             of_joints, keep_joints, gx, gy, drag, beta, alpha, step, tally,
         )  # fmt: skip
@@ -419,7 +456,7 @@ def _part(x1, y1, x2, y2, x3, y3, a, b, c, d, small):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _part_stretch(p, xy, c, small):
+def part_stretch(p, xy, c, small):
     """The same of triangle p of a quad with the corners xy (8,) and the row c (32,) of the table."""
     i, j, k = 2 * PARTS[p, 0], 2 * PARTS[p, 1], 2 * PARTS[p, 2]
     return _part(
@@ -454,9 +491,21 @@ def _part_forces(ux, uy, wx, wy, cs, sn, s11, s22, s12):
     return fx1, fy1, 0.25 * (xy * wx - xx * wy), 0.25 * (yy * wx - xy * wy)
 
 
-def overlay_loop(overlay, looks=False):
-    """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l. looks: it also
-    says by how much the stress of the overlay, without the viscous part, is outside.
+@njit(cache=True, error_model="numpy")
+def elastic_pair(e, a11, a22, a12, b11, b22, b12, mean, one, two, dt, lanes):
+    """Stress 11, 22, 12, 33 [Pa] of the two triangles of an overlay, a and b, without the initial one. mean: e11 + e22
+    of both; one, two: their areas in the mesh."""
+    pressure, two_mu = lanes[Q_LAM + e] * mean, lanes[Q_MU2 + e]
+    return (
+        pressure + two_mu * a11, pressure + two_mu * a22, two_mu * a12, pressure,
+        pressure + two_mu * b11, pressure + two_mu * b22, two_mu * b12, pressure,
+    )  # fmt: skip
+
+
+def overlay_loop(overlay, law=elastic_pair, keep=None, looks=False):
+    """The loop that adds the forces of an overlay (0, 1) of quads, the triangles i, j, k and i, k, l. law: a kernel
+    like `elastic_pair`; keep: first of eight lanes for the stress without the viscous part; looks: it also says by how
+    much that is outside.
 
     Mixed discretisation: strain per triangle, its volumetric part the mean of the overlay (Marti & Cundall 1982).
     """
@@ -469,10 +518,11 @@ def overlay_loop(overlay, looks=False):
     z1, z2 = (Q_S0 + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     l1, l2 = (Q_YIELD + lane(4 * part) for part in (2 * overlay, 2 * overlay + 1))
     out = Q_OUTSIDE + lane(overlay)
-    first = overlay == 0
+    first, keeps = overlay == 0, keep is not None
+    k1, k2 = (lane((keep or 0) + k) for k in (0, 4))
 
-    @njit(cache=True, nogil=True, error_model="numpy")
-    def loop(n, small, beta, lanes):
+    @njit(nogil=True, error_model="numpy")
+    def loop(n, small, beta, dt, lanes):
         for e in range(U(n)):
             x1, y1, x2, y2 = lanes[xi + e], lanes[xi + _NEXT + e], lanes[xj + e], lanes[xj + _NEXT + e]
             x3, y3, x4, y4 = lanes[xk + e], lanes[xk + _NEXT + e], lanes[xl + e], lanes[xl + _NEXT + e]
@@ -483,17 +533,19 @@ def overlay_loop(overlay, looks=False):
             lame, two_mu, eta = lanes[Q_LAM + e], lanes[Q_MU2 + e], lanes[Q_VISC + e]
             one, two = lanes[area1 + e], lanes[area2 + e]
             mean = (one * (a11 + a22) + two * (b11 + b22)) / (one + two)
-            pressure = lame * mean
-            z11, z22, z12 = lanes[z1 + e], lanes[z1 + _NEXT + e], lanes[z1 + _B + e]
-            shift = 0.5 * (mean - (a11 + a22))
-            s11, s22 = z11 + (pressure + two_mu * (a11 + shift)), z22 + (pressure + two_mu * (a22 + shift))
-            s12 = z12 + two_mu * a12
-            z11, z22, z12 = lanes[z2 + e], lanes[z2 + _NEXT + e], lanes[z2 + _B + e]
-            shift = 0.5 * (mean - (b11 + b22))
-            t11, t22 = z11 + (pressure + two_mu * (b11 + shift)), z22 + (pressure + two_mu * (b22 + shift))
-            t12 = z12 + two_mu * b12
+            shift, other = 0.5 * (mean - (a11 + a22)), 0.5 * (mean - (b11 + b22))
+            s11, s22, s12, s33, t11, t22, t12, t33 = law(
+                e, a11 + shift, a22 + shift, a12, b11 + other, b22 + other, b12, mean, one, two, dt, lanes
+            )
+            s11, s22, s12 = lanes[z1 + e] + s11, lanes[z1 + _NEXT + e] + s22, lanes[z1 + _B + e] + s12
+            t11, t22, t12 = lanes[z2 + e] + t11, lanes[z2 + _NEXT + e] + t22, lanes[z2 + _B + e] + t12
+            s33, t33 = lanes[z1 + _B + _NEXT + e] + s33, lanes[z2 + _B + _NEXT + e] + t33
+            if keeps:
+                lanes[k1 + e], lanes[k1 + _NEXT + e] = s11, s22
+                lanes[k1 + _B + e], lanes[k1 + _B + _NEXT + e] = s12, s33
+                lanes[k2 + e], lanes[k2 + _NEXT + e] = t11, t22
+                lanes[k2 + _B + e], lanes[k2 + _B + _NEXT + e] = t12, t33
             if looks:
-                s33, t33 = lanes[z1 + _B + _NEXT + e] + pressure, lanes[z2 + _B + _NEXT + e] + pressure
                 far = laws.outside(
                     s11, s22, s12, s33, lanes[l1 + e], lanes[l1 + _B + e], lanes[l1 + _B + _NEXT + e]
                 )  # fmt: skip
@@ -532,11 +584,11 @@ _quad_edge_loop_2, _quad_edge_loop_3 = _edge_loop(X3, X4, A2, Q_LEFT2), _edge_lo
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _mean_trace(overlay, xy, c, small):
+def mean_trace(overlay, xy, c, small):
     """Mean by area of e11 + e22 over the two triangles of an overlay (0, 1) of a quad."""
     mean, area = 0.0, 0.0
     for p in (2 * overlay, 2 * overlay + 1):
-        _, _, _, _, _, _, e11, e22, _ = _part_stretch(p, xy, c, small)
+        _, _, _, _, _, _, e11, e22, _ = part_stretch(p, xy, c, small)
         mean += c[Q_AREA + p] * (e11 + e22)
         area += c[Q_AREA + p]
     return mean / area
@@ -549,9 +601,9 @@ def quad_stress(xy, c, s0, small, stress):
     stress[:] = 0.0
     areas = 0.0
     for overlay in range(2):
-        mean = _mean_trace(overlay, xy, c, small)
+        mean = mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            _, _, _, _, cs, sn, e11, e22, e12 = part_stretch(p, xy, c, small)
             shift, m = 0.5 * (mean - (e11 + e22)), c[Q_TWO_MU]
             s11 = s0[4 * p] + (c[Q_LAMBDA] * mean + m * (e11 + shift))
             s22 = s0[4 * p + 1] + (c[Q_LAMBDA] * mean + m * (e22 + shift))
@@ -571,9 +623,9 @@ def quad_energy(xy, c, s0, small):
     """Elastic energy [J/m] of a quad: the mean of its two overlays."""
     total = 0.0
     for overlay in range(2):
-        mean = _mean_trace(overlay, xy, c, small)
+        mean = mean_trace(overlay, xy, c, small)
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, _, _, e11, e22, e12 = _part_stretch(p, xy, c, small)
+            _, _, _, _, _, _, e11, e22, e12 = part_stretch(p, xy, c, small)
             shift = 0.5 * (mean - (e11 + e22))
             density = _energy(e11 + shift, e22 + shift, e12, c[Q_LAMBDA], c[Q_TWO_MU], s0[4 * p : 4 * p + 4])
             total += 0.5 * c[Q_AREA + p] * density
@@ -760,30 +812,46 @@ def name_quads(first, n, rows, item, row):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _quads(
-    t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table, beyond,
-    slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
-):  # fmt: skip
-    lanes = np.zeros(QUAD_LANES * CAPACITY)
-    item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
-    flat_x, flat_v, flat_c, flat_s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
-    flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
-    flat_force, flat_of_joints = force.reshape(force.size), of_joints.reshape(of_joints.size)
-    room = softening.lanes_and_lists()
-    begin, end = count * t // threads, count * (t + 1) // threads
-    tied = False
-    for first in range(begin, end, QUAD_BLOCK):
-        n = min(QUAD_BLOCK, end - first)
-        whole = (n + 3) // 4 * 4
-        name_quads(first, n, rows, item, row)
-        gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
-        overlay_loop_0(whole, small, beta, lanes)
-        overlay_loop_1(whole, small, beta, lanes)
-        tied = finish_quads(
-            first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
-            flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
-            tally[t],
-        )  # fmt: skip
+def _elastic_quads(n, item, row, small, beta, law, lanes):
+    """Corner forces of a block of elastic quads."""
+    overlay_loop_0(n, small, beta, 0.0, lanes)
+    overlay_loop_1(n, small, beta, 0.0, lanes)
+
+
+def quad_blocks(stress, more=0):
+    """The work on all blocks of quads. stress: a kernel like `_elastic_quads`, which is handed the first argument;
+    more: lanes that it needs besides."""
+    size = (QUAD_LANES + more) * CAPACITY
+
+    @njit(nogil=True, error_model="numpy")
+    def work(
+        obeys, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
+        beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
+    ):  # fmt: skip
+        lanes = np.zeros(size)
+        item, row = np.empty(QUAD_BLOCK, np.int64), np.empty(QUAD_BLOCK, np.int64)
+        flat_x, flat_v, flat_c, flat_s0 = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size)
+        flat_table, flat_beyond = table.reshape(table.size), beyond.reshape(beyond.size)
+        flat_force, flat_of_joints = force.reshape(force.size), of_joints.reshape(of_joints.size)
+        room = softening.lanes_and_lists()
+        begin, end = count * t // threads, count * (t + 1) // threads
+        tied = False
+        for first in range(begin, end, QUAD_BLOCK):
+            n = min(QUAD_BLOCK, end - first)
+            whole = (n + 3) // 4 * 4
+            name_quads(first, n, rows, item, row)
+            gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
+            stress(whole, item, row, small, beta, obeys, lanes)
+            tied = finish_quads(
+                first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
+                flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
+                tally[t],
+            )  # fmt: skip
+
+    return work
+
+
+_quads = quad_blocks(_elastic_quads)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -792,7 +860,7 @@ def quads(threads, *args):
     (count, 16) [Pa]: stress without strain 11, 22, 12, 33 of each of their triangles; the slots of the quads' edges
     follow those of the triangles from `base` on, four each; slot_of (count,) i4: row of `pushed`, or -1."""
     for t in range(threads):
-        _quads(t, threads, *args)
+        _quads(None, t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -803,8 +871,8 @@ def quads_threaded(
     """The same on several threads."""
     for t in prange(threads):
         _quads(
-            t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history, table,
-            beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
+            None, t, threads, count, rows, x, v, c, s0, stressed, small, base, partner, law, kind, state, history,
+            table, beyond, slot_of, pushed, force, of_joints, keep_joints, gx, gy, drag, beta, step, tally,
         )  # fmt: skip
 
 
@@ -842,7 +910,7 @@ def drift_threaded(threads, first, last, x, v, dt):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _triangle_stretch(xy, c, small):
+def triangle_stretch(xy, c, small):
     """Rotation (cos, sin) and strain (11, 22, 12) of a triangle with the corners xy (6,)."""
     ux, uy, wx, wy = xy[2] - xy[0], xy[3] - xy[1], xy[4] - xy[0], xy[5] - xy[1]
     f11, f12 = ux * c[0] + wx * c[2], ux * c[1] + wx * c[3]
@@ -857,7 +925,7 @@ def _triangle_stretch(xy, c, small):
 @njit(cache=True, nogil=True, error_model="numpy")
 def triangle_stress(xy, c, s0, small, stress):
     """Stress (4,) xx, yy, xy, zz [Pa] of a triangle with the corners xy (6,), without the viscous part."""
-    cs, sn, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    cs, sn, e11, e22, e12 = triangle_stretch(xy, c, small)
     p, m = c[LAMBDA] * (e11 + e22), c[TWO_MU]
     stress[0], stress[1], stress[2] = laws.turned(s0[0] + (p + m * e11), s0[1] + (p + m * e22), s0[2] + m * e12, cs, sn)
     stress[3] = s0[3] + p
@@ -866,5 +934,5 @@ def triangle_stress(xy, c, s0, small, stress):
 @njit(cache=True, nogil=True, error_model="numpy")
 def triangle_energy(xy, c, s0, small):
     """Elastic energy per area [J/m3] of a triangle."""
-    _, _, e11, e22, e12 = _triangle_stretch(xy, c, small)
+    _, _, e11, e22, e12 = triangle_stretch(xy, c, small)
     return _energy(e11, e22, e12, c[LAMBDA], c[TWO_MU], s0)

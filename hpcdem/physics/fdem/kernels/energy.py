@@ -24,7 +24,7 @@ from hpcdem.physics.fdem.kernels.elements import (
     Q_TWO_MU,
     TWO_MU,
     _part_rate,
-    _part_stretch,
+    part_stretch,
 )
 from hpcdem.physics.fdem.kernels.joints import DAMAGE, FAR, NEAR, OPENED, SLIPPED
 
@@ -60,13 +60,13 @@ def _viscous_quad(xy, vel, c, beta, out):
     for overlay in range(2):
         rate, area = 0.0, 0.0
         for p in (2 * overlay, 2 * overlay + 1):
-            _, _, _, _, cs, sn, _, _, _ = _part_stretch(p, xy, c, False)
+            _, _, _, _, cs, sn, _, _, _ = part_stretch(p, xy, c, False)
             r11, r22, _ = _part_rate(p, vel, c, cs, sn)
             rate += c[Q_AREA + p] * (r11 + r22)
             area += c[Q_AREA + p]
         rate /= area
         for p in (2 * overlay, 2 * overlay + 1):
-            ux, uy, wx, wy, cs, sn, _, _, _ = _part_stretch(p, xy, c, False)
+            ux, uy, wx, wy, cs, sn, _, _, _ = part_stretch(p, xy, c, False)
             r11, r22, r12 = _part_rate(p, vel, c, cs, sn)
             shift, swell = 0.5 * (rate - (r11 + r22)), beta * c[Q_LAMBDA] * rate
             xx, yy = eta * (r11 + shift) + swell, eta * (r22 + shift) + swell

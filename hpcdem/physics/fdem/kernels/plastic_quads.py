@@ -102,10 +102,10 @@ def _relieve(i, j, p, q, base, memory, s0):
     e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
     two_mu = q[i, Q_TWO_MU]
     pressure = q[i, Q_LAMBDA] * (e11 + e22 + e33)
-    s0[i, to] = base[i, 0] - (pressure + two_mu * e11)
-    s0[i, to + 1] = base[i, 1] - (pressure + two_mu * e22)
-    s0[i, to + 2] = base[i, 2] - two_mu * e12
-    s0[i, to + 3] = base[i, 3] - (pressure + two_mu * e33)
+    s0[i, to] = base[i, to] - (pressure + two_mu * e11)
+    s0[i, to + 1] = base[i, to + 1] - (pressure + two_mu * e22)
+    s0[i, to + 2] = base[i, to + 2] - two_mu * e12
+    s0[i, to + 3] = base[i, to + 3] - (pressure + two_mu * e33)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -135,7 +135,6 @@ def _gather(item, row, first_row, x, q, base, s0, law, table, memory, lanes):
         at = i0 * _QUAD + _SIXTEEN, i1 * _QUAD + _SIXTEEN, i2 * _QUAD + _SIXTEEN, i3 * _QUAD + _SIXTEEN
         four_columns(lanes, AREAS + e, q, at)
         two_columns(lanes, LAM + e, q, (at[0] + _FOUR, at[1] + _FOUR, at[2] + _FOUR, at[3] + _FOUR))
-        four_columns(lanes, BASE + e, base, (i0 * _FOUR, i1 * _FOUR, i2 * _FOUR, i3 * _FOUR))
         width, own = U(4 * MEMORY), U(first_row)
         j0, j1, j2, j3 = (r0 - own) * width, (r1 - own) * width, (r2 - own) * width, (r3 - own) * width
         for p in range(U(4)):
@@ -144,6 +143,7 @@ def _gather(item, row, first_row, x, q, base, s0, law, table, memory, lanes):
             four_columns(lanes, CA + to, q, at)
             at = i0 * _SIXTEEN + k, i1 * _SIXTEEN + k, i2 * _SIXTEEN + k, i3 * _SIXTEEN + k
             four_columns(lanes, S11 + to, s0, at)
+            four_columns(lanes, BASE + to, base, at)
             at = (
                 U(law[_FOUR * i0 + p]) * _FOUR, U(law[_FOUR * i1 + p]) * _FOUR,
                 U(law[_FOUR * i2 + p]) * _FOUR, U(law[_FOUR * i3 + p]) * _FOUR,
@@ -277,10 +277,10 @@ def _relieve_part(p):
             f, lame, two_mu = first + e, lanes[LAM + e], lanes[MU2 + e]
             e11, e22, e12, e33 = lanes[M11 + f], lanes[M22 + f], lanes[M12 + f], lanes[M33 + f]
             pressure = lame * (e11 + e22 + e33)
-            lanes[S11 + f] = lanes[BASE + e] - (pressure + two_mu * e11)
-            lanes[S22 + f] = lanes[BASE + _NEXT + e] - (pressure + two_mu * e22)
-            lanes[S12 + f] = lanes[BASE + _SECOND + e] - two_mu * e12
-            lanes[S33 + f] = lanes[BASE + _THIRD + e] - (pressure + two_mu * e33)
+            lanes[S11 + f] = lanes[BASE + f] - (pressure + two_mu * e11)
+            lanes[S22 + f] = lanes[BASE + _NEXT + f] - (pressure + two_mu * e22)
+            lanes[S12 + f] = lanes[BASE + _SECOND + f] - two_mu * e12
+            lanes[S33 + f] = lanes[BASE + _THIRD + f] - (pressure + two_mu * e33)
 
     return loop
 
@@ -358,7 +358,7 @@ def flows(threads, *args):
     """Let the triangles of quads that are outside their yield surface at the present positions flow.
 
     Arguments as for `plasticity.flows`: count: quads; rows (count,) i4: their rows of x (n, 12); q (count, 32), see
-    `elements.QUAD`; base (count, 4) [Pa]; law (count, 4): of each of their triangles; memory (n_own, 36): the nine
+    `elements.QUAD`; base (count, 16) [Pa], law (count, 4): of each of their triangles; memory (n_own, 36): the nine
     columns of each of them; s0 (count, 16) [Pa].
     """
     for t in range(threads):
@@ -410,8 +410,8 @@ def _yielding(
         name_quads(first, n, rows, item, row)
         gather_quads(whole, item, row, flat_x, flat_v, flat_c, flat_s0, stressed, lanes)
         _gather_yield(whole, item, flat_yields, flat_surfaces, lanes)
-        _look_0(whole, small, beta, lanes)
-        _look_1(whole, small, beta, lanes)
+        _look_0(whole, small, beta, 0.0, lanes)
+        _look_1(whole, small, beta, 0.0, lanes)
         m = _outside_of(n, item, row, lanes, who, whose)
         if m > 0:
             for k in range(0, m, TILE):
@@ -420,8 +420,8 @@ def _yielding(
                     step, flat_memory, flat_s0, surfaces, tile,
                 )  # fmt: skip
             gather_stresses(whole, item, flat_s0, lanes)
-            overlay_loop_0(whole, small, beta, lanes)
-            overlay_loop_1(whole, small, beta, lanes)
+            overlay_loop_0(whole, small, beta, 0.0, lanes)
+            overlay_loop_1(whole, small, beta, 0.0, lanes)
         tied = finish_quads(
             first, n, item, row, tied, rows, flat_x, v, c, base, partner, law, kind, state, history, flat_table,
             flat_beyond, slot_of, pushed, flat_force, flat_of_joints, keep_joints, gx, gy, drag, step, lanes, room,
@@ -470,6 +470,7 @@ def locked_in(rows, first, q, base, memory, out):
             e11, e22, e12, e33 = memory[j, o + E11], memory[j, o + E22], memory[j, o + E12], memory[j, o + E33]
             trace = e11 + e22 + e33
             squares = e11 * e11 + e22 * e22 + 2.0 * e12 * e12 + e33 * e33
-            own = base[i, 0] * e11 + base[i, 1] * e22 + 2.0 * base[i, 2] * e12 + base[i, 3] * e33
+            b = 4 * p
+            own = base[i, b] * e11 + base[i, b + 1] * e22 + 2.0 * base[i, b + 2] * e12 + base[i, b + 3] * e33
             density = 0.5 * (q[i, Q_LAMBDA] * trace * trace + q[i, Q_TWO_MU] * squares) - own
             out[j] += 0.5 * q[i, Q_AREA + p] * density

@@ -27,9 +27,9 @@ from hpcdem.physics.fdem.kernels.elements import (
     Q_LAMBDA,
     Q_TWO_MU,
     TWO_MU,
-    _mean_trace,
-    _part_stretch,
-    _triangle_stretch,
+    mean_trace,
+    part_stretch,
+    triangle_stretch,
 )
 from hpcdem.physics.fdem.kernels.plasticity import N_PHI, N_PSI, STRENGTH, TENSILE, principal_return
 from hpcdem.physics.fdem.kernels.stiffness import gradients
@@ -136,7 +136,7 @@ def triangles(rows, x, c, s0, law, table, small, out):
     flowing = 0
     for i in range(len(rows)):
         xy = x[rows[i]]
-        cs, sn, e11, e22, e12 = _triangle_stretch(xy, c[i], small)
+        cs, sn, e11, e22, e12 = triangle_stretch(xy, c[i], small)
         pressure, two_mu = c[i, LAMBDA] * (e11 + e22), c[i, TWO_MU]
         s11, s22 = s0[i, 0] + (pressure + two_mu * e11), s0[i, 1] + (pressure + two_mu * e22)
         shear, c2, s2, flows = _lost(
@@ -164,7 +164,7 @@ def quads(rows, x, c, s0, law, table, small, out):
     for i in range(len(rows)):
         xy, lame, two_mu = x[rows[i]], c[i, Q_LAMBDA], c[i, Q_TWO_MU]
         for overlay in range(2):
-            trace, areas = _mean_trace(overlay, xy, c[i], small), 0.0
+            trace, areas = mean_trace(overlay, xy, c[i], small), 0.0
             mean[:] = 0.0
             for p in (2 * overlay, 2 * overlay + 1):
                 gradients(xy, PARTS[p, 0], PARTS[p, 1], PARTS[p, 2], c[i], 4 * p, small, g)
@@ -173,7 +173,7 @@ def quads(rows, x, c, s0, law, table, small, out):
                     mean[2 * PARTS[p, k]] += c[i, Q_AREA + p] * g[k, 0]
                     mean[2 * PARTS[p, k] + 1] += c[i, Q_AREA + p] * g[k, 1]
             for p in (2 * overlay, 2 * overlay + 1):
-                _, _, _, _, cs, sn, e11, e22, e12 = _part_stretch(p, xy, c[i], small)
+                _, _, _, _, cs, sn, e11, e22, e12 = part_stretch(p, xy, c[i], small)
                 shift, pressure, o = 0.5 * (trace - (e11 + e22)), lame * trace, 4 * p
                 s11 = s0[i, o] + (pressure + two_mu * (e11 + shift))
                 s22 = s0[i, o + 1] + (pressure + two_mu * (e22 + shift))
