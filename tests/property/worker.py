@@ -63,7 +63,7 @@ def get_ready(comm: Any, *kinds: str, threads: int = 1) -> None:
 
     for kind in kinds:
         if kind not in READY:
-            session.prepare(comm, Log(comm.rank, stream=io.StringIO()), kind, threads)
+            session.prepare(comm, Log(comm.rank, stream=io.StringIO()), [kind], threads)
             READY.add(kind)
 
 

@@ -41,7 +41,6 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import properties as known
-from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import ELEMENT, MODELS, USER, Model, Property
 from hpcdem.physics.user_files import (
     MARK,
@@ -217,6 +216,8 @@ def _derive(declared: _Declared, law: str, evaluate: Any, columns: Sequence[str]
 def _compile(law: UserLaw, blocks: State, quads: bool = False) -> None:
     """The loops over triangles, or quads, with arguments of the types that they will have: those of a tiny model of the
     class and the threads of `blocks`."""
+    from hpcdem.physics.fdem.mesh import Mesh  # brings kernels
+
     sim: Any = type(blocks)(SerialComm(), blocks.threads)
     corners = [0, 1, 2, 3] if quads else [0, 1, 2, -1]
     sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][: 4 if quads else 3], [corners]))
