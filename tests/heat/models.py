@@ -33,7 +33,8 @@ def cracking(sim: Blocks) -> None:
     heat.initial(None, 20.0)
     sim.table("oven", [(0.0, 20.0), (3e4, 320.0), (1e5, 120.0)])
     heat.prescribe(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.15), "oven")
-    heat.expose(None, environment="oven", transfer=20.0)
+    sim.table("room", [(0.0, 20.0), (1e5, 60.0)])
+    heat.expose(None, environment="room", transfer=20.0)
     heat.expose(np.flatnonzero(sim.face_exists())[::7], flux=400.0)
     sim.heat_clock(dt=100.0)
 
