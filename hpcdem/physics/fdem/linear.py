@@ -154,7 +154,7 @@ class Direct:
         except RuntimeError:
             return SINGULAR
         except MemoryError:
-            return f"the factors of {n} unknowns do not fit into history: take PETSc and more ranks, or relaxation"
+            return f"the factors of {n} unknowns do not fit into memory: take PETSc and more ranks, or relaxation"
         return None
 
     def solve(self, force: np.ndarray, share: float) -> np.ndarray:
