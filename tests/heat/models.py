@@ -60,7 +60,7 @@ def warming(sim: Blocks) -> None:
     right = np.flatnonzero(sim.mesh.centroids()[:, 0] > 1.0)
     changes.element_model(sim, right, "mech_burgers", {**solid, "maxwell_viscosity": 1e8})
     heat = Heat.of(sim)
-    heat.assign(None, HOT)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 2e-5})
     x = sim.mesh.points[:, 0]
     heat.prescribe(np.flatnonzero(x == 0.0), 300.0)
     heat.prescribe(np.flatnonzero(x == 2.0), 100.0)

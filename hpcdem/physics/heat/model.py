@@ -564,13 +564,20 @@ class Heat(SurfaceLoad):
             )
 
     def check_elements(self) -> None:
-        """CommandError if an element lacks a thermal model, or has a law that knows no temperature. Not collective."""
+        """CommandError if an element lacks a thermal model, or has a law that knows no temperature, or a transfer
+        coefficient that nothing takes. Not collective."""
         blocks = self.blocks
         bare = np.flatnonzero((self.row == 0) & blocks.alive)
         if len(bare):
             raise CommandError(
                 f"element {bare[0]} has no thermal model ({len(bare)} in all), but others have: element c-model "
                 "thermal-iso-heat for all"
+            )
+        passes = np.flatnonzero((self.column("transfer_coeficient")[self.row] > 0.0) & blocks.alive)
+        if len(passes) and all(one.environment is None for one in self.faces):
+            raise CommandError(
+                f"element {passes[0]} has a transfer-coeficient, but no face ever had an environment-temperature: "
+                "surfaces in contact and sides of cracks exchange no heat in this version"
             )
         if self.expands and user_laws.in_use(blocks):
             raise CommandError(
