@@ -4,14 +4,8 @@ on faces, table 16."""
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from hpcdem.physics.fdem.properties import ELEMENT, Model, Property
-
-
-def _across(values: dict[str, Any]) -> None:
-    values.setdefault("conductivity_across", values["conductivity"])
-
 
 ISO_HEAT = Model(
     "thermal_iso_heat",
@@ -24,9 +18,8 @@ ISO_HEAT = Model(
                  "them without a coefficient of its own", 0.0),
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
-                 optional=True, otherwise="conductivity", low_itself=False),
+                 optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise; it turns with "
                  "the element", 0.0, low=-math.inf),
     ),
-    _across,
 )  # fmt: skip
