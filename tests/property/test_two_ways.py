@@ -53,7 +53,7 @@ def test_two_ways_have_one_end(kind: str, tmp_path: Path) -> None:
     if kind != PARTICLES:
         assert any(end["joints"][1:].any() for end in done) and any("history v" in end for end in done)
     if kind == BLOCKS:
-        for what in ("creep", "plastic", "axial force", "slip", "pressure", "injected"):
+        for what in ("creep", "plastic", "axial force", "slip", "pressure", "injected", "temperature"):
             assert sum(bool(np.nansum(np.abs(end.get(what, 0.0)))) for end in done) > 3, what
     if kind != BLOCKS:
         assert sum(np.abs(end["disc vy"]).max() > 0.01 for end in done) > 0.7 * len(done)
@@ -115,7 +115,7 @@ def test_a_thousand_others(tmp_path: Path) -> None:
 def test_on_several_ranks(kind: str, ranks: int, tmp_path: Path) -> None:
     """The same ends on any number of ranks, or the models are too narrow for so many."""
     (tmp_path / "one").mkdir()
-    alone = two_ways.digests(kind, 0, 60, tmp_path / "one")
+    alone = two_ways.digests(kind, 0, 30, tmp_path / "one")
     folder = tmp_path / "several"
     folder.mkdir()
     command = [
@@ -124,7 +124,7 @@ def test_on_several_ranks(kind: str, ranks: int, tmp_path: Path) -> None:
         str(ROOT / "tests" / "property" / "two_ways.py"),
         kind,
         "0",
-        "60",
+        "30",
         folder,
     ]
     done = start(list(map(str, command)), tmp_path, env={**mpi_environment(), "PYTHONPATH": str(ROOT)}, timeout=600)

@@ -28,6 +28,7 @@ from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.liners.model import Liners
 from hpcdem.runtime.progress import Log
 from hpcdem.runtime.stop_requests import StopRequests
@@ -106,11 +107,12 @@ class Units:
 
 @dataclass
 class Writer:
-    """Makes the script of a seed. ways: see WAYS."""
+    """Makes the script of a seed. ways: see WAYS; wide: so many times as wide, for several ranks."""
 
     kind: str
     seed: int
     ways: frozenset[str]
+    wide: int = 1
     units: Units = field(default_factory=Units)
 
     def __post_init__(self) -> None:
@@ -193,10 +195,12 @@ class Writer:
             return repr(u.length(x))
 
         self.add(
-            f"sand.box({size(-0.2)}, {size(1.2)}, {size(-0.2)}, {size(2.0)}, kn={kn!r}, ks={kn!r}, fric=0.1)",
-            f"sand.wall(1, (({size(-0.125)}, 0.0), ({size(1.125)}, 0.0)), kn={kn!r}, ks={kn!r}, fric=0.3)",
+            f"sand.box({size(-0.2)}, {size(self.wide + 0.2)}, {size(-0.2)}, {size(2.0)}, kn={kn!r}, ks={kn!r}, "
+            "fric=0.1)",
+            f"sand.wall(1, (({size(-0.125)}, 0.0), ({size(self.wide + 0.125)}, 0.0)), kn={kn!r}, ks={kn!r}, fric=0.3)",
             f"sand.wall(1, yv={u.speed(moving)!r})",
-            f"sand.gen_grid([{size(self.radius)}], x=(0.0, {size(1.0)}), y=(0.0, {size(0.3)}), group='bed')",
+            f"sand.gen_grid([{size(self.radius)}], x=(0.0, {size(float(self.wide))}), y=(0.0, {size(0.3)}), "
+            "group='bed')",
         )
         if self.kind == PARTICLES:
             self.add(f"sand.gen(6, rad=[{size(self.radius * 0.75)}], x=(0.0, {size(1.0)}), y=({size(0.35)}, "
@@ -301,17 +305,17 @@ class Writer:
         self.shuffled(options)
         nx, ny = draw.choice(((3, 2), (4, 2), (2, 2)))
         kind = draw.choice(("tri", "tri", "quad"))
-        x0, x1 = u.length(0.25), u.length(0.75)
+        x0, x1 = u.length(0.25), u.length(0.25 + 0.5 * self.wide)
         low, high = u.length(self.low), u.length(self.high)
-        self.add(f"pcdc mesh structured ({x0!r},{low!r}) ({x1!r},{high!r}) cells {nx} {ny} type {kind} group 'whole' "
-                 "set 'sets'")  # fmt: skip
+        self.add(f"pcdc mesh structured ({x0!r},{low!r}) ({x1!r},{high!r}) cells {nx * self.wide} {ny} type {kind} "
+                 "group 'whole' set 'sets'")  # fmt: skip
         second = draw.random() < 0.5
         if second:
             gap = draw.choice((0.001, 0.0005))
             self.add(f"pcdc mesh structured ({u.length(0.3)!r},{u.length(self.high + gap)!r}) "
-                     f"({u.length(0.7)!r},{u.length(self.high + gap + 0.2)!r}) cells 2 1 type {kind} group 'whole' "
-                     "set 'sets'")  # fmt: skip
-        self.creeps = self.kind == BLOCKS and kind == "tri" and self.rng("creep").random() < 0.3
+                     f"({u.length(0.5 * self.wide + 0.2)!r},{u.length(self.high + gap + 0.2)!r}) cells "
+                     f"{2 * self.wide} 1 type {kind} group 'whole' set 'sets'")  # fmt: skip
+        self.creeps = self.kind == BLOCKS and self.rng("creep").random() < 0.3
         self.yields = not self.creeps and self.rng("plastic").random() < 0.4
         self.bolted = self.rng("bolts").random() < 0.35
         self._element_model()
@@ -323,6 +327,10 @@ class Writer:
             self._liners()
         if self.kind == BLOCKS and not self.creeps and self.rng("fluid").random() < 0.35:
             self._fluid()
+        if self.kind == BLOCKS and self.rng("heat").random() < 0.3:
+            self._heat()
+        if self.kind == BLOCKS and not self.static and self.rng("rayleigh").random() < 0.2:
+            self.add(f"pcdc model rayleigh 0.05 frequency {1.0 / u.time(1.0 / 512.0)!r}")
         if draw.random() < 0.5:
             self._surfaces()
         vy = u.speed(draw.choice((-2.0, -4.0)))
@@ -399,7 +407,7 @@ class Writer:
                 "dilation": min(rng.choice((0.0, 10.0)), friction), "damp-factor": self.rock["damp-factor"],
             }  # fmt: skip
         self._assign(f"pcdc element c-model {model}", self.rock, self.where("element"), "properties",
-                     5 if self.yields else 3, "pcdc element property")  # fmt: skip
+                     6 if self.yields else 3, "pcdc element property")  # fmt: skip
 
     def _joint_model(self) -> None:
         self._assign("pcdc face-joint c-model c-i-c-i", self.joint, self.where("joint"), "joints", 4,
@@ -469,6 +477,30 @@ class Writer:
             f"pcdc well stage 'pump' rate {self._steady('pumped', rate)} limit {limit!r} time {u.time(3.3e-4)!r}",
             f"pcdc well stage 'pump' shut-in time {u.time(1e-4)!r}",
             f"pcdc well stage 'pump' rate {-rate!r}",
+        )
+
+    def _heat(self) -> None:
+        """The floor is warm, faces on the left lie in warm air; heat has a clock that runs ahead, or that of a step."""
+        u, rng = self.units, self.rng("rocks")
+        slow = self.static or rng.random() < 0.7
+        power = u.stress(1.0) * u.speed(1.0)  # W/m2
+        values = {
+            "conductivity": 2.5 * power * u.l, "capacity": 1000.0 * (u.l / u.t) ** 2,
+            "expansion-coeficient": rng.choice((0.0, 1e-5)), "transfer-coeficient": 50.0 * power,
+        }  # fmt: skip
+        if not slow:
+            values["conductivity"] *= 2.0**20
+        self._assign("pcdc element c-model therm-iso-h", values, self.where("element"), "properties", 2,
+                     "pcdc element property")  # fmt: skip
+        self.add("pcdc node initial temperature 20")
+        if slow:
+            self.add(f"pcdc model time-step thermal {u.time(128.0)!r}")
+        line, left = u.length(self.low + 0.001), u.length(0.3)
+        self.add(
+            f"pcdc node boundary therm-s-b-c temperature {self._steady('warm', 60.0)} range y {-u.length(1.0)!r} "
+            f"{line!r}",
+            f"pcdc element-face boundary therm-c-h transfer-coeficient {25.0 * power!r} environment-temperature "
+            f"{self._steady('air', 90.0)} range x 0 {left!r}",
         )
 
     def _steady(self, name: str, value: float) -> str:
@@ -679,6 +711,10 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
             found["aperture"] = flow.values("flow-channel", "aperture") / u.l
             found["injected"] = np.array([flow.well_value("pump", "injected") / u.l**2])
             found["flow time"] = np.array([flow.time / u.t])
+        heat = Heat.there(blocks)
+        if heat is not None:
+            found["temperature"] = diagnostics.values(blocks, "temperature")
+            found["heat time"] = np.array([heat.time / u.t])
         found["block steps"] = np.array([blocks.clock.step, blocks.clock.time / u.t])
         found["joints"] = np.array(diagnostics.joint_counts(blocks), float)
         for name in ("v", "y") if u == Units() else ():
@@ -700,10 +736,10 @@ def leave(one: Session) -> None:
 
 
 def run(
-    kind: str, seed: int, ways: Sequence[str], folder: Path, comm: Any = None
+    kind: str, seed: int, ways: Sequence[str], folder: Path, comm: Any = None, wide: int = 1
 ) -> tuple[str, dict[str, np.ndarray], str]:
     """Script, end and error of a model said in these ways. Collective."""
-    writer = Writer(kind, seed, frozenset(ways))
+    writer = Writer(kind, seed, frozenset(ways), wide)
     text = writer.text()
     one, error = carry_out(text, folder, comm)
     try:
@@ -734,10 +770,11 @@ def chosen_ways(kind: str, seed: int) -> list[str]:
 
 
 def digests(kind: str, first: int, last: int, folder: Path, comm: Any = None) -> dict[int, list[str]]:
-    """Of the ends of these seeds, said in the ways that belong to them: error, and a checksum by name. Collective."""
+    """Of the ends of these seeds, said in the ways that belong to them and four times as wide: error, and a checksum by
+    name. Collective."""
     found = {}
     for seed in range(first, last):
-        _, state, error = run(kind, seed, chosen_ways(kind, seed), folder / str(seed), comm)
+        _, state, error = run(kind, seed, chosen_ways(kind, seed), folder / str(seed), comm, wide=4)
         sums = [f"{name} {zlib.crc32(values.tobytes())}" for name, values in sorted(state.items())]
         found[seed] = [error, *sums]
     return found

@@ -13,7 +13,6 @@ from hpcdem.physics.fdem.properties import Model, Property
 
 def _strengths(values: dict[str, Any]) -> None:
     tension, pre = values["tensile_yield_force"], values["pretension_force"]
-    values.setdefault("compressive_yield_force", tension)
     if pre > tension:
         raise CommandError(f"pretension_force must not be above tensile_yield_force ({tension:g} N), got {pre:g}")
 
@@ -29,7 +28,7 @@ BOLT = Model(
         Property("tensile_yield_force", "N", "axial force at which it yields in tension", math.inf, low_itself=False,
                  otherwise="never"),
         Property("compressive_yield_force", "N", "axial force, without sign, at which it yields in compression",
-                 optional=True, otherwise="that in tension", low_itself=False),
+                 optional=True, follows="tensile_yield_force", otherwise="that in tension", low_itself=False),
         Property("tension_failure_strain", "1", "lengthening of an element since it was installed, over its length, at "
                  "which it breaks for good", math.inf, low_itself=False, otherwise="never"),
         Property("shear_stiffness_rock_bolt", "N/m/m", "force of the grout per length of bolt and displacement"),

@@ -428,7 +428,7 @@ class ModelDefinition:
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
             model.property(name)
-        wanted: dict[str, Any] = keep(dict(before), new) if keep else {**before, **new}
+        wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
         if not each and not before:
             return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
         found = model.complete_each(wanted, len(of)) if all(map(_can_be_number, wanted.values())) else None

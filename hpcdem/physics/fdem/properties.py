@@ -32,13 +32,15 @@ class Property:
     low_itself: bool = True
     """The lowest value is allowed itself."""
     optional: bool = False
-    """May be left out without a default: it then follows from others."""
+    """May be left out without a default: it then follows from several others."""
     softens: bool = False
     """A table over plastic strain may stand for it."""
     internal: bool = False
     """Given by the program, not by name."""
     otherwise: str = ""
     """What counts where it is left out, if that is no number; commands see to what does not follow from others."""
+    follows: str = ""
+    """The property whose value it has where it is left out; it goes with that one as long as both are equal."""
 
     def check(self, value: float) -> float:
         """The value as a float; CommandError if it cannot be."""
@@ -81,6 +83,20 @@ class Model:
         known = ", ".join(p.name for p in self.properties if not p.internal)
         raise CommandError(f"model {self.name} has no property {name}; it has {known}")
 
+    def _follow(self, values: dict[str, Any]) -> None:
+        for one in self.properties:
+            if one.follows:
+                values.setdefault(one.name, values[one.follows])
+
+    def changed(self, before: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of which some are new, the others as before, or equal to a new one that they follow."""
+        values = {**before, **new}
+        for one in self.properties:
+            if one.follows in new and one.name in before and one.name not in new:
+                value = before[one.name]
+                values[one.name] = np.where(value == before[one.follows], new[one.follows], value)
+        return values
+
     def complete(self, given: Mapping[str, float]) -> dict[str, float]:
         """All values of the model, checked, in the order of `properties`.
 
@@ -92,6 +108,7 @@ class Model:
                 values[one.name] = one.default
             elif one.name not in values and not one.optional:
                 raise CommandError(f"model {self.name} needs {one.name} ({one.unit}: {one.doc})")
+        self._follow(values)
         self.derive(values)
         return {one.name: float(values[one.name]) for one in self.properties}
 
@@ -110,6 +127,7 @@ class Model:
                 values[one.name] = np.full(n, one.default)
             elif one.name not in values and not one.optional:
                 return None
+        self._follow(values)
         try:
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 self.derive(values)
@@ -153,10 +171,6 @@ def _elastic(values: dict[str, Any]) -> None:
         wrong = np.asarray(poisson)[~np.asarray(good)].flat[0] if np.ndim(poisson) else poisson
         raise CommandError(f"the moduli give Poisson's ratio {wrong:g}, which must lie between -1 and 0.5")
     values.update(young=young, poisson_ratio=poisson, shear=shear, bulk=bulk)
-
-
-def _penalties(values: dict[str, Any]) -> None:
-    values.setdefault("penalty_shear", values["penalty_normal"])
 
 
 def _friction(doc: str, softens: bool = False) -> Property:
@@ -297,7 +311,8 @@ CONTACT_MOHR_COULOMB = Model(
     (
         _friction("friction angle"),
         Property("penalty_normal", "Pa", "normal penalty; 10 to 100 E is usual", otherwise="10 E", low_itself=False),
-        Property("penalty_shear", "Pa", "shear penalty", optional=True, otherwise="the normal penalty"),
+        Property("penalty_shear", "Pa", "shear penalty", optional=True, follows="penalty_normal",
+                 otherwise="the normal penalty"),
         Property("damping_t", "Pa", "largest normal stress while surfaces approach; contacts that reach it lose energy",
                  math.inf, otherwise="never", low_itself=False),
         Property("damping_b", "1", "exponent of the overlap while surfaces part; above 1 contacts lose energy", 1.0,
@@ -305,7 +320,6 @@ CONTACT_MOHR_COULOMB = Model(
         Property("damping_ratio", "1", "normal dashpot, part of the critical damping of two elements; the larger of "
                  "two surfaces counts; without effect in static runs", 0.0),
     ),
-    _penalties,
 )  # fmt: skip
 
 COHESIVE = Model(
@@ -319,18 +333,16 @@ COHESIVE = Model(
         Property("gf1", "N/m", "fracture energy, mode I"),
         Property("gf2", "N/m", "fracture energy, mode II"),
         Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
-        Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, otherwise="that of opening",
-                 low_itself=False),
-        Property("penalty_shear", "Pa", "penalty of shear", optional=True, otherwise="that of opening",
-                 low_itself=False),
+        Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, follows="penalty_normal",
+                 otherwise="that of opening", low_itself=False),
+        Property("penalty_shear", "Pa", "penalty of shear", optional=True, follows="penalty_normal",
+                 otherwise="that of opening", low_itself=False),
     ),
     lambda values: _cohesive(values),
 )  # fmt: skip
 
 
 def _cohesive(values: dict[str, Any]) -> None:
-    for name in ("penalty_overlay", "penalty_shear"):
-        values.setdefault(name, values["penalty_normal"])
     for strength, energy in (("tensile_strength", "gf1"), ("cohesion", "gf2")):
         lost = (np.asarray(values[strength]) > 0.0) & (np.asarray(values[energy]) <= 0.0)
         if lost.any():

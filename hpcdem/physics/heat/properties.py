@@ -4,14 +4,8 @@ is kept."""
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from hpcdem.physics.fdem.properties import ELEMENT, JOINT, Model, Property
-
-
-def _across(values: dict[str, Any]) -> None:
-    values.setdefault("conductivity_across", values["conductivity"])
-
 
 ISO_HEAT = Model(
     "thermal_iso_heat",
@@ -25,11 +19,10 @@ ISO_HEAT = Model(
                  0.0),
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
-                 optional=True, otherwise="conductivity", low_itself=False),
+                 optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise; it turns with "
                  "the element", 0.0, low=-math.inf),
     ),
-    _across,
 )  # fmt: skip
 FLUID_HEAT = Model(
     "thermal_fluid",
