@@ -500,7 +500,8 @@ class Nodes(Objects):
         self._carry_out("initial", {"velocity": velocity}, where)
 
     def initial_temperature(self, temperature: float, *, where: Where = None) -> None:
-        """The temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress then."""
+        """The temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress
+        then."""
         self._carry_out("initial", {"temperature": temperature}, where)
 
     def reset_velocity(self) -> None:
@@ -829,8 +830,8 @@ class Charts(Words):
         where: Where = None,
     ) -> None:
         """A curve of history y against history x (or time), of points, or of what fluid has now along the line of
-        channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"); style: "line" or
-        "points"."""
+        channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity",
+        "temperature"); style: "line" or "points"."""
         given = {
             "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values,
             "profile": None if profile is None else _script_word(profile), "label": label, "style": style,

@@ -8,7 +8,6 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.heat import model as heat_model
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
@@ -158,7 +157,10 @@ def test_without_contact_a_coefficient_is_refused() -> None:
     heat = Heat.of(sim)
     heat.assign(None, {**GRANITE, "transfer_coeficient": 100.0})
     sim.option(collision=False)
-    with pytest.raises(CommandError, match="element 0 has a transfer-coeficient, but no face .* surfaces do not touch: model option collision on"):
+    with pytest.raises(
+        CommandError,
+        match=r"element 0 has a transfer-coeficient, but no face .* surfaces do not touch: model option collision on",
+    ):
         sim.step()
 
 

@@ -196,7 +196,9 @@ def test_filling_a_dry_fracture_brings_its_heat() -> None:
     wet = of_nodes(flow, "fluid") > 1e-12
     assert 4 < wet.sum() < 11 and of_nodes(flow)[wet] == pytest.approx(40.0, rel=1e-9)
     found = heat.account()
-    assert found["relative"] < 1e-12 and found["fluid"] == pytest.approx(RHO_C * 40.0 * flow.account()["given"], rel=1e-9)
+    assert found["relative"] < 1e-12 and found["fluid"] == pytest.approx(
+        RHO_C * 40.0 * flow.account()["given"], rel=1e-9
+    )
     assert flow.time == pytest.approx(heat.time)
 
 

@@ -1,4 +1,4 @@
-"""Heat in elements and in fluid: the thermal models, what is prescribed at nodes and faces, and initial temperatures."""
+"""Heat in elements and in fluid: thermal models, what is prescribed at nodes and faces, initial temperatures."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def fluid_model(project: Project, properties: Mapping[str, Value], where: Range 
     of_heat(project).of_fluid().assign(chosen(project, JOINT, where), properties)
 
 
-def _heat(project: Project) -> Heat:
+def of_heat(project: Project) -> Heat:
+    """The heat of the model; CommandError without one."""
     found = Heat.there(project.ready())
     if found is None:
         raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")

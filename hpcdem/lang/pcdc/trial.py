@@ -15,8 +15,8 @@ from hpcdem.lang.pcdc.table import (
     COHESIVE,
     CONTACT,
     FLOW_CONDITION,
-    ISO_ELASTIC,
     FLUID_HEAT,
+    ISO_ELASTIC,
     ISO_HEAT,
     LINER,
     MOHR_COULOMB,
@@ -33,7 +33,19 @@ from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, LINER, POROUS, ISO_HEAT, FLUID_HEAT)
+    for model in (
+        ISO_ELASTIC,
+        MOHR_COULOMB,
+        BURGERS,
+        USER,
+        CONTACT,
+        COHESIVE,
+        BOLT,
+        LINER,
+        POROUS,
+        ISO_HEAT,
+        FLUID_HEAT,
+    )
     if model.of is not None
 }
 """Models of the language by their names in full."""

@@ -135,9 +135,7 @@ class Heat(SurfaceLoad):
         if self.fluid is None:
             flow = Flow.there(self.blocks)
             if flow is None:
-                raise CommandError(
-                    "there are no channels yet: face-joint c-model hydraulic-porous-medium comes first"
-                )
+                raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
             self._need_model()
             self.fluid = FluidHeat(self, flow)
         return self.fluid
@@ -289,7 +287,9 @@ class Heat(SurfaceLoad):
         fluid, removed with elements and channels; closing: what does not add up, relative: that over the largest."""
         self.blocks.close_model()
         comm = self.blocks.comm
-        booked = [self.blocks.cold[GIVEN].reshape(-1), [self.accounts["given"]] if comm.rank == 0 else []]
+        booked = [self.blocks.cold[GIVEN].reshape(-1)]
+        if comm.rank == 0:
+            booked.append(np.array([self.accounts["given"]]))
         if self.fluid is not None:
             booked.append(self.fluid.given)
         found = {

@@ -32,6 +32,8 @@ FLUID_HEAT = Model(
         Property("conductivity", "W/(m K)", "thermal conductivity of the fluid"),
         Property("capacity", "J/(kg K)", "specific heat of the fluid", low_itself=False),
         Property("transfer_coeficient", "W/(m2 K)", "heat transfer between fluid and each of the two sides", 0.0),
-        Property("second_order", "1", "advection of second order with a flux limiter: fronts stay sharper", 0.0, high=1.0),
+        Property(
+            "second_order", "1", "advection of second order with a flux limiter: fronts stay sharper", 0.0, high=1.0
+        ),
     ),
 )

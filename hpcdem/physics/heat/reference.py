@@ -47,8 +47,13 @@ def through_contacts(
             if len(places) < 2:
                 continue
             for s, u in (min(places), max(places)):  # half of the length at each of its ends
-                heat = 0.5 * h * length * len(places) / samples * (
-                    (1.0 - u) * t[c] + u * t[d] - (1.0 - s) * t[a] - s * t[b]
+                heat = (
+                    0.5
+                    * h
+                    * length
+                    * len(places)
+                    / samples
+                    * ((1.0 - u) * t[c] + u * t[d] - (1.0 - s) * t[a] - s * t[b])
                 )
                 q[[a, b, c, d]] += heat * np.array([1.0 - s, s, u - 1.0, -u])
     return q
