@@ -487,6 +487,10 @@ class Nodes(Objects):
         """Temperature of nodes from now on: a number or the name of a table over the time of heat."""
         self._carry_out("boundary", {"temperature": temperature}, where, "thermal-solid-boundary-condition")
 
+    def fluid_temperature(self, temperature: Number, *, where: Where = None) -> None:
+        """The same of the fluid at flow nodes, and of what is injected there."""
+        self._carry_out("boundary", {"temperature": temperature}, where, "thermal-flow-boundary-condition")
+
     def remove_boundary(self, *, where: Where = None) -> None:
         """Take boundary conditions back, those of fluid and heat too."""
         self._carry_out("boundary remove", {}, where)
@@ -496,7 +500,8 @@ class Nodes(Objects):
         self._carry_out("initial", {"velocity": velocity}, where)
 
     def initial_temperature(self, temperature: float, *, where: Where = None) -> None:
-        """The temperature of nodes now; elements around them are free of thermal stress then."""
+        """The temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress
+        then."""
         self._carry_out("initial", {"temperature": temperature}, where)
 
     def reset_velocity(self) -> None:
@@ -825,8 +830,8 @@ class Charts(Words):
         where: Where = None,
     ) -> None:
         """A curve of history y against history x (or time), of points, or of what fluid has now along the line of
-        channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity"); style: "line" or
-        "points"."""
+        channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity",
+        "temperature"); style: "line" or "points"."""
         given = {
             "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values,
             "profile": None if profile is None else _script_word(profile), "label": label, "style": style,
@@ -960,7 +965,7 @@ class BlockCommands:
 
     @property
     def heat(self) -> dict[str, float]:
-        """The account of heat [J/m]: given, commands, stored, removed; what does not add up. Collective."""
+        """The account of heat [J/m]: given, commands, stored, fluid, removed; what does not add up. Collective."""
         return fdem.queries.heat(self._blocks.project())
 
     def rayleigh(self, ratio: float, *, frequency: float | None = None, part: str | None = None) -> None:

@@ -301,9 +301,6 @@ def test_what_makes_no_sense_is_refused() -> None:
         sim.step()
     with pytest.raises(CommandError, match="element 3 has no thermal model whose properties"):
         heat.adjust(np.array([2, 3]), {"capacity": 1.0})
-    heat.assign(None, {**GRANITE, "transfer_coeficient": 5.0})
-    with pytest.raises(CommandError, match="element 0 has a transfer-coeficient, but no face"):
-        sim.step()
     heat.assign(None, GRANITE)
     with pytest.raises(CommandError, match="must be finite"):
         heat.initial(None, math.inf)

@@ -230,9 +230,7 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 
 LATER = [
-    ("face-joint c-model t-f con 1", "heat in fluid comes later"),
     ("face-joint c-model hydr-p-p-m f-den 1", "proppant comes later"),
-    ("node boundary therm-f-b-c t 1", "heat in fluid comes later"),
     ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
     ("output image 'a'", "hpcdem movie"),
 ]

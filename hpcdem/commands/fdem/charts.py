@@ -53,7 +53,8 @@ def add(
 
 
 def _profile(project: Project, name: str, where: Range | None) -> list[tuple[float, float]]:
-    """(distance [m], value) along channels: pressure and saturation of their nodes, else of their middles."""
+    """(distance [m], value) along channels: pressure, saturation and temperature of their nodes, else of their
+    middles."""
     channels = everything(project, CHANNEL, where)
     flow, at = Flow.of(project.blocks), project.positions()
     network = flow.network
@@ -66,7 +67,9 @@ def _profile(project: Project, name: str, where: Range | None) -> list[tuple[flo
     if tuple(at[points[-1]]) < tuple(at[points[0]]):
         order, points = order[::-1], points[::-1]
     s = np.append(0.0, np.cumsum(np.hypot(*np.diff(at[points], axis=0).T)))
-    if name in ("pressure", "saturation"):
+    if name == "temperature" and name not in flow.more:
+        raise CommandError("the fluid has no heat: face-joint c-model thermal-fluid comes first")
+    if name in ("pressure", "saturation", "temperature"):
         values = _by_number(flow.values(FLOW_NODE, name, np.sort(points)), points)
     else:
         s = 0.5 * (s[1:] + s[:-1])

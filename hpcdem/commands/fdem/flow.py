@@ -7,17 +7,18 @@ from collections.abc import Mapping
 
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.heat import of_heat as heat_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.groups import JOINT, NODE, Range
+from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.properties import POROUS
+from hpcdem.physics.heat.properties import FLUID_HEAT
 
-Number = float | str
-"""A number, or the name of a table of time."""
 _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
 
 
@@ -38,12 +39,15 @@ def model(project: Project, properties: Mapping[str, Value], where: Range | None
 
 
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
-    """Change some properties of cohesive models, and of channels, each of the joints that a range chooses; without a
-    range of all that have them."""
+    """Change some properties of cohesive models, of channels, and of heat in these, each of the joints that a range
+    chooses; without a range of all that have them."""
     of_fluid = {name: value for name, value in properties.items() if POROUS.has(name)}
-    others = {name: value for name, value in properties.items() if name not in of_fluid}
+    of_heat = {name: value for name, value in properties.items() if FLUID_HEAT.has(name)}
+    others = {name: value for name, value in properties.items() if name not in of_fluid | of_heat}
     if of_fluid:
         _flow(project).adjust(chosen(project, JOINT, where), of_fluid)
+    if of_heat:
+        heat_of(project).of_fluid().adjust(chosen(project, JOINT, where), of_heat)
     if others:
         assignments.joint_property(project, others, where)
 

@@ -160,7 +160,8 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     if flow is None or not len(flow.network.channels):
         return joints
     mesh = blocks.the_mesh()
-    fluid = flow.owned_values(CHANNEL, list(FLUID.values()))
+    columns = FLUID | ({"fluid_temperature": "temperature"} if flow.more else {})
+    fluid = flow.owned_values(CHANNEL, list(columns.values()))
     new = np.setdiff1d(fluid["number"], joints["number"])
     ends = mesh.points[face_points(mesh.cells, new)]
     known = {"number": new, "state": np.ones(len(new)), "mode": np.zeros(len(new)),
@@ -169,7 +170,7 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     found = {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
     order = np.argsort(found["number"])
     at = order[np.searchsorted(found["number"][order], fluid["number"])]
-    for column, name in FLUID.items():
+    for column, name in columns.items():
         found[column] = np.full(len(found["number"]), np.nan)
         found[column][at] = fluid[name]
     return found

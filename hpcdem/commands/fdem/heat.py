@@ -1,4 +1,4 @@
-"""Heat in elements: the thermal model, what is prescribed at nodes and faces, and initial temperatures."""
+"""Heat in elements and in fluid: thermal models, what is prescribed at nodes and faces, initial temperatures."""
 
 from __future__ import annotations
 
@@ -9,13 +9,11 @@ from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.groups import ELEMENT, FACE, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.groups import ELEMENT, FACE, JOINT, NODE, OnBoundary, Range
+from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.heat.properties import ISO_HEAT
-
-Number = float | str
-"""A number, or the name of a table over the time of heat."""
 
 
 def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
@@ -40,12 +38,18 @@ def element_property(project: Project, properties: Mapping[str, Value], where: R
     thermal = {name: value for name, value in properties.items() if ISO_HEAT.has(name)}
     others = {name: value for name, value in properties.items() if name not in thermal}
     if thermal:
-        _heat(project).adjust(chosen(project, ELEMENT, where), thermal)
+        of_heat(project).adjust(chosen(project, ELEMENT, where), thermal)
     if others:
         assignments.element_property(project, others, where)
 
 
-def _heat(project: Project) -> Heat:
+def fluid_model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """The fluid of channels has heat, with these properties; without a range that of all channels."""
+    of_heat(project).of_fluid().assign(chosen(project, JOINT, where), properties)
+
+
+def of_heat(project: Project) -> Heat:
+    """The heat of the model; CommandError without one."""
     found = Heat.there(project.ready())
     if found is None:
         raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
@@ -54,7 +58,12 @@ def _heat(project: Project) -> Heat:
 
 def condition(project: Project, temperature: Number, where: Range | None = None) -> None:
     """Temperature of nodes."""
-    _heat(project).prescribe(chosen(project, NODE, where), temperature)
+    of_heat(project).prescribe(chosen(project, NODE, where), temperature)
+
+
+def fluid_condition(project: Project, temperature: Number, where: Range | None = None) -> None:
+    """Temperature of the fluid at flow nodes."""
+    of_heat(project).prescribe_fluid(chosen(project, NODE, where), temperature)
 
 
 def face_condition(
@@ -70,11 +79,11 @@ def face_condition(
     said = {name: value for name, value in given.items() if value is not None}
     if not said:
         raise CommandError("heat through faces is one of heat_flux, transfer_coeficient, environment_temperature")
-    _heat(project).expose(chosen(project, FACE, (OnBoundary(),) if where is None else where), **said)
+    of_heat(project).expose(chosen(project, FACE, (OnBoundary(),) if where is None else where), **said)
 
 
 def remove_conditions(project: Project, where: Range | None = None) -> None:
-    """No temperature of nodes is prescribed any more; without heat there is nothing to do."""
+    """No temperature of nodes and their fluid is prescribed any more; without heat there is nothing to do."""
     found = Heat.there(project.ready())
     if found is not None:
         found.remove_conditions(chosen(project, NODE, where))
@@ -88,5 +97,5 @@ def remove_face_conditions(project: Project, where: Range | None = None) -> None
 
 
 def initial(project: Project, temperature: float, where: Range | None = None) -> None:
-    """Temperature of nodes now; elements around them are free of thermal stress."""
-    _heat(project).initial(chosen(project, NODE, where), temperature)
+    """Temperature of nodes now, and of the fluid at them; elements around them are free of thermal stress."""
+    of_heat(project).initial(chosen(project, NODE, where), temperature)

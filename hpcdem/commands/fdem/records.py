@@ -56,7 +56,7 @@ UNITS = {
         "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "liner_work": "J/m",
         "heat_work": "J/m", "energy_error": "J/m",
         "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
-        "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m",
+        "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m", "heat_in_fluid": "J/m",
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
@@ -121,13 +121,16 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "heat_time": _of_heat("time"),
     "heat_given": _of_heat("given"),
     "heat_stored": _of_heat("stored"),
+    "heat_in_fluid": _of_heat("fluid"),
 }
 _OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
     "": lambda values: values[0], "sum": lambda values: math.fsum(values.tolist()),
     "mean": lambda values: math.fsum(values.tolist()) / len(values), "minimum": np.min, "maximum": np.max,
 }  # fmt: skip
 ENERGIES = tuple(
-    name for name, unit in UNITS[MODEL].items() if unit == "J/m" and name not in ("heat_given", "heat_stored")
+    name
+    for name, unit in UNITS[MODEL].items()
+    if (unit == "J/m" and not name.startswith("heat_")) or name == "heat_work"
 )
 
 

@@ -57,8 +57,9 @@ FLUID_WORDS = {
 }
 """The same of the account of the fluid, volumes at its density without pressure."""
 HEAT_WORDS = {
-    "given": "given by conditions", "commands": "brought by commands", "stored": "stored, above zero",
-    "removed": "removed with elements", "closing": "closing error",
+    "given": "given by conditions", "commands": "brought by commands", "stored": "stored in elements, above zero",
+    "fluid": "in the fluid",
+    "removed": "removed with elements and channels", "closing": "closing error",
 }  # fmt: skip
 """The same of the account of heat."""
 ACROSS_WORDS = {

@@ -9,7 +9,15 @@ from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
-from hpcdem.lang.pcdc.table import CONST_HEAT, FLOW_CONDITION, ISO_HEAT, POROUS, TEMPERATURE
+from hpcdem.lang.pcdc.table import (
+    CONST_HEAT,
+    FLOW_CONDITION,
+    FLUID_HEAT,
+    FLUID_TEMPERATURE,
+    ISO_HEAT,
+    POROUS,
+    TEMPERATURE,
+)
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
 
@@ -175,6 +183,9 @@ def _joint_model(call: Call) -> None:
     if trial.MODELS[call["model"]] is POROUS.of:
         fdem.flow.model(call.project, call.properties(), call.where)
         return
+    if trial.MODELS[call["model"]] is FLUID_HEAT.of:
+        fdem.heat.fluid_model(call.project, call.properties(), call.where)
+        return
     properties = {name: value for name, value in call.properties().items() if name != "np"}
     fdem.assignments.joint_model(call.project, trial.MODELS[call["model"]].name, properties, call.where)
 
@@ -201,6 +212,8 @@ def _node_condition(call: Call) -> None:
             fdem.flow.condition(call.project, **given, where=call.where)
         case TEMPERATURE.keyword.name:
             fdem.heat.condition(call.project, **_over_time(call), where=call.where)
+        case FLUID_TEMPERATURE.keyword.name:
+            fdem.heat.fluid_condition(call.project, **_over_time(call), where=call.where)
 
 
 def _free_nodes(call: Call) -> None:

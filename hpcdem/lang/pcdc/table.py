@@ -44,11 +44,11 @@ from hpcdem.lang.pcdc.kinds import (
 from hpcdem.physics.bolts.properties import BOLT as BOLT_PROPERTIES
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
+from hpcdem.physics.heat.properties import FLUID_HEAT as FLUID_HEAT_PROPERTIES
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT_PROPERTIES
 from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
 
 THREE_D = "this version computes in two dimensions"
-HEAT = "heat in fluid comes later; this version computes that of elements"
 PROPPANT = "proppant comes later; this version computes mechanics"
 
 
@@ -237,18 +237,14 @@ BURGERS = Model(
     ),
     one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS,
 )  # fmt: skip
-_HEAT_OF = (
-    Option("con{ductivity}", (POSITIVE,), "thermal conductivity", "W/(m K)"),
-    Option("cap{acity}", (POSITIVE,), "heat capacity", "J/(kg K)"),
-    Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer", "W/(m2 K)", also=("t{ransfer}-c{oefficient}",)),
-)
 _COEFFICIENTS = {
     "transfer-coeficient": ("t{ransfer}-c{oefficient}",), "expansion-coeficient": ("e{xpansion}-c{oefficient}",),
 }  # fmt: skip
 ISO_HEAT = Model(
     "therm{al}-iso-h{eat}", "12",
     "Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need it "
-    "where one has it. Heat crosses joints until they break. At the temperatures of this moment elements are free of "
+    "where one has it. Heat crosses joints until they break, and from then on passes "
+    "from surface to surface where they touch, with a transfer coefficient. At the temperatures of this moment elements are free of "
     "thermal stress. Temperatures are those of any scale of degrees.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
@@ -310,9 +306,12 @@ TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
 )  # fmt: skip
+FLUID_TEMPERATURE = Model(
+    "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
+    "there; times of tables are those of heat.",
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
+)  # fmt: skip
 _LATER_NODE = (
-    Model("therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of fluid.",
-          (Option("t{emperature}", (TABLED,), "", "degrees C"),), later=HEAT),
     Model("hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that is injected.",
           (Option("p{roppant}-v{olumetric}-c{oncentration}", (FLOAT,), "", "1"),
            Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=PROPPANT),
@@ -364,8 +363,17 @@ POROUS = Model(
     "no room any more is gone, and new room is dry.",
     _POROUS, of=POROUS_PROPERTIES,
 )  # fmt: skip
+FLUID_HEAT = Model(
+    "t{hermal}-f{luid}", "13",
+    "Heat in the fluid of joints with a hydraulic model, all of which need it where one has it, beside heat in the "
+    "elements. Fluid that has none yet has the temperature of the rock beside it. What comes in has the temperature of "
+    "its node.",
+    tuple(replace(o, values=(BOOL,), unit="", default="off") if o.name == "second-order" else o for o in declared(
+        FLUID_HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "sec{ond}-o{rder}",
+        also={"transfer-coeficient": _COEFFICIENTS["transfer-coeficient"]})),
+    of=FLUID_HEAT_PROPERTIES,
+)  # fmt: skip
 _LATER_JOINT = (
-    Model("t{hermal}-f{luid}", "13", "Heat in the fluid of joints.", _HEAT_OF, later=HEAT),
     Model("hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17", "Fluid with proppant in joints.",
           (*_POROUS, Option("p{roppant}-den{sity}", (POSITIVE,), "", "kg/m3"),
            Option("p{roppant}-s{ize}", (POSITIVE,), "", "m"),
@@ -480,8 +488,10 @@ RECORDED = {
         "reaction-y": "N", "host": "1", "distance": "m",
     },
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
-    "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s"},
-    "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s"},
+    "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s",
+                  "temperature": "K"},
+    "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s",
+                     "temperature": "K"},
     "well": {"pressure": "Pa", "rate": "m2/s", "injected": "m2", "stage": "1"},
     "liner-node": {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
@@ -501,7 +511,7 @@ RECORDED = {
         "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "liner-work": "J/m",
         "heat-work": "J/m", "energy-error": "J/m",
         "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
-        "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m",
+        "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m", "heat-in-fluid": "J/m",
     },
 }  # fmt: skip
 """What a history can follow, and its unit."""
@@ -834,12 +844,12 @@ _OBJECTS = (
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
-            models=(COHESIVE, POROUS, *_LATER_JOINT), ranged="face-joint"),
+            models=(COHESIVE, POROUS, FLUID_HEAT, *_LATER_JOINT), ranged="face-joint"),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
-            options=(*_properties(COHESIVE), *_properties(POROUS)),
+            options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT)),
             ranged="face-joint", needs_option=True),
     Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint"),
@@ -849,8 +859,9 @@ _OBJECTS = (
              "pcdc node boundary mech-vel-b-c velocity-x function 'pump.py:wave' range x 0 0",
              "pcdc node boundary mech-m-b-c type 1 (0,0) range id 1",
              "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'",
-             "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'"),
-            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, TEMPERATURE, *_LATER_NODE), ranged="node"),
+             "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
+             "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, TEMPERATURE, FLUID_TEMPERATURE, *_LATER_NODE), ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
@@ -859,8 +870,8 @@ _OBJECTS = (
     Command("node init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
-                     Option("temp{erature}", (FLOAT,), "temperature; before, it is 0. Elements around the nodes are "
-                            "free of thermal stress then", "K")), ranged="node", needs_option=True),
+                     Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
+                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node", needs_option=True),
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True),
@@ -999,7 +1010,7 @@ _RECORDS = (
             (Option("x", (STRING,), "history along x; without it the time", default="time"),
              Option("y", (STRING,), "history along y"), Option("scale-x", (FLOAT,), "factor", default="1"),
              Option("scale-y", (FLOAT,), "factor", default="1"), Option("val{ues}", (VECTORS,), "points (x,y)"),
-             Option("prof{ile}", (choice("pressure", "saturation", "aperture", "flow-rate", "velocity"),),
+             Option("prof{ile}", (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"),),
                     "of the fluid as it is now, along the line that the joints of the range make, over the distance "
                     "[m] from its left end"),
              Option("lab{el}", (STRING,), "in the legend"),

@@ -15,6 +15,7 @@ from hpcdem.lang.pcdc.table import (
     COHESIVE,
     CONTACT,
     FLOW_CONDITION,
+    FLUID_HEAT,
     ISO_ELASTIC,
     ISO_HEAT,
     LINER,
@@ -27,11 +28,24 @@ from hpcdem.physics.bolts import layout
 from hpcdem.physics.fdem import properties
 from hpcdem.physics.fdem.tables import Drawn, Over, Table
 from hpcdem.physics.flow.properties import POROUS as FLUID
+from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 
 MODELS = {
     model.keyword.name: model.of
-    for model in (ISO_ELASTIC, MOHR_COULOMB, BURGERS, USER, CONTACT, COHESIVE, BOLT, LINER, POROUS, ISO_HEAT)
+    for model in (
+        ISO_ELASTIC,
+        MOHR_COULOMB,
+        BURGERS,
+        USER,
+        CONTACT,
+        COHESIVE,
+        BOLT,
+        LINER,
+        POROUS,
+        ISO_HEAT,
+        FLUID_HEAT,
+    )
     if model.of is not None
 }
 """Models of the language by their names in full."""
@@ -55,11 +69,11 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
             given, model = _given(arguments), _OF_COMMAND[command.name]
-            beside = {properties.COHESIVE.name: FLUID, properties.SOLID.name: HEAT}.get(model.name)
-            of_other = {name: v for name, v in given.items() if beside is not None and beside.has(name)}
-            _changes(model, {name: value for name, value in given.items() if name not in of_other})
-            if beside is not None:
-                _changes(beside, of_other)
+            others = {properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID), properties.SOLID.name: (HEAT,)}
+            for other in others.get(model.name, ()):
+                _changes(other, {name: v for name, v in given.items() if other.has(name)})
+                given = {name: v for name, v in given.items() if not other.has(name)}
+            _changes(model, given)
         elif command.name in _TRIALS and known(list(arguments.values())):
             _TRIALS[command.name](arguments)
     except CommandError as error:
@@ -124,7 +138,7 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if (
-        model in (BOLT.of, LINER.of, POROUS.of, ISO_HEAT.of)
+        model in (BOLT.of, LINER.of, POROUS.of, ISO_HEAT.of, FLUID_HEAT.of)
         and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
     ):
         model.complete(given)

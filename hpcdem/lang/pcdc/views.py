@@ -76,7 +76,7 @@ class Model:
 
     @property
     def heat(self) -> dict[str, float]:
-        """The account of heat [J/m]: given, commands, stored, removed, closing, relative."""
+        """The account of heat [J/m]: given, commands, stored, fluid, removed, closing, relative."""
         return self._look(lambda: fdem.queries.heat(self._project))
 
     def node(self, number: int) -> View:

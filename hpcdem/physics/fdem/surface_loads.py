@@ -13,7 +13,7 @@ from hpcdem.core.errors import CommandError
 
 ORDER = ("discs", "fluid", "heat", "bolts", "liners", "free_field")
 """In which they are added up, whoever came first: sums keep their bits."""
-SHARED_OUT = ("flow_nodes",)
+SHARED_OUT = ("flow_nodes", "fluid_heat")
 """Tables of checkpoints of which each rank has a part, see `SurfaceLoad.saved_rows`."""
 
 

@@ -9,8 +9,9 @@ the bits depend on neither ranks nor threads.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -18,8 +19,10 @@ import numpy as np
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import said
 from hpcdem.physics.fdem.connectivity import corner_counts, face_points
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
+from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow import kernels
@@ -32,8 +35,6 @@ from hpcdem.physics.flow.wells import RATE, Stage, Well
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
-Number = float | str
-"""A number, or the name of a table over model time."""
 LOOK = 100
 """Cycles of flow after which an estimated sub-step is estimated again."""
 SAFETY = 0.8
@@ -60,6 +61,7 @@ NODE_QUANTITIES: dict[str, tuple[str, str]] = {
     "fluid": ("m2", "volume of the fluid at its density without pressure"),
     "volume": ("m2", "room for fluid: half of each channel"),
     "inflow": ("m2/s", "fluid that a condition brings, in the last sub-step"),
+    "temperature": ("K", "temperature of the fluid; NaN without a thermal model of it"),
 }
 CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "pressure": ("Pa", "mean pressure of its ends"),
@@ -67,6 +69,7 @@ CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "aperture": ("m", "hydraulic aperture"),
     "flow_rate": ("m2/s", "volume that flows along the lower face of the joint, from its first corner on"),
     "velocity": ("m/s", "that over the aperture"),
+    "temperature": ("K", "mean temperature of the fluid at its ends; NaN without a thermal model of it"),
 }
 QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
 """What can be asked of flow nodes and channels: unit and meaning."""
@@ -110,6 +113,10 @@ class Flow(SurfaceLoad):
         self._found_for: list[float] = []
         self._copies: Copies | None = None
         self.held = np.empty(0, np.int64)
+        self.more: dict[str, Callable[[], np.ndarray]] = {}
+        """By name quantities (n,) of this rank's flow nodes that other physics keep."""
+        self.carried: np.ndarray | None = None
+        """Volumes [m2] that flowed along the channels of this rank in the last cycle; None: nobody asks."""
         self._told: tuple[float, float] = (0.0, 0.0)
 
     @staticmethod
@@ -145,21 +152,9 @@ class Flow(SurfaceLoad):
 
     def _put(self, at: np.ndarray, values: np.ndarray) -> None:
         """Channels (n,) have these complete properties, (n, k) or (1, k) for all."""
-        blocks, rows, row = self.blocks, list(self.rows), self.row.copy()
-        known = {one: k for k, one in enumerate(rows, 1)}
-        sets, which = np.unique(values, axis=0, return_inverse=True)
-        for one in map(tuple, sets.tolist()):
-            if one not in known:
-                rows.append(one)
-                known[one] = len(rows)
-        row[at] = np.array([known[tuple(one)] for one in sets.tolist()], np.int32)[which.reshape(-1)]
-        used = {tuple(rows[r - 1][: len(FLUID)]) for r in np.unique(row[row > 0]).tolist()}
-        if len(used) > 1:
-            name, one, other = next(
-                (name, *sorted({fluid[k] for fluid in used})[:2]) for k, name in enumerate(FLUID)
-                if len({fluid[k] for fluid in used}) > 1
-            )  # fmt: skip
-            raise CommandError(f"there is one fluid in all channels, but {name} is {one:g} and {other:g}")
+        blocks = self.blocks
+        rows, row = said.with_rows(self.rows, self.row, at, values)
+        said.refuse_different(rows, row, _PROPERTIES, FLUID, "there is one fluid in all channels")
         blocks.before_change()
         self.rows, self.row, self._found_for, self._fluid = rows, row, [], {}
         self._network, self._reshaped = None, True
@@ -167,12 +162,12 @@ class Flow(SurfaceLoad):
 
     def prescribe(self, nodes: np.ndarray | None, does: int, value: Number) -> None:
         """What holds at flow nodes among these points (None: all) from now on, see `Condition`."""
-        at = self._flow_nodes(nodes)
+        at = self.flow_nodes(nodes)
         for well in self.wells:
             both = np.intersect1d(well.points, at)
             if len(both):
                 raise CommandError(f"node {both[0]} belongs to well '{well.name}', whose stages say what holds there")
-        values = self._checked(value, "a condition of a flow node")
+        values = said.checked(self.blocks.tables, value, "a condition of a flow node")
         if does == kernels.PRESSURE and values.min() < 0.0:
             raise CommandError(f"the pressure of a fluid must not be negative, got {values.min():g} Pa")
         self.blocks.before_change()
@@ -182,25 +177,12 @@ class Flow(SurfaceLoad):
         self.condition[at] = self.conditions.index(wanted)
         self.blocks.changed(stiffness=False)
 
-    def _checked(self, value: Number, what: str) -> np.ndarray:
-        """The finite values of a number or a table."""
-        if isinstance(value, str):
-            if value not in self.blocks.tables:
-                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
-            values = self.blocks.tables[value].values
-        else:
-            values = np.array([value], np.float64)
-        if not np.isfinite(values).all():
-            raise CommandError(f"{what} must be finite, got {value}")
-        return values
-
     def drill(self, name: str, nodes: np.ndarray | None) -> None:
         """Flow nodes among these points (None: all) are a well."""
         if any(well.name == name for well in self.wells):
             raise CommandError(f"there is a well '{name}' already")
         try:
-            at = self._flow_nodes(nodes)
+            at = self.flow_nodes(nodes)
         except CommandError as error:
             raise CommandError(f"well '{name}' has no flow node: {error}") from None
         for well in self.wells:
@@ -225,7 +207,7 @@ class Flow(SurfaceLoad):
     def stage(self, name: str, does: str, value: Number, duration: float, limit: float) -> None:
         """One more stage of a well, see `Stage`; duration [s] of flow time."""
         well = self.well(name)
-        values = self._checked(value, f"the {does} of a well")
+        values = said.checked(self.blocks.tables, value, f"the {does} of a well")
         if does == HELD and values.min() < 0.0:
             raise CommandError(f"the pressure of a well must not be negative, got {values.min():g} Pa")
         if not duration > 0.0:
@@ -259,7 +241,7 @@ class Flow(SurfaceLoad):
         if not math.isfinite(given) or given < 0.0 or (saturation is not None and saturation > 1.0):
             what = "the pressure must not be negative" if saturation is None else "the saturation lies between 0 and 1"
             raise CommandError(f"{what}, got {given:g}")
-        at = self._flow_nodes(nodes)
+        at = self.flow_nodes(nodes)
         self.blocks.close_model()
         mine = np.isin(self.number, at)
         part = saturation if pressure is None else 1.0 + pressure / self.fluid("fluid_bulk")
@@ -269,7 +251,7 @@ class Flow(SurfaceLoad):
         self._find_state(mine)
         self._refresh()
 
-    def _flow_nodes(self, points: np.ndarray | None) -> np.ndarray:
+    def flow_nodes(self, points: np.ndarray | None) -> np.ndarray:
         """Those of these points (None: all) that are flow nodes."""
         there = self.network.there
         if not len(self.network.channels):
@@ -324,6 +306,7 @@ class Flow(SurfaceLoad):
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
                 "saturation": self.state[: len(self.number), kernels.S], "fluid": self.nodes[:, kernels.W],
                 "volume": self.nodes[:, kernels.V], "inflow": self.nodes[:, kernels.INFLOW],
+                "temperature": self._of_others("temperature"),
             }  # fmt: skip
         else:
             blocks = self.blocks
@@ -331,13 +314,44 @@ class Flow(SurfaceLoad):
             mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
             ends, table = self._ends[mine], self._table[mine]
             self._find_flows(0.0)
+            others = self._of_others("temperature", copies="temperature" in names)
             made = {
                 "number": self._channels[mine], "aperture": table[:, kernels.APERTURE], "flow_rate": self._q[mine],
                 "pressure": self.state[ends, kernels.P].mean(axis=1),
                 "saturation": self.state[ends, kernels.S].mean(axis=1),
-                "velocity": self._q[mine] / table[:, kernels.APERTURE],
+                "velocity": self._q[mine] / table[:, kernels.APERTURE], "temperature": others[ends].mean(axis=1),
             }  # fmt: skip
         return {name: made[name].copy() for name in ("number", *names)}
+
+    def _of_others(self, name: str, copies: bool = False) -> np.ndarray:
+        """A quantity of other physics of this rank's flow nodes, NaN where there is none; with copies, then collective,
+        those of other ranks follow."""
+        own = self.more[name]().copy() if name in self.more else np.full(self.owned, math.nan)
+        out = np.append(own, np.full(len(self.held) - len(own), math.nan))
+        if copies and self._copies is not None:
+            kept = self.state[:, kernels.P].copy()
+            self.state[:, kernels.P] = out
+            self._copies.refresh()
+            out = self.state[:, kernels.P].copy()
+            self.state[:, kernels.P] = kept
+        return out if copies else own
+
+    def places_of(self, channels: np.ndarray) -> np.ndarray:
+        """Where channels (k,) are among those of this rank, -1: not there. Not collective."""
+        at = np.minimum(np.searchsorted(self._channels, channels), max(len(self._channels) - 1, 0))
+        return np.where(self._channels[at] == channels, at, -1) if len(self._channels) else np.full(len(channels), -1)
+
+    def apertures(self) -> np.ndarray:
+        """Of this rank's channels [m]. Not to be changed. Not collective."""
+        return self._table[:, kernels.APERTURE]
+
+    def mean_flows(self) -> np.ndarray:
+        """Flow (m,) [m2/s] of this rank's channels from their first end on: the mean of the last cycle, of which
+        `carried` is kept, or where flow is switched off that of this moment. Not collective."""
+        if self.carried is None or not self.blocks.options.hydraulic or len(self.carried) != len(self._channels):
+            self._find_flows(0.0)
+            return self._q
+        return self.carried / (self.sub_steps * self.dt)
 
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
         """A quantity of `QUANTITIES` of flow nodes or channels (None: all), on all ranks; NaN where there is none."""
@@ -509,6 +523,7 @@ class Flow(SurfaceLoad):
         self._sides, self._law, lost = self._sides_of(self._channels)
         self._law_table = self.laws()
         self._table = np.empty((len(ends), kernels.CHANNEL))
+        self.carried = None if self.carried is None else np.empty(0)
         self._find_geometry()
         lost = int(comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:
@@ -693,6 +708,8 @@ class Flow(SurfaceLoad):
                     self._refresh()
             if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given()):
                 self._find_step()
+            if self.carried is not None:
+                self.carried = np.zeros(len(self._channels))
             for _ in range(self.sub_steps):
                 self._sub_step()
             self.cycles += 1
@@ -710,6 +727,8 @@ class Flow(SurfaceLoad):
     def _sub_step(self) -> None:
         threads, before = self.blocks.threads, self.time
         self._find_flows(self.dt)
+        if self.carried is not None:
+            self.carried += self.dt * self._q
         self.time += self.dt
         kernel = kernels.fill if threads == 1 else kernels.fill_threaded
         kernel(
@@ -732,10 +751,11 @@ class Flow(SurfaceLoad):
         room[:2, mine], room[2, mine] = self.nodes[row, : kernels.V + 1].T, self.state[row, kernels.E]
         room = self.blocks.comm.sum_into(room)
         after, bulk = np.empty(len(at)), self.fluid("fluid_bulk")
+        value_at = partial(said.now, self.blocks.tables)
         ends = np.cumsum([len(one) for one in points])
         for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
             if end > begin:
-                after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, self._value_at)
+                after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, value_at)
             stage = well.number(self.time)
             if log is not None and stage != well.number(before):
                 does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage any more"
@@ -746,22 +766,18 @@ class Flow(SurfaceLoad):
         self.nodes[row, kernels.INFLOW] = came / (self.time - before)
         self._find_state(row)
 
-    def _value_at(self, value: Number, time: float) -> float:
-        return float(self.blocks.tables[value](time)) if isinstance(value, str) else value
-
     @property
     def _condition(self) -> np.ndarray:
         return self.condition[self.number]
 
     def conditions_at(self, time: float) -> np.ndarray:
         """The table of conditions (rows, 2) at a flow time: heights as potential energies."""
-        o, tables = self.blocks.options, self.blocks.tables
+        o = self.blocks.options
         table = np.zeros((len(self.conditions), 2))
         height = self.fluid("fluid_density") * math.hypot(o.gx, o.gy)
         for row, one in enumerate(self.conditions):
-            if not isinstance(one.value, str) or one.value in tables:  # else nobody follows it any more
-                value = tables[one.value](time) if isinstance(one.value, str) else one.value
-                table[row] = one.does, value * height if one.does == kernels.SURFACE else value
+            value = said.now(self.blocks.tables, one.value, time)
+            table[row] = one.does, value * height if one.does == kernels.SURFACE else value
         return table
 
     def _check(self) -> None:

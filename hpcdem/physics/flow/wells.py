@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.said import Number
 
 SHUT, RATE, PRESSURE = "shut_in", "rate", "pressure"
 QUANTITIES = {
@@ -24,7 +25,6 @@ QUANTITIES = {
     "stage": ("1", "number of the stage that is on, from 1; 0: none yet, or none any more"),
 }
 """What can be asked of a well: unit and meaning."""
-Number = float | str
 
 
 @dataclass(frozen=True)

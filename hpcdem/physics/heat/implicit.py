@@ -1,7 +1,7 @@
 """Implicit steps of heat, backward Euler, and the steady state: all nodes at once.
 
 (C / dt + K) (T' - T) = Q(T') with the conductances, capacities and conditions of the explicit steps, at the end of the
-step. Temperatures that are prescribed are put in first; what the others then lack is the right-hand side, so the answer
+step; fluid in channels, and surfaces that touch, are in the same system. Temperatures that are prescribed are put in first; what the others then lack is the right-hand side, so the answer
 is exact to rounding whatever the linear solver leaves: it is solved for twice.
 
 Nodes of heat are known to all ranks meanwhile, as those of the blocks are in the static solve.
@@ -19,6 +19,7 @@ from hpcdem.physics.fdem import connectivity, equilibrium
 from hpcdem.physics.fdem.linear import Direct, Petsc, Pieces, Unknowns
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
 
 PASSES = 2
@@ -98,23 +99,45 @@ class Implicit:
         sim, heat = self.sim, self.heat
         sim.close_model()
         heat.renew_nodes()
+        if self.moves:
+            heat.find_contacts()
         after = heat.time + dt if math.isfinite(dt) else heat.time
-        self._prepare(dt)
+        fluid = Fluid.there(heat)
+        self._prepare(dt, fluid)
         assert self.solver is not None
         begin, corner, held = heat.nodes
         flat = heat.t.reshape(-1)
         old = flat[corner[begin[:-1]]].copy()
         new = np.where(held >= 0, np.append(heat.held_at(after), 0.0)[held], old)
         inertia = heat.capacity / dt
+        count = len(heat.leads)
+        of_fluid = np.empty(0)
+        if fluid is not None:
+            of_fluid = np.where(fluid.held >= 0, np.append(heat.held_at(after), 0.0)[fluid.held], fluid.t)
         for _ in range(PASSES):
             self._spread(new)
-            force = np.zeros((len(heat.leads), 2))
+            force = np.zeros((count + len(of_fluid), 2))
             lack = np.where(held >= 0, 0.0, self._inflow(after) - inertia * (new - old))
-            for ids, values in sim.comm.allgather((self._ids, lack[self._mine])):
-                force[ids, 0] = values
-            new = new + self.solver.solve(force, 0.0)[heat.node_ids, 0]
+            force[:count, 0] = self._everywhere(lack)
+            if fluid is not None:
+                got, walls = fluid.inflow(of_fluid, self._everywhere(new))
+                force[:count, 0] += walls
+                force[count:, 0] = got - fluid.capacity / dt * (of_fluid - fluid.t)
+            change = self.solver.solve(force, 0.0)[:, 0]
+            new, of_fluid = new + change[heat.node_ids], of_fluid + change[count:]
         self._spread(new)
-        self._book(dt, after, old, new)
+        walls = np.zeros(count)
+        if fluid is not None:
+            got, walls = fluid.inflow(of_fluid, self._everywhere(new))
+            fluid.take(dt, of_fluid, got)
+        self._book(dt, after, old, new, walls[heat.node_ids])
+
+    def _everywhere(self, mine: np.ndarray) -> np.ndarray:
+        """Values of all nodes of the rock from those (n,) of the nodes that this rank's elements have."""
+        out = np.zeros(len(self.heat.leads))
+        for ids, values in self.sim.comm.allgather((self._ids, mine[self._mine])):
+            out[ids] = values
+        return out
 
     def _spread(self, values: np.ndarray) -> None:
         """Nodes (n,) have these temperatures."""
@@ -130,19 +153,20 @@ class Implicit:
         kernels.sums(begin, corner, heat.inflow(time, dt).reshape(-1), out)
         return out
 
-    def _book(self, dt: float, time: float, old: np.ndarray, new: np.ndarray) -> None:
-        """What conditions brought: on the way to a steady state all that has come in."""
+    def _book(self, dt: float, time: float, old: np.ndarray, new: np.ndarray, walls: np.ndarray) -> None:
+        """What conditions brought, beside heat (n,) [W/m] from fluid: on the way to a steady state all that has come
+        in."""
         sim, heat = self.sim, self.heat
         begin, corner, held = heat.nodes
         brought = heat.capacity * (new - old)
         if math.isfinite(dt):
-            brought = np.where(held >= 0, brought - dt * self._inflow(time, dt), 0.0)
+            brought = np.where(held >= 0, brought - dt * (self._inflow(time, dt) + walls), 0.0)
         lead = corner[begin[:-1]][self._mine] - sim.owned.start * heat.t.shape[1]
         sim.cold[GIVEN].reshape(-1)[lead] += brought[self._mine]
 
     # ---- the matrix ------------------------------------------------------------------------------------------------
 
-    def _prepare(self, dt: float) -> None:
+    def _prepare(self, dt: float, fluid: Fluid | None) -> None:
         """Who is unknown, and factors of the matrix, if it is another one than before."""
         sim, heat = self.sim, self.heat
         begin, corner, _ = heat.nodes
@@ -152,8 +176,10 @@ class Implicit:
         self._mine = (row >= sim.owned.start) & (row < sim.owned.stop) & (sim.number[row] == lowest)
         self._ids = heat.node_ids[self._mine]
         said = (part.tobytes() for part in (heat.leads, heat.held, heat.face, heat.row))
-        made_for = dt, sim.alive.tobytes(), *said
-        if self.solver is not None and made_for == self._made_for:
+        made_for = dt, sim.alive.tobytes(), *said, *(part.tobytes() for part in heat.contacts)
+        if fluid is not None:
+            made_for = *made_for, *fluid.made_for()
+        if not sim.comm.any(self.solver is None or made_for != self._made_for):
             return
         self.close()
         owner = np.zeros(len(heat.leads), np.int64)
@@ -165,10 +191,22 @@ class Implicit:
         count = len(there)
         number = np.full((count, 2), -1, np.int64)
         number[free, 0] = np.arange(int(free.sum()))
-        unknowns = Unknowns(number, np.tile(np.eye(2), (count, 1, 1)), np.zeros((count, 2)), np.zeros(count, bool))
+        pieces = self._pieces(dt)
+        if fluid is not None:
+            of_fluid = np.full((len(fluid.t), 2), -1, np.int64)
+            flowing = fluid.free(dt)
+            of_fluid[flowing, 0] = int(free.sum()) + np.arange(int(flowing.sum()))
+            number = np.concatenate([number, of_fluid])
+            pieces += fluid.pieces(dt, count)
+            beside = np.zeros(len(fluid.t), np.int64)
+            beside[fluid.ends.reshape(-1)] = fluid.walls[:, [0, 2]].reshape(-1)
+            owner = np.concatenate([owner, owner[beside]])
+        total = len(number)
+        unknowns = Unknowns(number, np.tile(np.eye(2), (total, 1, 1)), np.zeros((total, 2)), np.zeros(total, bool))
         nodes = equilibrium.Nodes(heat.leads, point, owner, np.empty(0), np.empty(0))
         self.solver = equilibrium.linear_solver(sim, self.wanted, unknowns, nodes)
-        self.solver.factor(self._pieces(dt))
+        self.solver.flows = fluid is not None
+        self.solver.factor(pieces)
         self.factors += 1
         self.unknowns = unknowns.count
         self._made_for = made_for
@@ -197,7 +235,20 @@ class Implicit:
         faces[:, 0, 0] = np.repeat(transfer, 2)
         key = np.repeat(at, 2)
         found.append(Pieces(key, heat.node.reshape(-1)[ends.reshape(-1)][:, None], faces))
+        found.append(self._contact_pieces())
         return found
+
+    def _contact_pieces(self) -> Pieces:
+        """Of faces that touch, the first of which belongs to this rank, by the numbers of its element."""
+        sim, heat = self.sim, self.heat
+        corner, weight, pass_on = heat.contacts
+        width = heat.t.shape[1]
+        row = corner // width
+        mine = (row[:, 0] >= sim.owned.start) & (row[:, 0] < sim.owned.stop)
+        corner, weight, row = corner[mine] % width, weight[mine], row[mine]
+        stiffness = np.zeros((len(corner), 8, 8))
+        stiffness[:, ::2, ::2] = pass_on[mine, None, None] * weight[:, :, None] * weight[:, None, :]
+        return Pieces(sim.number[row[:, 0]], heat.node[sim.number[row], corner], stiffness)
 
     def _refuse_loose(self) -> None:
         """CommandError naming a body whose heat nothing holds."""
@@ -209,6 +260,16 @@ class Implicit:
         bound[body[holds]] = True
         at, _, transfer = heat.transfers(everywhere=True)
         bound[body[at[transfer > 0.0] // 4]] = True
+        if (fluid := heat.flowing) is not None and fluid.held.any():  # fluid comes past these
+            lower = fluid.flow.network.channels
+            bound[body[np.append(lower, sim.partner[lower]) // 4]] = True
+        row = heat.contacts[0] // heat.t.shape[1]
+        touch = np.unique(np.concatenate(sim.comm.allgather(body[sim.number[row[:, [0, 2]]]])), axis=0)
+        while True:  # what touches a body that something holds
+            reached = touch[bound[touch].any(axis=1)]
+            if bound[reached].all():
+                break
+            bound[reached] = True
         loose = np.flatnonzero(sim.alive & ~bound[body])
         if len(loose):
             raise CommandError(

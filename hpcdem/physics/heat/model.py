@@ -18,24 +18,27 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, connectivity, user_laws
+from hpcdem.physics.fdem import build, connectivity, said, user_laws
 from hpcdem.physics.fdem.properties import ELEMENT
+from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.properties import ISO_HEAT
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
 
-Number = float | str
-"""A number, or the name of a table over the time of heat."""
 SAFETY = 0.9
 """Part of the stability limit that an estimated sub-step may be."""
 LOOK = 100
 """Cycles of heat after which it is looked whether it has blown up."""
 MANY = 100_000
 """Sub-steps in a cycle that are too many to be meant."""
+NEAR, DEEP = 1e-3, 0.2
+"""How far apart, and how deep in each other, faces may be that touch for heat, over the mean edge."""
 SPREAD = 0.1
 """By how much of the mean edge corners of one node may be apart, in joints that open."""
 TEMPERATURE, GIVEN, CAPACITY, UNSTRESSED = "temperature", "heat_given", "heat_capacity", "unstressed"
@@ -88,7 +91,10 @@ class Heat(SurfaceLoad):
         self._expands: bool | None = None
         self._stiffness_of: np.ndarray | None = None
         self._stiffness, self._quad = np.empty(0), np.empty(0, bool)
+        self.fluid: FluidHeat | None = None
         self._found_for: tuple[float, ...] = ()
+        self._passes = False
+        self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
         self._told = 0.0
         self._limit = math.inf
 
@@ -124,16 +130,25 @@ class Heat(SurfaceLoad):
         old = np.array(self.rows)[self.row[at] - 1]
         self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, dict(zip(_NAMES, old.T)), given))
 
+    def of_fluid(self) -> FluidHeat:
+        """The heat of the fluid, made on the first call. Not collective."""
+        if self.fluid is None:
+            flow = Flow.there(self.blocks)
+            if flow is None:
+                raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+            self._need_model()
+            self.fluid = FluidHeat(self, flow)
+        return self.fluid
+
+    @property
+    def flowing(self) -> FluidHeat | None:
+        """The heat of the fluid, None without channels that have it. Not collective."""
+        return self.fluid if self.fluid is not None and self.fluid.on else None
+
     def _put(self, at: np.ndarray, values: np.ndarray) -> None:
         """Elements (n,) have these complete properties, (n, k) or (1, k) for all."""
-        blocks, rows, row = self.blocks, list(self.rows), self.row.copy()
-        known = {one: k for k, one in enumerate(rows, 1)}
-        sets, which = np.unique(values, axis=0, return_inverse=True)
-        for one in map(tuple, sets.tolist()):
-            if one not in known:
-                rows.append(one)
-                known[one] = len(rows)
-        row[at] = np.array([known[tuple(one)] for one in sets.tolist()], np.int32)[which.reshape(-1)]
+        blocks = self.blocks
+        rows, row = said.with_rows(self.rows, self.row, at, values)
         blocks.before_change()
         self.rows, self.row, self._expands = rows, row, None
         self._make_columns()
@@ -161,7 +176,8 @@ class Heat(SurfaceLoad):
         return out
 
     def initial(self, nodes: np.ndarray | None, temperature: float) -> None:
-        """Nodes (None: all) have this temperature now; elements around them are free of thermal stress."""
+        """Nodes (None: all) have this temperature now, and the fluid at them; elements around them are free of thermal
+        stress."""
         blocks = self.blocks
         if not math.isfinite(temperature):
             raise CommandError(f"a temperature must be finite, got {temperature}")
@@ -177,24 +193,38 @@ class Heat(SurfaceLoad):
         self.accounts["commands"] += self._content() - before
         self._take_unstressed(np.flatnonzero(chosen[cells].any(axis=1)))
         blocks.changed(stiffness=False)
+        if (fluid := self.flowing) is not None:
+            fluid.initial(at, temperature)
 
     def prescribe(self, nodes: np.ndarray | None, temperature: Number) -> None:
         """Nodes (None: all) have this temperature from now on, a number or a table over the time of heat."""
         at = self.blocks.numbers_of_nodes(nodes)
         self._need_model()
-        self._check(temperature, "the temperature of a node")
+        row = self._row_of(temperature)
         self.blocks.before_change()
+        self.held[at] = row
+        self.blocks.changed(stiffness=False)
+
+    def _row_of(self, temperature: Number) -> int:
+        """Of this prescribed temperature."""
+        said.checked(self.blocks.tables, temperature, "the temperature of a node")
         if temperature not in self.prescribed[1:]:
             self.prescribed.append(temperature)
-        self.held[at] = 1 + self.prescribed[1:].index(temperature)
-        self.blocks.changed(stiffness=False)
+        return 1 + self.prescribed[1:].index(temperature)
+
+    def prescribe_fluid(self, nodes: np.ndarray | None, temperature: Number) -> None:
+        """The same of the fluid at flow nodes among these."""
+        if (fluid := self.flowing) is None:
+            raise CommandError("the fluid has no heat yet: face-joint c-model thermal-fluid comes first")
+        fluid.prescribe(nodes, self._row_of(temperature))
 
     def expose(self, faces: np.ndarray | None, **changes: Any) -> None:
         """Faces (None: all) have these conditions, fields of `FaceCondition`; the others of theirs stay."""
         at = self.blocks.numbers_of_faces(faces)
         self._need_model()
         for name, value in changes.items():
-            self._check(value, f"{name} of a face")
+            if value is not None:
+                said.checked(self.blocks.tables, value, f"{name} of a face")
         if changes.get("transfer") is not None and changes["transfer"] < 0.0:
             raise CommandError(f"a transfer coefficient must not be negative, got {changes['transfer']:g}")
         for row in np.unique(self.face[at]).tolist():
@@ -214,9 +244,11 @@ class Heat(SurfaceLoad):
         self.blocks.changed(stiffness=False)
 
     def remove_conditions(self, nodes: np.ndarray | None) -> None:
-        """Nodes (None: all) are no longer held."""
+        """Nodes (None: all) are no longer held, nor is the fluid at them."""
         self.blocks.before_change()
         self.held[slice(None) if nodes is None else nodes] = 0
+        if self.fluid is not None:
+            self.fluid.held[slice(None) if nodes is None else nodes] = 0
         self.blocks.changed(stiffness=False)
 
     def remove_face_conditions(self, faces: np.ndarray | None) -> None:
@@ -229,19 +261,11 @@ class Heat(SurfaceLoad):
         if not self.rows:
             raise CommandError("there is no heat yet: element c-model thermal-iso-heat comes first")
 
-    def _check(self, value: Number | None, what: str) -> None:
-        """CommandError unless it is a finite number or a table."""
-        if isinstance(value, str):
-            if value not in self.blocks.tables:
-                known = ", ".join(f"'{name}'" for name in self.blocks.tables) or "none so far"
-                raise CommandError(f"there is no table '{value}'; there is {known}")
-        elif value is not None and not math.isfinite(value):
-            raise CommandError(f"{what} must be finite, got {value}")
-
     def uses_table(self, name: str) -> bool:
         """Whether a node or a face follows this table. Not collective."""
         of_faces = (asdict(self.faces[row]).values() for row in np.unique(self.face).tolist())
-        return any(self.prescribed[row] == name for row in np.unique(self.held).tolist() if row) or any(
+        held = self.held if self.fluid is None else np.append(self.held, self.fluid.held)
+        return any(self.prescribed[row] == name for row in np.unique(held).tolist() if row) or any(
             name in values for values in of_faces
         )
 
@@ -258,18 +282,25 @@ class Heat(SurfaceLoad):
         return exact_sum((cold[CAPACITY] * cold[TEMPERATURE]).reshape(-1), self.blocks.comm)
 
     def account(self) -> dict[str, float]:
-        """Heat since there is a thermal model [J/m]: given by conditions, brought by commands (initial temperatures,
-        changes of capacity), stored, above the zero of the scale, removed with elements; closing: what does not add up,
-        relative: that over the largest."""
+        """Heat since there is a thermal model [J/m]: given by conditions and with fluid that came and went, brought by
+        commands (initial temperatures, changes of capacity), stored in elements, above the zero of the scale, in the
+        fluid, removed with elements and channels; closing: what does not add up, relative: that over the largest."""
         self.blocks.close_model()
         comm = self.blocks.comm
-        given = np.append(self.blocks.cold[GIVEN].reshape(-1), self.accounts["given"] if comm.rank == 0 else 0.0)
+        booked = [self.blocks.cold[GIVEN].reshape(-1)]
+        if comm.rank == 0:
+            booked.append(np.array([self.accounts["given"]]))
+        if self.fluid is not None:
+            booked.append(self.fluid.given)
         found = {
-            "given": exact_sum(given, comm), "commands": self.accounts["commands"], "stored": self._content(),
+            "given": exact_sum(np.concatenate(booked), comm), "commands": self.accounts["commands"],
+            "stored": self._content(), "fluid": self.fluid.content() if self.fluid is not None else 0.0,
             "removed": self.accounts["removed"],
         }  # fmt: skip
         largest = max(map(abs, found.values()))
-        found["closing"] = found["given"] + found["commands"] - found["stored"] - found["removed"]
+        found["closing"] = (
+            found["given"] + found["commands"] - found["stored"] - found["fluid"] - found["removed"]
+        )  # fmt: skip
         found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
         return found
 
@@ -343,6 +374,8 @@ class Heat(SurfaceLoad):
         cold[CAPACITY] = self._corner_capacity[own].copy()
         cold[TEMPERATURE] = self.t[own]  # one place for both
         self._make_conductances()
+        if self.fluid is not None:
+            self.fluid.bind()
         self._make_nodes()
         kernels.unite(self._begin, self._corner, weight.reshape(-1), self.t.reshape(-1))
         united = blocks.comm.any(not np.array_equal(was, cold[TEMPERATURE]))
@@ -351,6 +384,8 @@ class Heat(SurfaceLoad):
             blocks.local.restress()
         if blocks.comm.any(changed) or united:
             self.accounts["commands"] += self._content() - before
+        if (fluid := self.flowing) is not None:
+            fluid.take_new()
         self._checked = False
         self._find_step()
         if not blocks.options.mechanical and not self._beside_flow():
@@ -411,6 +446,7 @@ class Heat(SurfaceLoad):
         self._make_faces()
         self._find_limit()
         self._stale = False
+        self.find_contacts()
 
     def renew_nodes(self) -> None:
         """Nodes are those of the joints that hold now; the model is closed."""
@@ -465,26 +501,53 @@ class Heat(SurfaceLoad):
         pairs, which = np.unique(np.column_stack([self.face[at].astype(float), h]), axis=0, return_inverse=True)
         self._face_row, self._face_pairs = which.reshape(-1).astype(np.int64), pairs
 
+    @property
+    def passes(self) -> bool:
+        """Heat crosses where surfaces touch. Not collective."""
+        return self.blocks.options.collision and bool((self._transfers[self.blocks.alive] > 0.0).any())
+
+    @property
+    def _transfers(self) -> np.ndarray:
+        """Transfer coefficients (ne,) of the elements."""
+        return self.column("transfer_coeficient")[self.row]
+
+    def find_contacts(self) -> None:
+        """Where faces touch now, of pairs with an element of this rank; the model is closed. Not collective."""
+        blocks, pairs = self.blocks, self.blocks.local.pairs
+        self._passes, room = self.passes, 0
+        while True:
+            self._touch = np.empty((room, 4), np.int64), np.empty((room, 4)), np.empty(room)
+            if not self._passes or not len(pairs):
+                return
+            new = (np.diff(pairs.first, prepend=-1) != 0) | (np.diff(pairs.second, prepend=-1) != 0)
+            edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
+            found = kernels.touching(
+                pairs.first[new], pairs.second[new], pairs.start, pairs.free, pairs.element, blocks.the_mesh().cells,
+                blocks.where, blocks.x, h, NEAR * edge, DEEP * edge, self.t.shape[1], *self._touch,
+            )  # fmt: skip
+            if found == room:
+                return
+            room = found
+
+    @property
+    def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """corner, weight and pass_on of kernels.touching. Not to be changed. Not collective."""
+        return self._touch
+
     def _faces_at(self, time: float) -> np.ndarray:
         """The table of conditions (rows, 3) at a time of heat."""
         table = np.zeros((len(self._face_pairs), 3))
         for row, (condition, h) in enumerate(self._face_pairs):
             one = self.faces[int(condition)]
-            table[row, kernels.FLUX] = self._now(one.flux, time)
+            table[row, kernels.FLUX] = said.now(self.blocks.tables, one.flux, time)
             if one.environment is not None:
                 table[row, kernels.TRANSFER] = h if one.transfer is None else one.transfer
-                table[row, kernels.ENVIRONMENT] = self._now(one.environment, time)
+                table[row, kernels.ENVIRONMENT] = said.now(self.blocks.tables, one.environment, time)
         return table
 
     def held_at(self, time: float) -> np.ndarray:
         """Prescribed temperatures (rows,) at a time of heat."""
-        return np.array([self._now(one, time) for one in self.prescribed[1:]], np.float64)
-
-    def _now(self, value: Number, time: float) -> float:
-        if isinstance(value, str):
-            table = self.blocks.tables.get(value)  # nobody follows one that is gone
-            return table(time) if table is not None else 0.0
-        return value
+        return np.array([said.now(self.blocks.tables, one, time) for one in self.prescribed[1:]], np.float64)
 
     # ---- the clock -----------------------------------------------------------------------------------------------
 
@@ -499,11 +562,28 @@ class Heat(SurfaceLoad):
             corner[:, b] += each[:, pair]
         h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
         np.add.at(corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, 2))
+        if self.passes:
+            self._add_most_of_contacts(corner)
+        if (fluid := self.flowing) is not None:
+            fluid.add_to_limit(corner.reshape(-1))
         total = np.empty(len(self.capacity))
         kernels.sums(self._begin, self._corner, corner.reshape(-1), total)
         free = (self._held < 0) & (total > 0.0)
         least = float((self.capacity[free] / total[free]).min(initial=math.inf))
         self._limit = float(self.blocks.comm.min_into(np.array([least]))[0])
+
+    def _add_most_of_contacts(self, corner: np.ndarray) -> None:
+        """What free faces pass on to corners (n, w) where they touch all along, whatever they touch."""
+        blocks, mesh = self.blocks, self.blocks.reference
+        h = self._transfers
+        most = h[blocks.alive].max()
+        at = np.flatnonzero(blocks.face_exists() & ~blocks.closed_faces() & np.repeat(h > 0.0, 4))
+        at = at[blocks.where[at // 4] >= 0]
+        way = np.diff(mesh.points[connectivity.face_points(mesh.cells, at)], axis=1)[:, 0]
+        each = np.hypot(way[:, 0], way[:, 1]) * h[at // 4] * most / (h[at // 4] + most)
+        k, n = at % 4, connectivity.corner_counts(mesh.cells[at // 4])
+        for end in (k, (k + 1) % n):
+            np.add.at(corner, (blocks.where[at // 4], end), each)
 
     def limit(self) -> float:
         """The stability limit of a sub-step [s]."""
@@ -573,12 +653,14 @@ class Heat(SurfaceLoad):
                 f"element {bare[0]} has no thermal model ({len(bare)} in all), but others have: element c-model "
                 "thermal-iso-heat for all"
             )
-        passes = np.flatnonzero((self.column("transfer_coeficient")[self.row] > 0.0) & blocks.alive)
-        if len(passes) and all(one.environment is None for one in self.faces):
+        passes = np.flatnonzero((self._transfers > 0.0) & blocks.alive)
+        if len(passes) and not blocks.options.collision and all(one.environment is None for one in self.faces):
             raise CommandError(
-                f"element {passes[0]} has a transfer-coeficient, but no face ever had an environment-temperature: "
-                "surfaces in contact and sides of cracks exchange no heat in this version"
+                f"element {passes[0]} has a transfer-coeficient, but no face ever had an environment-temperature, and "
+                "surfaces do not touch: model option collision on"
             )
+        if self.fluid is not None:
+            self.fluid.check()
         if self.expands and user_laws.in_use(blocks):
             raise CommandError(
                 f"{user_laws.some(blocks)} has a law of the user, which knows no temperature: expansion-coeficient "
@@ -614,6 +696,8 @@ class Heat(SurfaceLoad):
 
     def mesh_replaced(self) -> None:
         """There is another mesh: `of_mesh` says that this is gone with the one before."""
+        if self.fluid is not None:
+            self.fluid.close()
 
     def follow(self) -> None:
         """Heat flows for as long as the step that the elements have moved by."""
@@ -621,15 +705,23 @@ class Heat(SurfaceLoad):
         if not self.on:
             return
         self.waited += 1
-        if o.mechanical and self.waited < o.flow_every:
+        fluid = self.flowing
+        if fluid is not None and o.hydraulic:
+            if fluid.flow.waited > 0:  # heat goes with the fluid
+                return
+        elif o.mechanical and self.waited < o.flow_every:
             return
         self.waited = 0
         with blocks.timers("heat"):
             self.renew_nodes()
+            if o.mechanical:
+                self.find_contacts()
             if self._found_for != self._given():
                 self._find_step()
             if blocks.budget is not None and o.dynamic and self.expands:
                 blocks.budget.pause(blocks, by_heat=True)
+            if fluid is not None:
+                fluid.begin_cycle(self.sub_steps * self.dt)
             for _ in range(self.sub_steps):
                 self._sub_step()
             self.cycles += 1
@@ -643,9 +735,10 @@ class Heat(SurfaceLoad):
         width, own = self.t.shape[1], self.blocks.owned
         return width * own.start, width * own.stop
 
-    def inflow(self, time: float, dt: float) -> np.ndarray:
+    def inflow(self, time: float, dt: float, fluid: FluidHeat | None = None) -> np.ndarray:
         """Heat (n, w) [W/m] that flows to the corners of the elements held here, with the conditions of faces of a time
-        of heat; what these bring in dt [s] is booked. Not collective."""
+        of heat; what these bring in dt [s] is booked. fluid: what brought heat in the last sub-step besides. Collective
+        where heat comes from surfaces or fluid."""
         threads = self.blocks.threads
         (kernels.conduct if threads == 1 else kernels.conduct_threaded)(threads, self.t, self._g, self._q)
         if len(self._face_row):
@@ -654,11 +747,19 @@ class Heat(SurfaceLoad):
                 self._face_corner, self._half, self._face_row, self._faces_at(time), *self._own_corners(), t, q, dt,
                 given,
             )  # fmt: skip
+        if self._passes:
+            kernels.through_contacts(*self._touch, self.t.reshape(-1), self._q.reshape(-1))
+        if fluid is not None:
+            fluid.add_wall_heat(self._q.reshape(-1))
+        if self._passes or fluid is not None:
+            self.blocks.halo.fill(self._q)  # elements of other ranks touch more than is held here
         return self._q
 
     def _sub_step(self) -> None:
         blocks, threads = self.blocks, self.blocks.threads
-        q = self.inflow(self.time, self.dt).reshape(-1)
+        if (fluid := self.flowing) is not None:
+            fluid.advance(self.dt, self.held_at(self.time + self.dt))
+        q = self.inflow(self.time, self.dt, fluid).reshape(-1)
         self.time += self.dt
         first, last = self._own_corners()
         t, given = self.t.reshape(-1), blocks.cold[GIVEN].reshape(-1)
@@ -688,6 +789,7 @@ class Heat(SurfaceLoad):
             "rows": [list(row) for row in self.rows], "prescribed": self.prescribed,
             "faces": [asdict(one) for one in self.faces], "accounts": self.accounts, "time": self.time,
             "cycles": self.cycles, "waited": self.waited,
+            "fluid": self.fluid.saved_state() if self.fluid is not None else None,
         }  # fmt: skip
 
     def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
@@ -696,7 +798,10 @@ class Heat(SurfaceLoad):
         for name, rows in (("elements", self.row), ("points", self.held), ("faces", self.face)):
             at = np.flatnonzero(rows)
             found[f"heat_{name}"] = {"number": at, "row": rows[at].astype(np.int64)}
-        return found
+        return found | (self.fluid.saved_tables() if self.fluid is not None else {})
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        return self.fluid.saved_rows() if self.fluid is not None else {}
 
     @staticmethod
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
@@ -710,3 +815,5 @@ class Heat(SurfaceLoad):
         for name, rows in (("elements", made.row), ("points", made.held), ("faces", made.face)):
             table = tables[f"heat_{name}"]
             rows[table["number"]] = table["row"]
+        if state.get("fluid") is not None:
+            made.of_fluid().restore(state["fluid"], tables)

@@ -1,11 +1,11 @@
-"""The thermal model of elements, table 12 of the manual, whose spelling of coefficients is kept, and what is prescribed
-on faces, table 16."""
+"""The thermal models of elements and of fluid in joints, tables 12 and 13 of the manual, whose spelling of coefficients
+is kept."""
 
 from __future__ import annotations
 
 import math
 
-from hpcdem.physics.fdem.properties import ELEMENT, Model, Property
+from hpcdem.physics.fdem.properties import ELEMENT, JOINT, Model, Property
 
 ISO_HEAT = Model(
     "thermal_iso_heat",
@@ -15,7 +15,8 @@ ISO_HEAT = Model(
         Property("conductivity", "W/(m K)", "thermal conductivity", low_itself=False),
         Property("capacity", "J/(kg K)", "specific heat", low_itself=False),
         Property("transfer_coeficient", "W/(m2 K)", "heat transfer at faces: to an environment that is prescribed on "
-                 "them without a coefficient of its own", 0.0),
+                 "them without a coefficient of its own, and to surfaces that they touch, with the harmonic mean of both",
+                 0.0),
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
@@ -23,3 +24,16 @@ ISO_HEAT = Model(
                  "the element", 0.0, low=-math.inf),
     ),
 )  # fmt: skip
+FLUID_HEAT = Model(
+    "thermal_fluid",
+    JOINT,
+    "heat in fluid: conduction and advection along channels, exchange with the rock on both sides",
+    (
+        Property("conductivity", "W/(m K)", "thermal conductivity of the fluid"),
+        Property("capacity", "J/(kg K)", "specific heat of the fluid", low_itself=False),
+        Property("transfer_coeficient", "W/(m2 K)", "heat transfer between fluid and each of the two sides", 0.0),
+        Property(
+            "second_order", "1", "advection of second order with a flux limiter: fronts stay sharper", 0.0, high=1.0
+        ),
+    ),
+)

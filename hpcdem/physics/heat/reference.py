@@ -22,3 +22,75 @@ def sub_step(
     for point, value in (held or {}).items():
         after[point] = value
     return after
+
+
+def through_contacts(
+    points: np.ndarray, faces: np.ndarray, t: np.ndarray, h: float, near: float, deep: float, samples: int = 4000
+) -> np.ndarray:  # fmt: skip
+    """Heat (np,) [W/m] that points get from faces (n, 2) that touch, of free surfaces, material on their left: summed
+    over samples of each first face, of lower number, that see a second one."""
+    q = np.zeros(len(points))
+    for i, (a, b) in enumerate(faces.tolist()):
+        way = points[b] - points[a]
+        length = np.hypot(*way)
+        out = np.array([way[1], -way[0]]) / length
+        for c, d in faces[i + 1 :].tolist():
+            other = points[d] - points[c]
+            if 2.0 * way @ other > -length * np.hypot(*other):
+                continue
+            places = []  # along the first and the second face
+            for s in (np.arange(samples) + 0.5) / samples:
+                u = ((points[a] + s * way - points[c]) @ way) / (other @ way)
+                gap = (points[c] + u * other - points[a] - s * way) @ out
+                if 0.0 <= u <= 1.0 and -deep <= gap <= near:
+                    places.append((s, u))
+            if len(places) < 2:
+                continue
+            for s, u in (min(places), max(places)):  # half of the length at each of its ends
+                heat = (
+                    0.5
+                    * h
+                    * length
+                    * len(places)
+                    / samples
+                    * ((1.0 - u) * t[c] + u * t[d] - (1.0 - s) * t[a] - s * t[b])
+                )
+                q[[a, b, c, d]] += heat * np.array([1.0 - s, s, u - 1.0, -u])
+    return q
+
+
+def fluid_step(
+    points: np.ndarray, ends: np.ndarray, q: np.ndarray, aperture: np.ndarray, s: np.ndarray, w: np.ndarray,
+    t: np.ndarray, rock: np.ndarray, dt: float, rho_c: float, k: float, h: float, held: dict[int, float], second: bool,
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """Temperatures (n,) after dt [s] of flow nodes at points (n, 2) with fluid w (n,) [m2], through channels with these
+    ends (m, 2) and flows q (m,) [m2/s], between rock of these temperatures (n,); and what the rock gets [W/m]."""
+    length = np.hypot(*(points[ends[:, 1]] - points[ends[:, 0]]).T)
+    inflow: list[list[tuple[float, int, float]]] = [[] for _ in points]
+    for (a, b), rate, way in zip(ends.tolist(), q.tolist(), length.tolist()):
+        if rate > 0.0:
+            inflow[b].append((rate, a, way))
+        elif rate < 0.0:
+            inflow[a].append((-rate, b, way))
+    heat, passes = np.zeros(len(points)), np.zeros(len(points))
+    for (a, b), rate, way, delta in zip(ends.tolist(), q.tolist(), length.tolist(), aperture.tolist()):
+        up, down = (a, b) if rate > 0.0 else (b, a)
+        value = t[up]
+        if second and inflow[up] and t[down] != t[up]:
+            total = sum(one for one, _, _ in inflow[up])
+            before = sum(one * t[node] for one, node, _ in inflow[up]) / total
+            distance = sum(one * far for one, _, far in inflow[up]) / total
+            r = (t[up] - before) / distance / ((t[down] - t[up]) / way)
+            limiter = (r + abs(r)) / (1.0 + abs(r))
+            value += 0.5 * limiter * (t[down] - t[up]) * max(0.0, 1.0 - dt * abs(rate) / w[up])
+        heat[down] += rho_c * abs(rate) * (value - t[down])
+        heat[up] -= rho_c * abs(rate) * (value - t[up])
+        along = k * delta * min(s[a], s[b]) / way * (t[a] - t[b])
+        heat[b] += along
+        heat[a] -= along
+        for node in (a, b):
+            passes[node] += 2.0 * h * 0.5 * way * s[node] ** 2 * (3.0 - 2.0 * s[node])
+    after = t + dt * (heat + passes * (rock - t)) / (rho_c * w + dt * passes)
+    for node, value in held.items():
+        after[node] = value
+    return after, float((passes * (after - rock)).sum())

@@ -1,0 +1,61 @@
+"""What is said of objects by rows of a table, and numbers that may follow tables of time: of fluid and of heat."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.tables import Table
+
+Number = float | str
+"""A number, or the name of a table over the time of the physics that follows it."""
+
+
+def with_rows(
+    rows: list[tuple[float, ...]], row: np.ndarray, at: np.ndarray, values: np.ndarray
+) -> tuple[list[tuple[float, ...]], np.ndarray]:
+    """The same rows and more, and row (n,), from 1, of objects of which those at `at` (m,) have these values, (m, k) or
+    (1, k) for all."""
+    rows, row = list(rows), row.copy()
+    known = {one: k for k, one in enumerate(rows, 1)}
+    sets, which = np.unique(values, axis=0, return_inverse=True)
+    for one in map(tuple, sets.tolist()):
+        if one not in known:
+            rows.append(one)
+            known[one] = len(rows)
+    row[at] = np.array([known[tuple(one)] for one in sets.tolist()], np.int32)[which.reshape(-1)]
+    return rows, row
+
+
+def refuse_different(
+    rows: list[tuple[float, ...]], row: np.ndarray, names: Sequence[str], alike: Sequence[str], why: str
+) -> None:  # fmt: skip
+    """CommandError if objects with rows differ in a property that is to be alike, of all these names of columns."""
+    used = sorted(set(np.unique(row[row > 0]).tolist()))
+    for name in alike:
+        values = sorted({rows[r - 1][names.index(name)] for r in used})
+        if len(values) > 1:
+            raise CommandError(f"{why}, but {name} is {values[0]:g} and {values[1]:g}")
+
+
+def checked(tables: Mapping[str, Table], value: Number, what: str) -> np.ndarray:
+    """The values (n,) that a number or a table takes; CommandError unless they are finite."""
+    if isinstance(value, str):
+        if value not in tables:
+            known = ", ".join(f"'{name}'" for name in tables) or "none so far"
+            raise CommandError(f"there is no table '{value}'; there is {known}")
+        values = tables[value].values
+    else:
+        values = np.array([value], np.float64)
+    if not np.isfinite(values).all():
+        raise CommandError(f"{what} must be finite, got {value}")
+    return values
+
+
+def now(tables: Mapping[str, Table], value: Number, time: float) -> float:
+    """What it is at this time [s]; 0 where nobody follows a table that is gone."""
+    if not isinstance(value, str):
+        return value
+    return tables[value](time) if value in tables else 0.0

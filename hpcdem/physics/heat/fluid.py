@@ -1,0 +1,347 @@
+"""Heat in the fluid of channels: conduction and advection along them, exchange with the rock on both sides.
+
+A flow node holds the heat rho C W T, W: its fluid at the density without pressure; so what flows out of one node flows
+into another one. Fluid that comes or goes otherwise (conditions, wells, leak-off) has the temperature of its node. The
+fluid has sub-steps of its own, as short as flow needs them; meanwhile the rock stays as it is and gets the sum of what
+the walls took. Owners of nodes and their neighbours are those of the flow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.halo.copies import Copies, moved
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import said
+from hpcdem.physics.fdem.connectivity import corner_counts, face_points
+from hpcdem.physics.fdem.properties import JOINT
+from hpcdem.physics.fdem.tables import Value
+from hpcdem.physics.flow import kernels as flowing
+from hpcdem.physics.flow.network import at_nodes
+from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat.properties import FLUID_HEAT
+
+if TYPE_CHECKING:
+    from hpcdem.physics.flow.model import Flow
+    from hpcdem.physics.heat.model import Heat
+
+SAFETY = 0.9
+"""Part of the stability limit that a sub-step may be."""
+MANY = 100_000
+"""Sub-steps in one of the rock that are too many to be meant."""
+ALIKE = ("conductivity", "capacity", "second_order")
+"""Properties of the fluid: the same in all channels."""
+_NAMES = tuple(one.name for one in FLUID_HEAT.properties)
+_COLUMNS = ("temperature", "given", "had")
+"""Of nodes, as they are saved: temperature [K], heat that came with fluid and by conditions [J/m], and the fluid at the
+end of the last cycle [m2]."""
+
+
+class FluidHeat:
+    """The heat of the fluid of a model with heat. Methods are collective unless they say otherwise.
+
+    row (4 ne,): of the table of properties, by joint, 0: none; held (np,): row of the prescribed temperatures of the
+    heat, by node, 0: none; number (n,): flow nodes owned here; given, had (n,): see _COLUMNS; state (n + copies,
+    kernels.FLUID_STATE): of them and of other ranks' nodes beside this rank's elements.
+    """
+
+    def __init__(self, heat: Heat, flow: Flow) -> None:
+        self.heat, self.flow, self.blocks = heat, flow, heat.blocks
+        mesh = self.blocks.the_mesh()
+        self.row = np.zeros(mesh.cells.size, np.int32)
+        self.held = np.zeros(len(mesh.points), np.int32)
+        self.rows: list[tuple[float, ...]] = []
+        self.number = np.empty(0, np.int64)
+        self.given, self.had = np.empty(0), np.empty(0)
+        self.state = np.empty((0, kernels.FLUID_STATE))
+        self.rho_c = 0.0
+        self.sub_steps = 0
+        self.limit = math.inf
+        self._copies: Copies | None = None
+        self._new = np.empty(0, np.int64)
+        flow.carried = np.empty(0)
+        flow.more["temperature"] = lambda: self.state[: len(self.number), kernels.T]
+
+    # ---- what is said --------------------------------------------------------------------------------------------
+
+    def assign(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Channels among these joints (None: all channels) have these properties; the fluid of those that had none has
+        the temperature of the rock beside it."""
+        at = self.flow.network.channels if joints is None else self.blocks.numbers_of_joints(joints)
+        dry = at[self.flow.row[at] == 0]
+        if len(dry) or not len(at):
+            which = f"joint {dry[0]} is no channel" if len(dry) else "there are no channels yet"
+            raise CommandError(f"{which}: face-joint c-model hydraulic-porous-medium comes first")
+        self._put(at, self.blocks.complete(JOINT, at, FLUID_HEAT, {}, given))
+
+    def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
+        """Change some properties of channels that have the model; None: of all that have it."""
+        at = np.flatnonzero(self.row) if joints is None else self.blocks.numbers_of_joints(joints)
+        bare = at[self.row[at] == 0]
+        if len(bare):
+            raise CommandError(f"{JOINT} {bare[0]} has no thermal model whose properties could be changed")
+        old = np.array(self.rows)[self.row[at] - 1]
+        self._put(at, self.blocks.complete(JOINT, at, FLUID_HEAT, dict(zip(_NAMES, old.T)), given))
+
+    def _put(self, at: np.ndarray, values: np.ndarray) -> None:
+        rows, row = said.with_rows(self.rows, self.row, at, values)
+        said.refuse_different(rows, row, _NAMES, ALIKE, "there is one fluid in all channels")
+        self.blocks.before_change()
+        self.rows, self.row = rows, row
+        self.blocks.changed(stiffness=False)
+
+    def prescribe(self, nodes: np.ndarray | None, row: int) -> None:
+        """Fluid at flow nodes among these points (None: all) has this row of the prescribed temperatures."""
+        at = self.flow.flow_nodes(nodes)
+        self.blocks.before_change()
+        self.held[at] = row
+        self.blocks.changed(stiffness=False)
+
+    def initial(self, points: np.ndarray, temperature: float) -> None:
+        """Flow nodes among these points (n,) have this temperature now."""
+        self.blocks.close_model()
+        mine = np.isin(self.number, points)
+        before = self.content()
+        self.state[: len(self.number)][mine, kernels.T] = temperature
+        self.heat.accounts["commands"] += self.content() - before
+        self._refresh()
+
+    def constant(self, name: str) -> float:
+        """One that is the same everywhere. Not collective."""
+        return self.rows[self.row[np.argmax(self.row > 0)] - 1][_NAMES.index(name)]
+
+    def check(self) -> None:
+        """CommandError if a channel lacks a thermal model. Not collective."""
+        channels = self.flow.network.channels
+        bare = channels[self.row[channels] == 0]
+        if self.rows and len(bare):
+            raise CommandError(
+                f"channel {bare[0]} has no thermal model ({len(bare)} in all), but others have: face-joint c-model "
+                "thermal-fluid for all"
+            )
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+
+    @property
+    def on(self) -> bool:
+        """There are channels with it. Not collective."""
+        return bool(self.rows) and len(self.flow.network.channels) > 0
+
+    def content(self) -> float:
+        """Heat in the fluid [J/m], above the zero of the scale, at the end of the last cycle."""
+        return exact_sum(self.rho_c * self.had * self.state[: len(self.number), kernels.T], self.blocks.comm)
+
+    # ---- tables of this rank -------------------------------------------------------------------------------------
+
+    def bind(self) -> None:
+        """Elements have other rows or owners, there are other channels, or something was said."""
+        blocks, flow, comm, network = self.blocks, self.flow, self.blocks.comm, self.flow.network
+        self._forget(~network.there[self.number])
+        if not self.on:
+            return
+        cells, own, points, mine = blocks.the_mesh().cells, blocks.owned, len(network.there), flow.number
+        faces = np.column_stack([network.channels, blocks.partner[network.channels]])
+        at = blocks.where[faces // 4]
+        beside = ((at >= own.start) & (at < own.stop)).any(axis=1)
+        here = np.isin(network.ends, mine).any(axis=1) | beside
+        self.channels, ends, faces, at = network.channels[here], network.ends[here], faces[here], at[here]
+        n, wanted = len(self.number), np.setdiff1d(ends, mine)
+        had = np.column_stack([self.state[:n, kernels.T], self.given, self.had, np.ones(n)])
+        rows, owner = moved(comm, points, self.number, had, mine, wanted)
+        order = np.lexsort((wanted, owner))
+        wanted, owner = wanted[order], owner[order]
+        self.number = mine.copy()
+        self.given, self.had = rows[:, 1].copy(), rows[:, 2].copy()
+        self._new = np.flatnonzero(rows[:, 3] == 0.0)
+        self.state = np.zeros((len(mine) + len(wanted), kernels.FLUID_STATE))
+        self.state[: len(mine), kernels.T] = rows[:, 0]
+        self.close()
+        self._copies = Copies(comm, mine, wanted, owner, self.state)
+        local = np.full(points, -1, np.int64)
+        local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
+        self._ends = local[ends]
+        self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
+        one, other = (np.column_stack([f % 4, (f % 4 + 1) % corner_counts(cells[f // 4])]) for f in faces.T)
+        corner = np.column_stack([one[:, 0], other[:, 1], one[:, 1], other[:, 0]])
+        row = at[:, [0, 1, 0, 1]]
+        self._walls = np.where(row >= 0, row * self.heat.t.shape[1] + corner, -1)
+        self._length = self.lengths(self.channels)
+        self._exchange = 0.5 * self._length * self.transfers(self.channels)
+        self.wall_heat = np.zeros((len(ends), 4))
+        self._place = flow.places_of(self.channels)
+        self._held = self.held[mine].astype(np.int64) - 1
+
+    def _forget(self, gone: np.ndarray) -> None:
+        """The heat of nodes (n,) bool that are no longer there is gone with them."""
+        comm, accounts, n = self.blocks.comm, self.heat.accounts, len(self.number)
+        if not comm.any(bool(gone.any())):
+            return
+        t = self.state[:n, kernels.T]
+        accounts["removed"] += exact_sum(self.rho_c * self.had[gone] * t[gone], comm)
+        accounts["given"] += exact_sum(self.given[gone], comm)
+        self.state = self.state[:n][~gone]
+        self.number, self.given, self.had = self.number[~gone], self.given[~gone], self.had[~gone]
+
+    def take_new(self) -> None:
+        """New nodes have the temperature of the rock around them; what all hold by the present capacity."""
+        before = self.content()
+        n, t = len(self.number), self.heat.t.reshape(-1)
+        for i in self._new.tolist():
+            at = slice(self._begin[i], self._begin[i + 1])
+            first = np.where(self._side[at] < 0.0, 0, 2)
+            walls = np.column_stack([first, first + 1])
+            self.state[i, kernels.T] = t[self._walls[self._channel[at][:, None], walls]].mean()
+        self.had[self._new] = self.flow.nodes[self._new, flowing.W]
+        self._new = self._new[:0]
+        self.rho_c = self.flow.fluid("fluid_density") * self.constant("capacity")
+        self.heat.accounts["commands"] += self.content() - before
+        self.state[:n, kernels.U] = self.state[:n, kernels.T]
+        self._refresh()
+
+    def transfers(self, channels: np.ndarray) -> np.ndarray:
+        """Transfer coefficients of channels (m,) [W/(m2 K)]. Not collective."""
+        h = np.array([0.0, *(row[_NAMES.index("transfer_coeficient")] for row in self.rows)])
+        return h[self.row[channels]]
+
+    def lengths(self, channels: np.ndarray) -> np.ndarray:
+        """Of channels (m,) in the mesh [m]. Not collective."""
+        mesh = self.blocks.reference
+        way = np.diff(mesh.points[face_points(mesh.cells, channels)], axis=1)[:, 0]
+        return np.hypot(way[:, 0], way[:, 1])
+
+    def put(self, nodes: np.ndarray, t: np.ndarray, brought: np.ndarray) -> None:
+        """Nodes (n,) have these temperatures, after an implicit step in which so much heat [J/m] came from outside."""
+        at, own = np.searchsorted(nodes, self.number), self.state[: len(self.number)]
+        w = self.flow.nodes[:, flowing.W]
+        self.given += brought[at] + self.rho_c * (w - self.had) * own[:, kernels.T]  # what came before has its old one
+        own[:, kernels.T], self.had = t[at], w.copy()
+        self._refresh()
+
+    def add_to_limit(self, corner: np.ndarray) -> None:
+        """What walls pass on at most at corners (flat) per degree [W/(m K)]. Not collective."""
+        there = self._walls >= 0
+        np.add.at(corner, self._walls[there], np.repeat(self._exchange, 4)[there.reshape(-1)])
+
+    def close(self) -> None:
+        """Give the requests back to MPI."""
+        if self._copies is not None:
+            self._copies.close()
+            self._copies = None
+
+    def _refresh(self) -> None:
+        if self._copies is not None:
+            self._copies.refresh()
+
+    # ---- the step ------------------------------------------------------------------------------------------------
+
+    def begin_cycle(self, period: float) -> None:
+        """Flow of a cycle of heat that takes so long [s]: the mean of the last cycle of flow, or that of this moment
+        where it stands still."""
+        flow, n = self.flow, len(self.number)
+        known = np.maximum(self._place, 0)
+        there = self._place >= 0
+        q, aperture = flow.mean_flows(), flow.apertures()
+        self._q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
+        delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
+        w, s = flow.nodes[:, flowing.W], flow.state[:n, flowing.S]
+        self._period, self._passed, self._w0 = period, 0.0, self.had.copy()
+        self.state[:n, kernels.X] = part(s)
+        self.state[:n, kernels.S], self.state[:n, kernels.FULL] = s, self.had
+        self._refresh()
+        ends = self._ends
+        wet = np.minimum(self.state[ends[:, 0], kernels.S], self.state[ends[:, 1], kernels.S])
+        self._conduct = self.constant("conductivity") * delta * wet / self._length
+        self._second = self.constant("second_order") > 0.0
+        if self._second:
+            self._look_upstream()
+        least = np.where(self._w0 > 0.0, np.minimum(self._w0, w), w)
+        into = np.bincount(ends[:, 1], np.maximum(self._q, 0.0), len(self.state))
+        into += np.bincount(ends[:, 0], np.maximum(-self._q, 0.0), len(self.state))
+        total = (2.0 if self._second else 1.0) * into[:n]
+        for end in range(2):
+            total += np.bincount(ends[:, end], self._conduct, len(self.state))[:n] / self.rho_c
+        some = (total > 0.0) & (least > 0.0)
+        limit = float((least[some] / total[some]).min(initial=math.inf))
+        self.limit = float(self.blocks.comm.min_into(np.array([limit]))[0])
+
+    def _look_upstream(self) -> None:
+        n = len(self.number)
+        kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self.state[:n],
+                         self.state)  # fmt: skip
+        self._refresh()
+
+    def advance(self, dt: float, table: np.ndarray) -> None:
+        """The fluid during a sub-step of the rock dt [s]; `wall_heat` (m, 4) [W/m] is the mean of what its walls get.
+        table: prescribed temperatures."""
+        n, t = len(self.number), self.heat.t.reshape(-1)
+        count = max(1, math.ceil(dt / (SAFETY * self.limit) * (1.0 - 1e-12)))
+        if count > MANY:
+            raise CommandError(
+                f"heat in the fluid would need {count} sub-steps of {self.limit:.3g} s in one of the rock of {dt:.3g} s: "
+                "model time-step thermal makes those shorter, model solve thermal takes implicit steps"
+            )
+        self.sub_steps = count
+        w1 = self.flow.nodes[:, flowing.W]
+        short = dt / count
+        self.wall_heat[:] = 0.0
+        face, fresh = np.empty(len(self.channels)), np.empty(n)
+        for k in range(count):
+            share = min(1.0, (self._passed + (k + 1) * short) / self._period) if self._period > 0.0 else 1.0
+            w = self._w0 + share * (w1 - self._w0) if share < 1.0 else w1.copy()
+            kernels.faces(self._ends, self._q, self._length, self._second, short, self.state, face)
+            kernels.carry(
+                short, self._begin, self._channel, self._side, self._ends, self._q, face, self._conduct, self._walls,
+                self._exchange, t, self._held, table, self.had, w, self.rho_c, self.state, fresh, self.given,
+            )  # fmt: skip
+            self.state[:n, kernels.T], self.state[:n, kernels.FULL], self.had = fresh, w, w
+            if self._second:
+                self._look_upstream()
+            else:
+                self._refresh()
+            kernels.to_walls(short / dt, self._ends, self._walls, self._exchange, t, self.state, self.wall_heat)
+        self._passed += dt
+
+    def add_wall_heat(self, q: np.ndarray) -> None:
+        """Add what the walls get to the heat at corners q (flat) [W/m]. Not collective."""
+        kernels.from_walls(self._walls, self.wall_heat, q)
+
+    # ---- state on disk -------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {"rows": [list(row) for row in self.rows], "rho_c": self.rho_c}
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Channels with their properties, prescribed nodes, of all ranks."""
+        found = {}
+        for name, rows in (("channels", self.row), ("flow_nodes", self.held)):
+            at = np.flatnonzero(rows)
+            found[f"heat_{name}"] = {"number": at, "row": rows[at].astype(np.int64)}
+        return found
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        """What this rank's flow nodes hold."""
+        held = np.ascontiguousarray(self.state[: len(self.number), kernels.T]), self.given, self.had
+        return {"fluid_heat": {"number": self.number, **dict(zip(_COLUMNS, held))}}
+
+    def restore(self, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse of these."""
+        self.rows, self.rho_c = [tuple(row) for row in state["rows"]], state["rho_c"]
+        for name, rows in (("channels", self.row), ("flow_nodes", self.held)):
+            table = tables[f"heat_{name}"]
+            rows[table["number"]] = table["row"]
+        nodes = tables["fluid_heat"]
+        self.number = nodes["number"].astype(np.int64)
+        self.given, self.had = nodes["given"].copy(), nodes["had"].copy()
+        self.state = np.zeros((len(self.number), kernels.FLUID_STATE))
+        self.state[:, kernels.T] = nodes["temperature"]
+
+
+def part(s: np.ndarray) -> np.ndarray:
+    """Part of the exchange at saturations (n,), that of the transmissivity: kernels.part of the flow."""
+    return s * s * (3.0 - 2.0 * s)

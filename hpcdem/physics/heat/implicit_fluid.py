@@ -1,0 +1,136 @@
+"""The fluid in implicit steps of heat: its flow nodes are unknowns beside the nodes of the rock.
+
+Fluid flows as it does at this moment, with its first-order upwind temperatures:
+
+    rho C W (T' - T) / dt = rho C sum(side q (T_up' - T')) + conduction + sum(a (T_wall' - T')),
+
+all at the end of the step. Everything here is known to all ranks and the same on all: it is little beside the factors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.connectivity import corner_counts
+from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
+from hpcdem.physics.fdem.linear import Pieces
+from hpcdem.physics.heat.fluid import FluidHeat, part
+from hpcdem.physics.heat.model import Heat
+
+
+@dataclass
+class Fluid:
+    """The network of a model as arrays. ends (m, 2): rows of nodes; q (m,) [m2/s]; conduct (m,), exchange (m, 2):
+    [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the rock, two at each end;
+    held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,): temperatures."""
+
+    of: FluidHeat
+    ends: np.ndarray
+    q: np.ndarray
+    conduct: np.ndarray
+    exchange: np.ndarray
+    walls: np.ndarray
+    held: np.ndarray
+    capacity: np.ndarray
+    t: np.ndarray
+
+    @staticmethod
+    def there(heat: Heat) -> Fluid | None:
+        """That of a closed model, None without heat in its fluid. Collective."""
+        fluid = heat.flowing
+        if fluid is None:
+            return None
+        if fluid.constant("second_order") > 0.0:
+            raise CommandError("implicit steps of heat take advection of first order: second-order off for them")
+        flow, network, sim = fluid.flow, fluid.flow.network, heat.blocks
+        row_of = np.full(len(network.there), -1, np.int64)
+        row_of[network.nodes] = np.arange(len(network.nodes))
+        ends = row_of[network.ends]
+        q, aperture = (flow.values(CHANNEL, name) for name in ("flow_rate", "aperture"))
+        w, s, t = (flow.values(FLOW_NODE, name) for name in ("fluid", "saturation", "temperature"))
+        wet = s[ends].min(axis=1)
+        length = fluid.lengths(network.channels)
+        exchange = 0.5 * length[:, None] * fluid.transfers(network.channels)[:, None] * part(s)[ends]
+        cells, lower = sim.the_mesh().cells, network.channels
+        (a, b), (p, r) = (
+            (heat.node[f // 4, f % 4], heat.node[f // 4, (f % 4 + 1) % corner_counts(cells[f // 4])])
+            for f in (lower, sim.partner[lower])
+        )
+        return Fluid(
+            fluid, ends, q, fluid.constant("conductivity") * aperture * wet / length, exchange,
+            np.column_stack([a, r, b, p]), fluid.held[network.nodes].astype(np.int64) - 1, fluid.rho_c * w, t,
+        )  # fmt: skip
+
+    def made_for(self) -> tuple[bytes, ...]:
+        """What the matrix follows from."""
+        parts = (self.ends, self.q, self.conduct, self.exchange, self.walls, self.held, self.capacity)
+        return tuple(one.tobytes() for one in parts)
+
+    def free(self, dt: float) -> np.ndarray:
+        """(n,) bool: nodes whose temperature is unknown: dry ones keep theirs."""
+        n, rho_c = len(self.t), self.of.rho_c
+        total = self.capacity / dt
+        for end in range(2):
+            into = np.maximum(self.q if end else -self.q, 0.0) * rho_c
+            total = total + np.bincount(self.ends[:, end], into + self.conduct + 2.0 * self.exchange[:, end], n)
+        return (self.held < 0) & (total > 0.0)
+
+    def inflow(self, t: np.ndarray, rock: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heat [W/m] that nodes (n,) of these temperatures get, and nodes of the rock (k,) of theirs."""
+        n, (a, b) = len(t), self.ends.T
+        rho_c, out = self.of.rho_c, np.zeros(len(rock))
+        up = np.where(self.q > 0.0, t[a], t[b])
+        along = self.conduct * (t[a] - t[b])
+        got = np.bincount(b, rho_c * self.q * (up - t[b]) + along, n)
+        got += np.bincount(a, -rho_c * self.q * (up - t[a]) - along, n)
+        for k in range(4):
+            passed = self.exchange[:, k // 2] * (t[self.ends[:, k // 2]] - rock[self.walls[:, k]])
+            got -= np.bincount(self.ends[:, k // 2], passed, n)
+            out += np.bincount(self.walls[:, k], passed, len(rock))
+        return got, out
+
+    def pieces(self, dt: float, first: int) -> list[Pieces]:
+        """Of channels and of nodes, whose numbers begin with `first`, for rank 0."""
+        mine = slice(None) if self.of.blocks.comm.rank == 0 else slice(0, 0)
+        ends, q = self.ends[mine], self.of.rho_c * self.q[mine]
+        conduct, exchange = self.conduct[mine], self.exchange[mine]
+        out = np.zeros((len(ends), 6, 6))
+        for end in range(2):
+            into = np.maximum(q if end else -q, 0.0)
+            out[:, end, end] += into + conduct + 2.0 * exchange[:, end]
+            out[:, end, 1 - end] -= into + conduct
+            for wall in (2 + 2 * end, 3 + 2 * end):
+                out[:, end, wall] -= exchange[:, end]
+                out[:, wall, end] -= exchange[:, end]
+                out[:, wall, wall] += exchange[:, end]
+        node = np.column_stack([first + ends, self.walls[mine]])
+        nodes = np.arange(len(self.t))[mine]
+        own = (self.capacity / dt)[mine, None, None]
+        return [Pieces(self.of.flow.network.channels[mine], node, _first_of_two(out)),
+                Pieces(nodes, first + nodes[:, None], _first_of_two(own))]  # fmt: skip
+
+    def take(self, dt: float, t: np.ndarray, got: np.ndarray) -> None:
+        """Nodes have these temperatures (n,), with this inflow of heat; what came with fluid and by conditions is
+        booked."""
+        fluid = self.of
+        n, (a, b) = len(t), self.ends.T
+        net = np.bincount(b, self.q, n) - np.bincount(a, self.q, n)
+        stored = self.capacity * (t - self.t)
+        if np.isfinite(dt):
+            # Fluid that is not carried on by channels leaves with the temperature of its node.
+            brought = -dt * fluid.rho_c * t * net
+            brought[self.held >= 0] += (stored - dt * got)[self.held >= 0]
+        else:
+            brought = stored  # with what the rock is given: all that has come in
+        fluid.put(fluid.flow.network.nodes, t, brought)
+
+
+def _first_of_two(stiffness: np.ndarray) -> np.ndarray:
+    """(m, 2 k, 2 k): the first of the two unknowns of each node."""
+    m, k, _ = stiffness.shape
+    out = np.zeros((m, 2 * k, 2 * k))
+    out[:, ::2, ::2] = stiffness
+    return out
