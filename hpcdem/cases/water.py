@@ -17,6 +17,29 @@ class Water(Case):
     patience: int = quantity(400000, "1", "steps after which the search for steady flow ends", ge=1000)
 
 
+class Warm(Case):
+    """Parameters of water and rock with heat; flow is steady, so the water's bulk modulus does not count."""
+
+    fluid_density: float = quantity(1000.0, "kg/m3", "density of the water", gt=0)
+    viscosity: float = quantity(1e-3, "Pa s", "dynamic viscosity of the water", gt=0)
+    fluid_conductivity: float = quantity(0.6, "W/(m K)", "thermal conductivity of the water", ge=0)
+    fluid_capacity: float = quantity(4200.0, "J/(kg K)", "specific heat of the water", gt=0)
+    exchange: float = quantity(1e3, "W/(m2 K)", "heat transfer between the water and each side of its channel", gt=0)
+    density: float = quantity(2700.0, "kg/m3", "density of the rock", gt=0)
+    conductivity: float = quantity(2.7, "W/(m K)", "thermal conductivity of the rock", gt=0)
+    capacity: float = quantity(1000.0, "J/(kg K)", "specific heat of the rock", gt=0)
+
+
+WARM = """\
+pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 1e6 \\
+    viscosity [viscosity/fluid_density] aperature-initial [aperture] aperature-minumum [0.5*aperture] RANGE
+pcdc face-joint c-model t-f property conductivity [fluid_conductivity] capacity [fluid_capacity] \\
+    transfer-coeficient [exchange] RANGE
+pcdc model option mechanical off                 # the rock stands still
+pcdc flow-node initial saturation 1
+"""
+"""Channels of a RANGE, full of water, with heat; the elements have theirs."""
+
 ROCK = """
 pcdc element c-model mech-iso-e property density 2500 young 50e9 poisson-r 0.25
 pcdc model option mechanical off                 # the rock stands still

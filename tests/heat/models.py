@@ -7,14 +7,19 @@ from typing import Any
 import numpy as np
 
 from hpcdem.physics.fdem import changes, creep, diagnostics
+from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
+from tests.flow.models import bursting
+from tests.flow.models import more as burst_on
 from tests.flow.support import inner
 from tests.heat.support import GRANITE
 from tests.parallel.model import Found, Model
 
+WATER = {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 5e4, "second_order": 1.0}
 HOT = {**GRANITE, "expansion_coeficient": 2e-5, "transfer_coeficient": 50.0}
 
 
@@ -76,6 +81,52 @@ def move(sim: Blocks) -> None:
         sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vx=0.0, vy=0.0)
 
 
+def steaming(sim: Blocks) -> None:
+    """Hot water is pumped into a cold block that flies through the strips of the ranks, and tears it apart; the rock
+    expands, cracks pass heat on."""
+    bursting(sim)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 1e-4, "transfer_coeficient": 300.0})
+    heat.initial(None, 20.0)
+    fluid = heat.of_fluid()
+    fluid.assign(None, WATER)
+    sim.table("boiler", [(0.0, 20.0), (1e-4, 320.0), (1e-2, 220.0)])
+    heat.prescribe_fluid(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.12), "boiler")
+
+
+def steaming_on(sim: Blocks) -> None:
+    """What happens to it."""
+    burst_on(sim)
+    fluid = Heat.of(sim).of_fluid()
+    if sim.clock.step == 600:
+        fluid.assign(None, WATER)
+        Heat.of(sim).initial(np.flatnonzero(sim.node_exists())[5:30], 90.0)
+    if sim.clock.step == 800:
+        fluid.adjust(None, {"second_order": 0.0, "capacity": 4000.0})
+        sim.parts(hydraulic=False)
+        sim.heat_clock(dt=1e-5)
+    if sim.clock.step == 900:
+        sim.parts(hydraulic=True)
+        sim.heat_clock(dt=0.0)
+
+
+def of_water(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks, with the water."""
+    flow = Flow.of(sim)
+    found = result(sim, notes)
+    found["water"] = flow.values(FLOW_NODE, "temperature")
+    found["along"] = flow.values(CHANNEL, "temperature")
+    found["pressure"] = flow.values(FLOW_NODE, "pressure")
+    found["sub_steps"] = np.array([Heat.of(sim).of_fluid().sub_steps])
+    return found
+
+
+def it_steams(found: Found) -> None:
+    assert found["account_relative"] < 1e-12 and found["account_fluid"] > 0.0
+    assert found["water"].max() > 150.0 and 25.0 < np.nanmax(found["temperature"]) < 321.0
+    assert found["counts"][2] > 20 and found["water"].min() > 10.0
+
+
 def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     """All that may not depend on ranks."""
     names = ("position_x", "velocity_y", "stress_xx", "stress_zz", "temperature", "mean_temperature",
@@ -109,5 +160,6 @@ def it_flows(found: Found) -> None:
 # Checkpoints after excavation, and after the blocks have begun to move.
 MODELS = {
     "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
+    "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703),
     "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503),
 }

@@ -83,7 +83,7 @@ def test_a_sub_step_against_plain_sums(second: float) -> None:
     sim.close_model()
     q, w = flow.values(CHANNEL, "flow_rate"), of_nodes(flow, "fluid")
     fluid.begin_cycle(1.0)
-    dt = 0.4 * fluid.limit
+    dt = 0.4 / fluid.rate
     fluid.begin_cycle(dt)
     fluid.advance(dt, heat.held_at(0.0))
     assert fluid.sub_steps == 1

@@ -3,8 +3,8 @@
 python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
-SOLVER-pumped: a joint that fluid opens by implicit steps, or SOLVER-cooled: a jointed bar that cools; one after
-the other. Files are RUN.npz.
+SOLVER-pumped: a joint that fluid opens by implicit steps, or SOLVER-cooled: a jointed bar that cools, or SOLVER-rinsed:
+rock that water cools; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from hpcdem.physics.flow import kernels
@@ -145,9 +146,45 @@ def cooled(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def rinsed(sim: Blocks, solver: str, out: str) -> None:
+    """Cold water flows through warm rock, whose parts touch along a crack."""
+    sim.take_mesh(shaken(rectangle(24, 6, 2.4, 0.6, kind="mixed"), 0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    mesh = sim.the_mesh()
+    x, y = mesh.points.T
+    ends = mesh.points[face_points(mesh.cells, joints := sim.numbers_of_joints(None))]
+    wet = (np.abs(ends[:, :, 1] - 0.3) < 0.06).all(axis=1)
+    flow = Flow.of(sim)
+    flow.assign(joints[wet], {**WATER, "aperature_initial": 5e-4, "fluid_bulk": 1e6})
+    changes.crack(sim, joints[(np.abs(ends[:, :, 0] - 1.2) < 0.06).all(axis=1)])
+    sim.parts(mechanical=False)
+    flow.fill(None, saturation=1.0)
+    network = flow.network.nodes
+    for end, pressure in ((x[network].min(), 100.0), (x[network].max(), 0.0)):
+        flow.prescribe(network[x[network] == end], kernels.PRESSURE, pressure)
+    with Coupled(sim, 1.0, "direct") as run:
+        run.steady()
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "transfer_coeficient": 20.0})
+    heat.initial(None, 60.0)
+    fluid = heat.of_fluid()
+    fluid.assign(None, {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 150.0})
+    heat.prescribe_fluid(network[x[network] == x[network].min()], 10.0)
+    run = Implicit(sim, solver)
+    for _ in range(10):
+        run.advance(1e3)
+    found = {"temperature": diagnostics.values(sim, "temperature"), "water": flow.values("flow-node", "temperature")}
+    found["account"] = np.array(list(heat.account().values())[:5])
+    run.steady()
+    run.close()
+    found["steady"] = flow.values("flow-node", "temperature")
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
 if __name__ == "__main__":
     for run in sys.argv[1:]:
         solver, _, kind = run.partition("-")
-        {"": excavation, "yields": stamp, "pumped": pumped, "cooled": cooled}[kind](
+        {"": excavation, "yields": stamp, "pumped": pumped, "cooled": cooled, "rinsed": rinsed}[kind](
             Blocks(communicator()), solver, f"{run}.npz"
         )

@@ -35,7 +35,7 @@ def runs(tmp_path_factory) -> Callable[[int, str], Found]:
         return found
 
     return lambda ranks, name: started(
-        ranks, *(name.split("-")[0] + kind for kind in ("", "-yields", "-pumped", "-cooled"))
+        ranks, *(name.split("-")[0] + kind for kind in ("", "-yields", "-pumped", "-cooled", "-rinsed"))
     )[name]
 
 
@@ -71,8 +71,17 @@ def test_cold_strains_the_joints(runs):
     assert np.nanmax(found["stress_xx"]) > 1e6 and np.nanmax(found["opening"]) > 1e-7
 
 
+def test_cold_water_cools_the_rock(runs):
+    found = runs(1, "direct-rinsed")
+    given, commands, stored, fluid, removed = found["account"]
+    assert abs(given + commands - stored - fluid - removed) < 1e-12 * stored and given < -1e5
+    assert found["water"].min() == 10.0 and 30.0 < found["water"].max() < 60.0
+    assert found["temperature"].max() > 59.0 and found["temperature"].min() < 40.0
+    assert found["steady"] == pytest.approx(10.0, abs=1e-6)
+
+
 @pytest.mark.mpi
-@pytest.mark.parametrize("name", ["direct", "direct-yields", "direct-pumped", "direct-cooled"])
+@pytest.mark.parametrize("name", ["direct", "direct-yields", "direct-pumped", "direct-cooled", "direct-rinsed"])
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=SLOW), 3, pytest.param(4, marks=SLOW)])
 def test_the_same_bits(runs, name, ranks):
     alone, found = runs(1, name), runs(ranks, name)

@@ -178,6 +178,9 @@ SAME: list[tuple[str, str]] = [
     ("pcdc face-joint c-model hydr-p-m property f-den 1000 f-bulk 2e9 vis 1e-6 a-initial 1e-5 a-min 1e-6 range crack",
      "sim.joints.model('hydr-p-m', fluid_density=1000, fluid_bulk=2e9, viscosity=1e-6, aperture_initial=1e-5, "
      "aperture_minimum=1e-6, where='crack')"),
+    ("pcdc face-joint c-model t-f property con 0.6 cap 4200 t-c 100 second-order on range crack",
+     "sim.joints.model('t-f', conductivity=0.6, capacity=4200, transfer_coeficient=100, second_order=True, "
+     "where='crack')"),
     ("pcdc node boundary hydra-c-f-b pressure table 'v' range id 1", "sim.nodes.fluid(pressure='v', where='id 1')"),
     ("pcdc node boundary hydra-c-f-b flow-surface 2", "sim.nodes.fluid(flow_surface=2)"),
     ("pcdc node boundary hydra-c-f-b flow-rate 2", "sim.nodes.fluid(flow_rate=2)"),

@@ -139,10 +139,9 @@ _OF_SEVERAL: dict[str, Callable[[np.ndarray], float]] = {
     "mean": lambda values: math.fsum(values.tolist()) / len(values), "minimum": np.min, "maximum": np.max,
 }  # fmt: skip
 ENERGIES = tuple(
-    name
-    for name, unit in UNITS[MODEL].items()
-    if (unit == "J/m" and not name.startswith("heat_")) or name == "heat_work"
-)
+    name for name, unit in UNITS[MODEL].items()
+    if unit == "J/m" and name not in ("heat_given", "heat_stored", "heat_in_fluid")
+)  # fmt: skip
 
 
 @dataclass

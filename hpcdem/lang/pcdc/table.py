@@ -244,9 +244,9 @@ _COEFFICIENTS = {
 ISO_HEAT = Model(
     "therm{al}-iso-h{eat}", "12",
     "Heat conduction and thermal expansion. It acts beside the mechanical model of the elements, all of which need it "
-    "where one has it. Heat crosses joints until they break, and from then on passes "
-    "from surface to surface where they touch, with a transfer coefficient. At the temperatures of this moment elements are free of "
-    "thermal stress. Temperatures are those of any scale of degrees.",
+    "where one has it. Heat crosses joints until they break, and from then on passes from surface to surface where "
+    "they touch, with a transfer coefficient. At the temperatures of this moment elements are free of thermal stress. "
+    "Temperatures are those of any scale of degrees.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
     of=HEAT_PROPERTIES,
@@ -883,7 +883,8 @@ _OBJECTS = (
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node", needs_option=True),
+                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
+            needs_option=True),
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
             manual=True),
@@ -1023,7 +1024,8 @@ _RECORDS = (
             (Option("x", (STRING,), "history along x; without it the time", default="time"),
              Option("y", (STRING,), "history along y"), Option("scale-x", (FLOAT,), "factor", default="1"),
              Option("scale-y", (FLOAT,), "factor", default="1"), Option("val{ues}", (VECTORS,), "points (x,y)"),
-             Option("prof{ile}", (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"),),
+             Option("prof{ile}",
+                    (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"),),
                     "of the fluid as it is now, along the line that the joints of the range make, over the distance "
                     "[m] from its left end"),
              Option("lab{el}", (STRING,), "in the legend"),

@@ -254,15 +254,17 @@ class Fluid:
         opens = across + np.where(gains, law[:, kernels.DILATE] * np.sign(slip), 0.0)[:, None] * along
         by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * opens[:, None, :]
         by_x = by_x.reshape(m, 8)  # of the aperture
+        first_row = 8 if self.flow.blocks.options.mechanical else 0  # blocks that stand still need no columns
         fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
-        out = np.zeros((m, 12, 12))
+        out = np.zeros((m, first_row + 4, first_row + 4))
         for end in range(2):
-            row = 8 + 2 * end
-            out[:, row, 8:12:2] = sign[end] * dt * by_u + leak_u
-            stored = half / delta * fill[ends[:, end]]
-            out[:, row, :8] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
+            row = first_row + 2 * end
+            out[:, row, first_row::2] = sign[end] * dt * by_u + leak_u
+            if first_row:
+                stored = half / delta * fill[ends[:, end]]
+                out[:, row, :8] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
             out[now.held[ends[:, end]], row, :] = 0.0
-        nodes = np.column_stack([self.at[mine], first + ends])
+        nodes = np.column_stack([self.at[mine], first + ends]) if first_row else first + ends
         return Pieces(self.channels[mine], nodes, out)
 
     def _face_pieces(self, u: np.ndarray, x: np.ndarray, first: int) -> Pieces:

@@ -339,7 +339,7 @@ class Flow(SurfaceLoad):
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
                 "saturation": self.state[: len(self.number), kernels.S], "fluid": self.nodes[:, kernels.W],
                 "volume": self.nodes[:, kernels.V], "inflow": self.nodes[:, kernels.INFLOW],
-                **{name: self._of_others(name) for name in _OF_OTHERS},
+                **{name: self._of_others(name)[: self.owned] for name in _OF_OTHERS},
             }  # fmt: skip
         else:
             blocks = self.blocks
@@ -357,9 +357,9 @@ class Flow(SurfaceLoad):
         return {name: made[name].copy() for name in ("number", *names)}
 
     def _of_others(self, name: str, copies: bool = False) -> np.ndarray:
-        """A quantity of other physics of this rank's flow nodes, NaN where there is none; with copies, then collective,
-        those of other ranks follow."""
-        own = self.more[name]().copy() if name in self.more else np.full(self.owned, math.nan)
+        """A quantity of other physics of the flow nodes held here, NaN where there is none; with copies, then
+        collective, those of other ranks too."""
+        own = self.more[name]() if name in self.more else np.full(self.owned, math.nan)
         out = np.append(own, np.full(len(self.held) - len(own), math.nan))
         if copies and self._copies is not None:
             kept = self.state[:, kernels.P].copy()
@@ -367,7 +367,7 @@ class Flow(SurfaceLoad):
             self._copies.refresh()
             out = self.state[:, kernels.P].copy()
             self.state[:, kernels.P] = kept
-        return out if copies else own
+        return out
 
     def places_of(self, channels: np.ndarray) -> np.ndarray:
         """Where channels (k,) are among those of this rank, -1: not there. Not collective."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -27,8 +27,17 @@ from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.properties import FLUID_HEAT
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
     from hpcdem.physics.flow.model import Flow
-    from hpcdem.physics.heat.model import Heat
+
+
+class Rock(Protocol):
+    """What the fluid asks of the heat of elements, see `Heat`."""
+
+    blocks: Blocks
+    t: np.ndarray
+    accounts: dict[str, float]
+
 
 SAFETY = 0.9
 """Part of the stability limit that a sub-step may be."""
@@ -50,7 +59,7 @@ class FluidHeat:
     kernels.FLUID_STATE): of them and of other ranks' nodes beside this rank's elements.
     """
 
-    def __init__(self, heat: Heat, flow: Flow) -> None:
+    def __init__(self, heat: Rock, flow: Flow) -> None:
         self.heat, self.flow, self.blocks = heat, flow, heat.blocks
         mesh = self.blocks.the_mesh()
         self.row = np.zeros(mesh.cells.size, np.int32)
@@ -61,7 +70,7 @@ class FluidHeat:
         self.state = np.empty((0, kernels.FLUID_STATE))
         self.rho_c = 0.0
         self.sub_steps = 0
-        self.limit = math.inf
+        self.rate = 0.0
         self._copies: Copies | None = None
         self._new = np.empty(0, np.int64)
         flow.carried = np.empty(0)
@@ -164,12 +173,12 @@ class FluidHeat:
         self._copies = Copies(comm, mine, wanted, owner, self.state)
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
-        self._ends = local[ends]
+        self._ends = np.ascontiguousarray(local[ends])
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
         one, other = (np.column_stack([f % 4, (f % 4 + 1) % corner_counts(cells[f // 4])]) for f in faces.T)
         corner = np.column_stack([one[:, 0], other[:, 1], one[:, 1], other[:, 0]])
         row = at[:, [0, 1, 0, 1]]
-        self._walls = np.where(row >= 0, row * self.heat.t.shape[1] + corner, -1)
+        self._walls = np.ascontiguousarray(np.where(row >= 0, row * self.heat.t.shape[1] + corner, -1))
         self._length = self.lengths(self.channels)
         self._exchange = 0.5 * self._length * self.transfers(self.channels)
         self.wall_heat = np.zeros((len(ends), 4))
@@ -248,10 +257,11 @@ class FluidHeat:
         q, aperture = flow.mean_flows(), flow.apertures()
         self._q = np.where(there, q[known], 0.0) if len(q) else np.zeros(len(known))
         delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
-        w, s = flow.nodes[:, flowing.W], flow.state[:n, flowing.S]
-        self._period, self._passed, self._w0 = period, 0.0, self.had.copy()
-        self.state[:n, kernels.X] = part(s)
-        self.state[:n, kernels.S], self.state[:n, kernels.FULL] = s, self.had
+        w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
+        least = np.minimum(w0, w)
+        self._period, self._passed, self._w0 = period, 0.0, w0.copy()
+        wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
+        self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
         ends = self._ends
         wet = np.minimum(self.state[ends[:, 0], kernels.S], self.state[ends[:, 1], kernels.S])
@@ -259,15 +269,29 @@ class FluidHeat:
         self._second = self.constant("second_order") > 0.0
         if self._second:
             self._look_upstream()
-        least = np.where(self._w0 > 0.0, np.minimum(self._w0, w), w)
-        into = np.bincount(ends[:, 1], np.maximum(self._q, 0.0), len(self.state))
-        into += np.bincount(ends[:, 0], np.maximum(-self._q, 0.0), len(self.state))
-        total = (2.0 if self._second else 1.0) * into[:n]
+        self.rate = self._least_rate(w0, w, least)
+
+    def _least_rate(self, w0: np.ndarray, w: np.ndarray, least: np.ndarray) -> float:
+        """Sub-steps of this cycle over its length [1/s] that keep temperatures between those around them: what flows
+        in and, of second order, out is never more than the node holds after a sub-step, as its fluid goes from w0 to
+        w (n,); least (n,): of both [m2]."""
+        ends, period, total = self._ends, self._period, len(self.state)
+        passes = np.zeros(len(w))
         for end in range(2):
-            total += np.bincount(ends[:, end], self._conduct, len(self.state))[:n] / self.rho_c
-        some = (total > 0.0) & (least > 0.0)
-        limit = float((least[some] / total[some]).min(initial=math.inf))
-        self.limit = float(self.blocks.comm.min_into(np.array([limit]))[0])
+            into = self._q if end else -self._q
+            counts = np.abs(into) if self._second else np.maximum(into, 0.0)
+            passes += np.bincount(ends[:, end], counts, total)[: len(w)]
+        more = np.maximum(w - w0, 0.0) / period if period > 0.0 else 0.0
+        there = least > 0.0
+        most = np.where(there, least, w)
+        rate = np.divide(np.where(there, np.maximum(passes - more, 0.0), 0.0), most, out=np.zeros(len(w)),
+                         where=most > 0.0)  # fmt: skip
+        drained = ~there & (w > 0.0)  # filled just now: what has come in is all that is there
+        rate[drained] = np.maximum(passes[drained] / w[drained] - 1.0 / period, 0.0)
+        for end in range(2):
+            passed = np.bincount(ends[:, end], self._conduct, total)[: len(w)]
+            rate += np.divide(passed, self.rho_c * least, out=np.zeros(len(w)), where=there)
+        return float(self.blocks.comm.max_into(np.array([rate.max(initial=0.0)]))[0])
 
     def _look_upstream(self) -> None:
         n = len(self.number)
@@ -279,11 +303,11 @@ class FluidHeat:
         """The fluid during a sub-step of the rock dt [s]; `wall_heat` (m, 4) [W/m] is the mean of what its walls get.
         table: prescribed temperatures."""
         n, t = len(self.number), self.heat.t.reshape(-1)
-        count = max(1, math.ceil(dt / (SAFETY * self.limit) * (1.0 - 1e-12)))
+        count = max(1, math.ceil(dt * self.rate / SAFETY * (1.0 - 1e-12)))
         if count > MANY:
             raise CommandError(
-                f"heat in the fluid would need {count} sub-steps of {self.limit:.3g} s in one of the rock of {dt:.3g} s: "
-                "model time-step thermal makes those shorter, model solve thermal takes implicit steps"
+                f"heat in the fluid would need {count} sub-steps in one of the rock of {dt:.3g} s: model "
+                "time-step thermal makes those shorter, model solve thermal takes implicit steps"
             )
         self.sub_steps = count
         w1 = self.flow.nodes[:, flowing.W]

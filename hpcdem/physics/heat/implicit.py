@@ -1,8 +1,9 @@
 """Implicit steps of heat, backward Euler, and the steady state: all nodes at once.
 
 (C / dt + K) (T' - T) = Q(T') with the conductances, capacities and conditions of the explicit steps, at the end of the
-step; fluid in channels, and surfaces that touch, are in the same system. Temperatures that are prescribed are put in first; what the others then lack is the right-hand side, so the answer
-is exact to rounding whatever the linear solver leaves: it is solved for twice.
+step; fluid in channels, and surfaces that touch, are in the same system. Temperatures that are prescribed are put in
+first; what the others then lack is the right-hand side, so the answer is exact to rounding whatever the linear solver
+leaves: it is solved for twice.
 
 Nodes of heat are known to all ranks meanwhile, as those of the blocks are in the static solve.
 """

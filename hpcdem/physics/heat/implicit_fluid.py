@@ -24,8 +24,8 @@ from hpcdem.physics.heat.model import Heat
 @dataclass
 class Fluid:
     """The network of a model as arrays. ends (m, 2): rows of nodes; q (m,) [m2/s]; conduct (m,), exchange (m, 2):
-    [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the rock, two at each end;
-    held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,): temperatures."""
+    [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the rock, two at each
+    end; held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,): temperatures."""
 
     of: FluidHeat
     ends: np.ndarray

@@ -107,11 +107,11 @@ def through_faces(corner, half, row, table, first, last, t, q, dt, given):
 def touching(first, second, start, free, element, cells, where, x, h, near, deep, wide, corner, weight, pass_on):
     """Where faces of bodies touch: how many places, and as many rows of the rest as there are.
 
-    first, second (m,): pairs of bodies; start, free, element (bodies,): see pairs.Bodies; h (rows,) [W/(m2 K)]: transfer
-    coefficients of the elements held here, of two bodies in contact the harmonic mean of both. Faces that look
+    first, second (m,): pairs of bodies; start, free, element (bodies,): see pairs.Bodies; h (rows,) [W/(m2 K)]:
+    transfer coefficients of the elements held here, of two bodies in contact the harmonic mean of both. Faces that look
     against each other pass heat on where their distance is at most `near` [m], their overlap at most `deep` [m]; half
-    of that length at each of its ends, where corner (n, 4) in t, flat, of `wide` columns, with weight (n, 4), negative on the second face,
-    give the difference of temperature; pass_on (n,) [W/(m K)].
+    of that length at each of its ends, where corner (n, 4) in t, flat, of `wide` columns, with weight (n, 4), negative
+    on the second face, give the difference of temperature; pass_on (n,) [W/(m K)].
     """
     n = 0
     for p in range(len(first)):
@@ -286,7 +286,7 @@ def faces(ends, q, length, second, dt, state, out):
         value = state[up, T]
         out[c] = value
         rise = state[down, T] - value
-        if second and rise != 0.0:
+        if second and rise != 0.0 and q[c] != 0.0 and state[up, FULL] > 0.0:
             r = (value - state[up, U]) / state[up, FROM] * length[c] / rise
             if r > 0.0:
                 out[c] = value + r / (1.0 + r) * rise * max(0.0, 1.0 - dt * abs(q[c]) / state[up, FULL])

@@ -599,8 +599,13 @@ class Heat(SurfaceLoad):
         period = o.mechanical or self._beside_flow()
         return (
             float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.heat_steps), o.heat_dt,
-            clock.dt if period else 0.0, self._limit,
+            clock.dt if period else 0.0, self._limit, self._of_fluid(),
         )  # fmt: skip
+
+    def _of_fluid(self) -> float:
+        """Time of a cycle of flow that heat goes with [s], 0: it does not."""
+        fluid = self.flowing if self.blocks.options.hydraulic else None
+        return fluid.flow.sub_steps * fluid.flow.dt if fluid is not None else 0.0
 
     def _find_step(self) -> None:
         """Sub-steps of a cycle and their length, from what was said and what is stable."""
@@ -613,6 +618,7 @@ class Heat(SurfaceLoad):
             period = o.flow_every * blocks.clock.dt if o.dynamic else 0.0
         else:
             period = blocks.clock.dt if self._beside_flow() else 0.0
+        period = self._of_fluid() or period
         if o.heat_dt > 0.0:
             self.sub_steps, self.dt = max(1, o.heat_steps), o.heat_dt
         elif period == 0.0:
@@ -672,7 +678,12 @@ class Heat(SurfaceLoad):
         if not self.rows or self._checked:
             return
         self.check_elements()
-        if self.on and o.mechanical and not o.dynamic and o.heat_dt == 0.0:
+        if self.on and o.heat_dt > 0.0 and self._of_fluid() > 0.0:
+            raise CommandError(
+                "heat in fluid goes with the time of flow: model time-step thermal 0, or model option hydraulic off for "
+                "water that flows on as it does now"
+            )
+        if self.on and o.mechanical and not o.dynamic and o.heat_dt == 0.0 == self._of_fluid():
             raise CommandError(
                 "in static runs time of heat passes by model time-step thermal, which comes first; or model option "
                 "thermal off leaves temperatures as they are"

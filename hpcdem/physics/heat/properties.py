@@ -15,8 +15,8 @@ ISO_HEAT = Model(
         Property("conductivity", "W/(m K)", "thermal conductivity", low_itself=False),
         Property("capacity", "J/(kg K)", "specific heat", low_itself=False),
         Property("transfer_coeficient", "W/(m2 K)", "heat transfer at faces: to an environment that is prescribed on "
-                 "them without a coefficient of its own, and to surfaces that they touch, with the harmonic mean of both",
-                 0.0),
+                 "them without a coefficient of its own, and to surfaces that they touch, with the harmonic mean of "
+                 "both", 0.0),
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),

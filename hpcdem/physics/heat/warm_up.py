@@ -9,9 +9,10 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.model import Heat
 
-GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5}
+GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5, "transfer_coeficient": 5.0}
 
 
 def warm_up(threads: int = 1) -> None:
@@ -23,4 +24,21 @@ def warm_up(threads: int = 1) -> None:
     heat.assign(None, GRANITE)
     heat.initial(np.array([0]), 20.0)
     heat.expose(None, flux=1.0)
+    changes.crack(sim, np.flatnonzero(sim.joint_exists()))
     sim.step()
+    _fluid()
+
+
+def _fluid() -> None:
+    """One channel between two nodes: its kernels, without those of the flow."""
+    begin, channel, side = np.array([0, 1, 2]), np.zeros(2, np.int64), np.array([-1.0, 1.0])
+    ends, walls, held = np.array([[0, 1]]), np.zeros((1, 4), np.int64), np.full(2, -1)
+    one, two, state = np.ones(1), np.ones(2), np.ones((2, kernels.FLUID_STATE))
+    face, out, wall_heat = np.empty(1), np.empty(2), np.zeros((1, 4))
+    kernels.upstream(begin, channel, side, ends, one, one, state[:2], state)
+    kernels.faces(ends, one, one, True, 1.0, state, face)
+    kernels.carry(
+        1.0, begin, channel, side, ends, one, face, one, walls, one, one, held, one, two, two, 1.0, state, out, out
+    )
+    kernels.to_walls(1.0, ends, walls, one, one, state, wall_heat)
+    kernels.from_walls(walls, wall_heat, one)
