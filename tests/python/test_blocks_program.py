@@ -402,7 +402,6 @@ WRONG = {
     "property of another model": ("sim.joints.property(young=3)", "joints.property: face-joint property has no young"),
     "no such model": ("sim.elements.model('elastic', density=1)", "elements.model: there is no model 'elastic'"),
     "model that is no text": ("sim.elements.model(3)", "elements.model: expected the name of a model, got 3"),
-    "model of later": ("sim.joints.model('hydraulic-porous-proppant-medium', proppant_size=1)", "is not there yet"),
     "incomplete model": ("sim.elements.model('mech-iso-elastic', density=1, young=3)",
                          "needs young and poisson_ratio or shear and bulk"),
     "missing property": ("sim.elements.model('mech-iso-elastic', young=3, poisson_ratio=0.2)", "needs density"),

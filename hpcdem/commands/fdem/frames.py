@@ -152,7 +152,9 @@ FLUID = {
 }  # fmt: skip
 """Columns of joints that are channels, and the quantities of channels in them."""
 OF_OTHERS = {
-    "fluid_temperature": "temperature", "proppant_concentration": "concentration", "pack_pressure": "pack_pressure",
+    "fluid_temperature": "temperature",
+    "proppant_concentration": "concentration",
+    "pack_pressure": "pack_pressure",
 }
 """The same of quantities that are there with further physics."""
 

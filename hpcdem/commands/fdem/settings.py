@@ -36,7 +36,7 @@ def option(
     proppant: bool | None = None,
 ) -> None:
     """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal, proppant: see `Blocks.parts`."""
+    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {

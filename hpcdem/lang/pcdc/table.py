@@ -313,8 +313,8 @@ FLUID_TEMPERATURE = Model(
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
 )  # fmt: skip
 PROPPANT_CONDITION = Model(
-    "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; times "
-    "of tables are those of flow. A node that is packed takes none.",
+    "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
+    "times of tables are those of flow. A node that is packed takes none.",
     (Option("p{roppant}-v{olumetric}-c{oncentration}", (TABLED,), "concentration of the slurry that conditions and "
             "wells bring: volume of grains over that of the slurry", "1"),
      Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that comes in at each node, in the "
@@ -873,7 +873,8 @@ _OBJECTS = (
              "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'",
              "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
-            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE), ranged="node"),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
+            ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),

@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 LEAST_PRESSURE = 1e4
 """p0 is at least this [Pa]."""
 ROUNDING = 1e-8
-"""Part of the fluid of a node that counts as flowing: where nothing flows any more the rest is rounding."""
+"""Part of the fluid of a node, and of what would flow if pressure and height did not balance, that counts as flowing:
+where nothing flows any more the rest is rounding."""
 
 
 @dataclass
@@ -182,7 +183,9 @@ class Fluid:
         dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
         held = step.known | out | dry
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
-        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
+        head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
+        level = np.bincount(self.end, (table[:, kernels.CONDUCT] * head)[self.both], self.n) * dt
+        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * (np.abs(fluid) + level)
         return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------

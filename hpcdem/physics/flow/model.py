@@ -347,7 +347,8 @@ class Flow(SurfaceLoad):
             mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
             ends, table = self._ends[mine], self._table[mine]
             self._find_flows(0.0)
-            others = {name: self._of_others(name, copies=True)[ends].mean(axis=1) for name in names if name in _OF_OTHERS}
+            wanted = [name for name in names if name in _OF_OTHERS]
+            others = {name: self._of_others(name, copies=True)[ends].mean(axis=1) for name in wanted}
             made = {
                 "number": self._channels[mine], "aperture": table[:, kernels.APERTURE], "flow_rate": self._q[mine],
                 "pressure": self.state[ends, kernels.P].mean(axis=1),

@@ -129,7 +129,9 @@ def move(begin, channel, side, ends, out, dt, part, limit, modulus, nodes, state
             c = channel[m]
             far = ends[c, 1] if side[m] < 0.0 else ends[c, 0]
             mine, its = (FORTH, BACK) if side[m] < 0.0 else (BACK, FORTH)
-            into += state[far, GIVES] * out[c, its] * state[i, TAKES] - state[i, GIVES] * out[c, mine] * state[far, TAKES]
+            comes = state[far, GIVES] * out[c, its] * state[i, TAKES]
+            leaves = state[i, GIVES] * out[c, mine] * state[far, TAKES]
+            into += comes - leaves
         nodes[i, N] = max(nodes[i, N] + dt * into, 0.0)
     settle(part, limit, modulus, nodes, state)
 

@@ -177,7 +177,8 @@ class Proppant(SurfaceLoad):
         self.blocks.close_model()
         comm, nodes = self.blocks.comm, self.nodes
         packed = self.state[: len(self.number), kernels.PACKED]
-        found = {"stored": exact_sum(nodes[:, kernels.N], comm), "packed": exact_sum(nodes[:, kernels.N] * packed, comm)}
+        n = nodes[:, kernels.N]
+        found = {"stored": exact_sum(n, comm), "packed": exact_sum(n * packed, comm)}
         for name, column in (("came", kernels.CAME), ("left", kernels.LEFT)):
             gone = self.accounts[name] if comm.rank == 0 else 0.0
             found[name] = exact_sum(np.append(nodes[:, column], gone), comm)
@@ -355,6 +356,7 @@ class Proppant(SurfaceLoad):
         nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
         nodes[:, kernels.ROOM] = np.minimum(flow.nodes[:, flowing.W], flow.nodes[:, flowing.V])
         ends, begin, channel, side = flow.links
+        assert flow.carried is not None
         q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
         if flow.implicit or self.cycles % LOOK == 0:
             least = kernels.fastest(begin, channel, side, self._out, q, table, abs(speed), nodes)
@@ -382,9 +384,7 @@ class Proppant(SurfaceLoad):
             kernels.give(begin, channel, side, self._out, short, nodes, self.state)
             self._refresh()
             for _ in range(SWEEPS):
-                kernels.take(
-                    begin, channel, side, ends, self._out, short, limit, part, nodes, self.state, self._takes
-                )
+                kernels.take(begin, channel, side, ends, self._out, short, limit, part, nodes, self.state, self._takes)
                 self.state[: len(nodes), kernels.TAKES] = self._takes
                 self._refresh()
             kernels.move(

@@ -12,9 +12,9 @@ def sub_step(
     ends: np.ndarray, q: np.ndarray, delta: np.ndarray, along: np.ndarray, held: np.ndarray, n: np.ndarray,
     room: np.ndarray, packed: np.ndarray, limit: float, dt: float, sweeps: int,
 ) -> np.ndarray:  # fmt: skip
-    """Proppant n (nodes,) [m2] after a sub-step dt [s]. ends (m, 2): nodes of channels; q (m,) [m2/s]: slurry that flows
-    from the first to the last; delta (m,) [m]; along (m,) [m/s]: speed of a single grain in that direction; held (m,)
-    bool: grains do not pass; room (nodes,) [m2]: slurry of nodes, packed (nodes,) bool; limit: concentration of a
+    """Proppant n (nodes,) [m2] after a sub-step dt [s]. ends (m, 2): nodes of channels; q (m,) [m2/s]: slurry that
+    flows from the first to the last; delta (m,) [m]; along (m,) [m/s]: speed of a single grain in that direction; held
+    (m,) bool: grains do not pass; room (nodes,) [m2]: slurry of nodes, packed (nodes,) bool; limit: concentration of a
     pack; sweeps: over the nodes, for what they take."""
     c = np.divide(n, room, out=np.zeros_like(n), where=room > 0.0)
     moves = []  # from, to, volume

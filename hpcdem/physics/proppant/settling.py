@@ -36,7 +36,8 @@ def terminal(size: float, density: float, fluid: float, viscosity: float, gravit
     def lacks(v: float) -> float:
         return drag(fluid * v * size / viscosity) * fluid * v * v - weight
 
-    v = brentq(lacks, 1e-9 * abs(slow), abs(slow), xtol=0.0, rtol=1e-14) if lacks(abs(slow)) > 0.0 else abs(slow)
+    most = abs(slow)  # what drags more is slower
+    v = brentq(lacks, 1e-9 * most, most, xtol=1e-15 * most, rtol=1e-14) if lacks(most) > 0.0 else most
     return math.copysign(v, slow)
 
 
