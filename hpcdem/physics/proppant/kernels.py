@@ -35,21 +35,22 @@ NEAR = 0.999
 def carry(ends, one, other, carries, x, q, channels, narrow, vx, vy, state, out):
     """What channels carry, out (m, 2) [m2/s]: volume rates of proppant. one, other (m,): where both faces begin in x;
     carries (m,) bool; q (m,): flow of slurry [m2/s]; narrow [m]: least aperture that grains pass; vx, vy: velocity of
-    a single grain [m/s]. None passes to or from a pack."""
+    a single grain [m/s]. Slurry that flows brings none into a pack and takes none out of it; grains settle into one that
+    is not quite full, and out of one with room below."""
     x = x.reshape(x.size)
     for c in range(len(ends)):
         a, b = ends[c, 0], ends[c, 1]
         forth = back = 0.0
         delta = channels[c, flowing.APERTURE]
-        free = state[a, PACKED] == 0.0 and state[b, PACKED] == 0.0
-        if carries[c] and delta >= narrow and free:
+        if carries[c] and delta >= narrow:
             i, j = one[c], other[c]
             wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
             wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
             along = (vx * wx + vy * wy) / math.sqrt(wx * wx + wy * wy)
             slip = along * delta * (1.0 - 0.5 * (state[a, C] + state[b, C])) ** HINDERED
-            forth = state[a, C] * (max(q[c], 0.0) + max(slip, 0.0))
-            back = state[b, C] * (max(-q[c], 0.0) + max(-slip, 0.0))
+            flow = q[c] if state[a, PACKED] == 0.0 and state[b, PACKED] == 0.0 else 0.0
+            forth = state[a, C] * (max(flow, 0.0) + max(slip, 0.0))
+            back = state[b, C] * (max(-flow, 0.0) + max(-slip, 0.0))
         out[c, FORTH], out[c, BACK] = forth, back
 
 

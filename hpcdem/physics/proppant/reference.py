@@ -19,8 +19,9 @@ def sub_step(
     c = np.divide(n, room, out=np.zeros_like(n), where=room > 0.0)
     moves = []  # from, to, volume
     for (a, b), flow, width, v, shut in zip(ends.tolist(), q, delta, along, held):
-        if shut or packed[a] or packed[b]:
+        if shut:
             continue
+        flow = 0.0 if packed[a] or packed[b] else flow
         slip = v * width * (1.0 - 0.5 * (c[a] + c[b])) ** 5.65
         moves.append((a, b, c[a] * (max(flow, 0.0) + max(slip, 0.0)) * dt))
         moves.append((b, a, c[b] * (max(-flow, 0.0) + max(-slip, 0.0)) * dt))
