@@ -13,7 +13,7 @@ from tests.proppant.support import OIL, nodes_up, over, profile, slot
 
 @pytest.mark.parametrize("reynolds", [0.01, 0.1, 1.0, 10.0, 77.0, 300.0, 999.0])
 def test_the_speed_is_that_of_the_correlation(reynolds: float) -> None:
-    """The other way round: a Reynolds number gives the drag, that the diameter by Archimedes' number, that the speed."""
+    """The other way round: a Reynolds number gives the drag, that the diameter by Archimedes' number."""
     density, fluid, viscosity, g = 2550.0, 1000.0, 1e-3, 9.81
     drag = 24.0 / reynolds * (1.0 + 0.15 * reynolds**0.687)
     archimedes = 0.75 * drag * reynolds**2
@@ -86,7 +86,8 @@ def test_a_pack_is_as_high_as_its_sand() -> None:
     ("fluid", "changes", "factor"),
     [
         ({}, {}, 1.0), ({}, {"proppant_density": 1825.0}, 0.5), ({}, {"proppant_size": 2.5e-4}, 0.25),
-        ({"viscosity": 2e-4}, {}, 0.5), ({"fluid_density": 1825.0}, {}, 0.274), ({}, {"proppant_density": 350.0}, -0.394),
+        ({"viscosity": 2e-4}, {}, 0.5), ({"fluid_density": 1825.0}, {}, 0.274),
+        ({}, {"proppant_density": 350.0}, -0.394),
     ],
 )  # fmt: skip
 def test_each_property_of_settling_acts(fluid: dict[str, float], changes: dict[str, float], factor: float) -> None:

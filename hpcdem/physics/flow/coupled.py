@@ -129,6 +129,8 @@ class Coupled:
         sim.close_model()
         if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
+        if flow.slurry is not None:
+            flow.slurry.check_start()
         self._take_nodes()
         if self.moves:
             equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)

@@ -87,6 +87,9 @@ class Slurry(Protocol):
 
     values: dict[str, float]
 
+    def check_start(self) -> None:
+        """CommandError if it cannot move in this run. Collective."""
+
     def thicken(self, ends: np.ndarray, table: np.ndarray) -> None:
         """Conductance and weight of this rank's channels, in place. Not collective."""
 

@@ -18,25 +18,29 @@ from hpcdem.physics.flow import kernels as flowing
 # of the pack on its walls [Pa].
 C, GIVES, TAKES, PACKED, PUSHES = range(5)
 STATE = 5
-# Columns of owned nodes (n, 6): proppant, what came and what left by conditions [m2]; room for slurry at the end of the
-# last step, and that now [m2]; what comes by conditions in a sub-step [m2], negative: part of the room that leaves.
-N, CAME, LEFT, ROOM_BEFORE, ROOM, SOURCE = range(6)
-NODE = 6
+# Columns of owned nodes (n, 7): proppant, what came and what left by conditions [m2]; room for slurry at the end of the
+# last step, and that now [m2]; what comes by conditions in a sub-step [m2], negative: part of the room that leaves; all
+# room between the walls [m2].
+N, CAME, LEFT, ROOM_BEFORE, ROOM, SOURCE, VOLUME = range(7)
+NODE = 7
 # Columns of what channels carry (m, 2) [m2/s]: from the first end, from the last.
 FORTH, BACK = range(2)
 HINDERED = 5.65
 FULL, LOOSE = 1e-6, 0.99
 """A node is packed from its limit less this on, until its concentration is below this part of the limit."""
+EMPTY = 0.1
+"""Part of the volume of a node below which its slurry does not shorten sub-steps."""
 NEAR = 0.999
 """Part of the limit beyond which the viscosity of a slurry does not grow."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carry(ends, one, other, carries, x, q, channels, narrow, vx, vy, state, out):
+def carry(ends, one, other, carries, x, q, channels, fluid, narrow, vx, vy, state, out):
     """What channels carry, out (m, 2) [m2/s]: volume rates of proppant. one, other (m,): where both faces begin in x;
-    carries (m,) bool; q (m,): flow of slurry [m2/s]; narrow [m]: least aperture that grains pass; vx, vy: velocity of
-    a single grain [m/s]. Slurry that flows brings none into a pack and takes none out of it; grains settle into one that
-    is not quite full, and out of one with room below."""
+    carries (m,) bool; q (m,): flow of slurry [m2/s]; fluid: state of the flow's nodes, grains settle in as much of a
+    channel as is filled at both ends; narrow [m]: least aperture that grains pass; vx, vy: velocity of
+    a single grain [m/s]. Slurry that flows brings none into a pack and takes none out of it; grains settle into one
+    that is not quite full, and out of one with room below."""
     x = x.reshape(x.size)
     for c in range(len(ends)):
         a, b = ends[c, 0], ends[c, 1]
@@ -47,7 +51,8 @@ def carry(ends, one, other, carries, x, q, channels, narrow, vx, vy, state, out)
             wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
             wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
             along = (vx * wx + vy * wy) / math.sqrt(wx * wx + wy * wy)
-            slip = along * delta * (1.0 - 0.5 * (state[a, C] + state[b, C])) ** HINDERED
+            filled = delta * min(fluid[a, flowing.S], fluid[b, flowing.S])
+            slip = along * filled * max(1.0 - 0.5 * (state[a, C] + state[b, C]), 0.0) ** HINDERED  # 0: crushed pack
             flow = q[c] if state[a, PACKED] == 0.0 and state[b, PACKED] == 0.0 else 0.0
             forth = state[a, C] * (max(flow, 0.0) + max(slip, 0.0))
             back = state[b, C] * (max(-flow, 0.0) + max(-slip, 0.0))
@@ -55,16 +60,17 @@ def carry(ends, one, other, carries, x, q, channels, narrow, vx, vy, state, out)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fastest(begin, channel, side, out, q, channels, speed, nodes):
-    """Shortest time [s] in which a node could lose its slurry: room over flow and settling out of it."""
+def fastest(begin, channel, side, q, channels, speed, fluid, nodes):
+    """Shortest time [s] in which a node could lose its slurry: room over flow and settling out of it. fluid (n,
+    flowing.NODE): of the nodes; of one that is nearly empty a part of its volume counts, its factor does the rest."""
     least = math.inf
     for i in range(len(nodes)):
         rate = 0.0
         for m in range(begin[i], begin[i + 1]):
             c = channel[m]
             rate += max(-side[m] * q[c], 0.0) + speed * channels[c, flowing.APERTURE]
-        if rate > 0.0 and nodes[i, ROOM] > 0.0:
-            least = min(least, nodes[i, ROOM] / rate)
+        if rate > 0.0:
+            least = min(least, max(nodes[i, ROOM], EMPTY * fluid[i, flowing.V]) / rate)
     return least
 
 
@@ -115,7 +121,7 @@ def take(begin, channel, side, ends, out, dt, limit, part, nodes, state, takes):
                 far = ends[c, 0]
                 leaves += state[i, GIVES] * out[c, BACK] * state[far, TAKES]
                 comes += state[far, GIVES] * out[c, FORTH]
-        room = nodes[i, ROOM_BEFORE] + part * (nodes[i, ROOM] - nodes[i, ROOM_BEFORE])
+        room = (1.0 - part) * nodes[i, ROOM_BEFORE] + part * nodes[i, ROOM]
         free = (limit * room - nodes[i, N]) + dt * leaves
         takes[i] = min(max(free, 0.0) / (dt * comes), 1.0) if comes > 0.0 else 1.0
 
@@ -139,11 +145,14 @@ def move(begin, channel, side, ends, out, dt, part, limit, modulus, nodes, state
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def settle(part, limit, modulus, nodes, state):
-    """Concentration, pack and its pressure of the owned nodes by their proppant and room."""
+    """Concentration, pack and its pressure of the owned nodes by their proppant and room. A pack is pressed by its
+    walls; of what fluid leaves it, it becomes no denser."""
     for i in range(len(nodes)):
-        room = nodes[i, ROOM_BEFORE] + part * (nodes[i, ROOM] - nodes[i, ROOM_BEFORE])
+        room = (1.0 - part) * nodes[i, ROOM_BEFORE] + part * nodes[i, ROOM]
         n = nodes[i, N]
-        c = n / room if room > 0.0 else 0.0
+        c = n / room if n > 0.0 and room > 0.0 else 0.0
+        if c > limit:  # fluid has gone from between the grains, or walls have come closer
+            c = max(limit, n / nodes[i, VOLUME])
         packed = state[i, PACKED] > 0.0
         packed = c >= LOOSE * limit if packed else c >= limit - FULL
         state[i, C], state[i, PACKED] = c, 1.0 if packed else 0.0

@@ -39,8 +39,11 @@ MANY = 100_000
 NO_STOKES = 1.0
 """Reynolds number of a single grain beyond which Stokes' law is far off."""
 CONCENTRATION, RATE = "concentration", "rate"
-_COLUMNS = ("proppant", "came", "left", "room", "given", "packed")
+_COLUMNS = ("proppant", "came", "left", "room", "volume", "given", "packed")
 """Of nodes, as they are saved; given: fluid that conditions had given."""
+
+
+_SAVED = [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM, kernels.VOLUME]
 
 
 class Proppant(SurfaceLoad):
@@ -120,6 +123,11 @@ class Proppant(SurfaceLoad):
                 raise CommandError(
                     f"there is one proppant in all channels, but {name} is {before[name]:g} and {values[name]:g}"
                 )
+        limit = values["proppant_concentration_limit"]
+        for row in np.unique(self.condition).tolist():
+            kind, value = self.conditions[row]
+            if kind == CONCENTRATION and said.checked(self.blocks.tables, value, kind).max() > limit:
+                raise CommandError(f"slurry that comes in would be thicker than a pack, {limit:g}: change it first")
         self.values = values
 
     def prescribe(self, nodes: np.ndarray | None, kind: str, value: Number) -> None:
@@ -235,28 +243,28 @@ class Proppant(SurfaceLoad):
         n, mine = len(self.number), flow.number
         wanted = flow.held[len(mine) :]
         had = np.column_stack([
-            self.nodes[:, [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM]], self.given,
+            self.nodes[:, _SAVED], self.given,
             self.state[:n, kernels.PACKED], np.ones(n),
         ])  # fmt: skip
         rows, owner = moved(comm, len(network.there), self.number, had, mine, wanted)
         self.number = mine.copy()
         self.nodes = np.zeros((len(mine), kernels.NODE))
-        self.nodes[:, [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM_BEFORE]] = rows[:, :4]
-        self.nodes[:, kernels.ROOM] = rows[:, 3]
-        self.given = rows[:, 4].copy()
+        self.nodes[:, _SAVED] = rows[:, :5]
+        self.nodes[:, kernels.ROOM_BEFORE] = self.nodes[:, kernels.ROOM]
+        self.given = rows[:, 5].copy()
         self.close()
         self.state = np.zeros((len(flow.held), kernels.STATE))
-        self.state[: len(mine), kernels.PACKED] = rows[:, 5]
+        self.state[: len(mine), kernels.PACKED] = rows[:, 6]
         self._copies = Copies(comm, mine, wanted, owner, self.state)
         self._held = flow.held
-        new = rows[:, 6] == 0.0
+        new = rows[:, 7] == 0.0
         if comm.any(bool(new.any())):
             self.given[new] = flow.nodes[new, flowing.GIVEN]
         lost = self.nodes[:, kernels.N] * (1.0 - flow.kept)
         self.nodes[:, kernels.N] -= lost
         if comm.any(bool(lost.any())):
             self.accounts["removed"] += exact_sum(lost, comm)
-            self.nodes[:, kernels.ROOM] *= flow.kept
+            self.nodes[:, [kernels.ROOM, kernels.VOLUME]] *= flow.kept[:, None]
         channels = flow.channels_here
         self._carries = self.carries[channels]
         self._out = np.zeros((len(channels), 2))
@@ -283,10 +291,17 @@ class Proppant(SurfaceLoad):
 
     def take_rooms(self) -> None:
         """Slurry of the nodes is as it is now, whatever commands have said. Not collective."""
-        room = np.minimum(self.flow.nodes[:, flowing.W], self.flow.nodes[:, flowing.V])
-        self.nodes[:, kernels.ROOM_BEFORE] = self.nodes[:, kernels.ROOM] = room
+        room = self._find_rooms()
+        self.nodes[:, kernels.ROOM_BEFORE] = room
         self.given = self.flow.nodes[:, flowing.GIVEN].copy()
         self.time = self.flow.time
+
+    def _find_rooms(self) -> np.ndarray:
+        """That for slurry is returned."""
+        volume = self.flow.nodes[:, flowing.V]
+        self.nodes[:, kernels.VOLUME] = volume
+        self.nodes[:, kernels.ROOM] = room = np.minimum(self.flow.nodes[:, flowing.W], volume)
+        return room
 
     def filled(self) -> None:
         """A command has given fluid to nodes, or taken it; their proppant stays."""
@@ -354,12 +369,12 @@ class Proppant(SurfaceLoad):
         """As long [s] as the fluid has flowed."""
         flow, v, o, nodes, comm = self.flow, self.values, self.blocks.options, self.nodes, self.blocks.comm
         nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
-        nodes[:, kernels.ROOM] = np.minimum(flow.nodes[:, flowing.W], flow.nodes[:, flowing.V])
+        self._find_rooms()
         ends, begin, channel, side = flow.links
         assert flow.carried is not None
         q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
         if flow.implicit or self.cycles % LOOK == 0:
-            least = kernels.fastest(begin, channel, side, self._out, q, table, abs(speed), nodes)
+            least = kernels.fastest(begin, channel, side, q, table, abs(speed), flow.nodes, nodes)
             least = float(comm.min_into(np.array([least]))[0])
             self.sub_steps = max(1, math.ceil(dt / (COURANT * least)))
             if self.sub_steps > MANY:
@@ -379,8 +394,9 @@ class Proppant(SurfaceLoad):
             part = k / count
             refused += kernels.pour(short, limit, nodes, self.state)
             kernels.carry(
-                ends, one, other, self._carries, self.blocks.x, q, table, narrow, vx, vy, self.state, self._out
-            )
+                ends, one, other, self._carries, self.blocks.x, q, table, flow.state, narrow, vx, vy, self.state,
+                self._out,
+            )  # fmt: skip
             kernels.give(begin, channel, side, self._out, short, nodes, self.state)
             self._refresh()
             for _ in range(SWEEPS):
@@ -442,8 +458,8 @@ class Proppant(SurfaceLoad):
 
     def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
         """What this rank's flow nodes hold."""
-        k = kernels
-        held = [*self.nodes[:, [k.N, k.CAME, k.LEFT, k.ROOM]].T, self.given, self.state[: len(self.number), k.PACKED]]
+
+        held = [*self.nodes[:, _SAVED].T, self.given, self.state[: len(self.number), kernels.PACKED]]
         columns = {name: np.ascontiguousarray(values) for name, values in zip(_COLUMNS, held)}
         return {"proppant_nodes": {"number": self.number, **columns}}
 
@@ -461,8 +477,7 @@ class Proppant(SurfaceLoad):
         made.number = nodes["number"].astype(np.int64)
         n = len(made.number)
         made.nodes = np.zeros((n, kernels.NODE))
-        columns = kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM
-        for name, column in zip(_COLUMNS, columns):
+        for name, column in zip(_COLUMNS, _SAVED):
             made.nodes[:, column] = nodes[name]
         made.given = np.array(nodes["given"])
         made.state = np.zeros((n, kernels.STATE))

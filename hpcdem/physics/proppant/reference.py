@@ -10,19 +10,19 @@ import numpy as np
 
 def sub_step(
     ends: np.ndarray, q: np.ndarray, delta: np.ndarray, along: np.ndarray, held: np.ndarray, n: np.ndarray,
-    room: np.ndarray, packed: np.ndarray, limit: float, dt: float, sweeps: int,
+    room: np.ndarray, packed: np.ndarray, wet: np.ndarray, limit: float, dt: float, sweeps: int,
 ) -> np.ndarray:  # fmt: skip
     """Proppant n (nodes,) [m2] after a sub-step dt [s]. ends (m, 2): nodes of channels; q (m,) [m2/s]: slurry that
     flows from the first to the last; delta (m,) [m]; along (m,) [m/s]: speed of a single grain in that direction; held
-    (m,) bool: grains do not pass; room (nodes,) [m2]: slurry of nodes, packed (nodes,) bool; limit: concentration of a
-    pack; sweeps: over the nodes, for what they take."""
+    (m,) bool: grains do not pass; room (nodes,) [m2]: slurry of nodes, packed (nodes,) bool, wet (nodes,): saturation;
+    limit: concentration of a pack; sweeps: over the nodes, for what they take."""
     c = np.divide(n, room, out=np.zeros_like(n), where=room > 0.0)
     moves = []  # from, to, volume
     for (a, b), flow, width, v, shut in zip(ends.tolist(), q, delta, along, held):
         if shut:
             continue
         flow = 0.0 if packed[a] or packed[b] else flow
-        slip = v * width * (1.0 - 0.5 * (c[a] + c[b])) ** 5.65
+        slip = v * width * min(wet[a], wet[b]) * max(1.0 - 0.5 * (c[a] + c[b]), 0.0) ** 5.65
         moves.append((a, b, c[a] * (max(flow, 0.0) + max(slip, 0.0)) * dt))
         moves.append((b, a, c[b] * (max(-flow, 0.0) + max(-slip, 0.0)) * dt))
     leaves = np.zeros_like(n)
