@@ -13,10 +13,10 @@ from hpcdem.cases.water import WARM, Warm
 
 @dataclass(frozen=True)
 class Breakthrough:
-    """breakthrough [s]: of the front on the straight way, closed form; quarter, exact_quarter [s]: when a quarter of the
-    difference of temperature has come, found and closed form; error: largest difference of the temperature of the water
-    that comes up from the closed form, from 1.5 times the breakthrough on, over that between the wells; curve: (time
-    [s], part of the difference that has come, of the closed form); account: what of the heat does not add up;
+    """breakthrough [s]: of the front on the straight way, closed form; quarter, exact_quarter [s]: when a quarter of
+    the difference of temperature has come, found and closed form; error: largest difference of the temperature of the
+    water that comes up from the closed form, from 1.5 times the breakthrough on, over that between the wells; curve:
+    (time [s], part of the difference that has come, of the closed form); account: what of the heat does not add up;
     elements."""
 
     breakthrough: float
@@ -115,7 +115,8 @@ quarter = float(np.interp(0.25, came, times)) if came[-1] > 0.25 else math.inf
 exact_quarter = float(np.interp(0.25, angle / math.pi, arrival))
 account, elements = pcdc.heat['relative'], len(pcdc.numbers('element'))
 print('front on the straight way after %.3g years; a quarter has come after %.3g, closed form %.3g years; from 1.5 '
-      'times the front on at most %.3g %% off' % (breakthrough / year, quarter / year, exact_quarter / year, 100 * error))
+      'times the front on at most %.3g %% off'
+      % (breakthrough / year, quarter / year, exact_quarter / year, 100 * error))
 pcdc output vtk 'doublet'
 pcdc chart create 'doublet' x-label 'time (years)' y-label 'part of the inflow in what comes up (1)'
 pcdc chart add 'doublet' values [[(t / year, e) for t, _, e in curve]] label 'stream lines alone'
