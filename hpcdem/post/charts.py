@@ -103,7 +103,10 @@ def _beside(model: MeshState, panel: str) -> tuple[Any, Any]:
         modes = blocks.panel(left, model, seen, 2.54 * width)
     for axes, label in ((left, "(a)"), (right, "(b)")):
         axes.set_title(label, loc="left", fontsize=FONT, pad=3.0)
-    if modes:  # over the diagram there is room for all of them in one line
+    if modes and coloured:
+        left.legend(handles=modes, loc="lower right", fontsize=0.75 * FONT, borderaxespad=0.3, framealpha=0.9,
+                    edgecolor="none", handlelength=1.2, handletextpad=0.4)  # fmt: skip
+    elif modes:  # over the diagram there is room for all of them in one line
         tight = len(modes) > 2
         figure.legend(
             handles=modes, loc="lower right", bbox_to_anchor=(1.0, 1.0), bbox_transform=right.transAxes, ncols=4,

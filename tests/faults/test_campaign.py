@@ -26,18 +26,19 @@ QUICK = (
 
 
 @pytest.mark.alone
-def test_a_dozen_faults(tmp_path: Path) -> None:
+@pytest.mark.parametrize("names", [QUICK[::2], pytest.param(QUICK, marks=pytest.mark.slow)], ids=["half", "all"])
+def test_a_dozen_faults(names: tuple[str, ...], tmp_path: Path) -> None:
     """All runs, of particles, blocks and both by turns, come to the same end. One rank; two runs at a time."""
     paths = [str(ROOT / "scripts" / "lib"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    kinds = [word for name in QUICK for word in ("--kind", name)]
+    kinds = [word for name in names for word in ("--kind", name)]
     lines = tmp_path / "lines.json"
-    command = [sys.executable, "-m", "faults", "--number", str(len(QUICK)), "--seed", "7", "--ranks", "1", *kinds]
+    command = [sys.executable, "-m", "faults", "--number", str(len(names)), "--seed", "7", "--ranks", "1", *kinds]
     done = run([*command, "--json", str(lines)], tmp_path, env={"PYTHONPATH": os.pathsep.join(paths)}, timeout=900)
     assert done.returncode == 0, done.stderr
     rows = [json.loads(line) for line in lines.read_text().splitlines()]
-    assert {row["kind"] for row in rows} == set(QUICK)
+    assert {row["kind"] for row in rows} == set(names)
     assert {row["result"] for row in rows} <= {"survived", "refused", "missed"}
-    assert sum(row["result"] == "survived" for row in rows) >= 8
+    assert sum(row["result"] == "survived" for row in rows) >= 2 * len(names) // 3
     assert {row["model"] for row in rows} == set(MODELS)
     page = tmp_path / "page.md"
     page.write_text(f"before\n{report.BEGIN}\nold\n{report.END}\nafter\n")
