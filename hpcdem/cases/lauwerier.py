@@ -42,8 +42,8 @@ class Lauwerier(Warm):
     along: float = quantity(
         1e-3, "1", "conductivity of the rock along the fracture over that across; the closed form has none", gt=0
     )
-    inflow_temperature: float = quantity(20.0, "K", "of the water that comes in, on any scale of degrees")
-    rock_temperature: float = quantity(100.0, "K", "of rock and water at the beginning")
+    inflow_temperature: float = quantity(293.15, "K", "of the water that comes in", gt=0)
+    rock_temperature: float = quantity(373.15, "K", "of rock and water at the beginning", gt=0)
     first: float = quantity(50.0, "days", "the first of two times", gt=0)
     second: float = quantity(150.0, "days", "the second one", gt=0)
     aside: float = quantity(5.0, "m", "distance from the fracture at which the rock is looked at", gt=0)
@@ -125,7 +125,7 @@ for time in (first * day, second * day):
     days = '%g days' % (time / day)
     line = [(k * length / 100, float(closed_form(np.float64(k * length / 100), 0.0, time))) for k in range(101)]
     if time == first * day:
-        pcdc chart create 'lauwerier' x-label 'along the fracture (m)' y-label 'part of the inflow in temperature (1)'
+        pcdc chart create 'lauwerier' x-label 'distance along the fracture (m)' y-label 'relative cooling of the water (1)'
     pcdc chart add 'lauwerier' values [line] label ['Lauwerier, ' + days]
     points = [(float(a), float(b)) for a, b in zip(xs[at][order][::8], t[order][::8])]
     pcdc chart add 'lauwerier' values [points] label ['water, ' + days] style points
