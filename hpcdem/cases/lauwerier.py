@@ -39,9 +39,7 @@ class Lauwerier(Warm):
     coarse: float = quantity(5.0, "m", "edges far from it", gt=0)
     aperture: float = quantity(1e-3, "m", "hydraulic aperture of the fracture", gt=0)
     speed: float = quantity(0.01, "m/s", "of the water", gt=0)
-    along: float = quantity(
-        1e-3, "1", "conductivity of the rock along the fracture over that across; the closed form has none", gt=0
-    )
+    along: float = quantity(1e-3, "1", "conductivity of the rock along the fracture over that across", gt=0)
     inflow_temperature: float = quantity(293.15, "K", "of the water that comes in", gt=0)
     rock_temperature: float = quantity(373.15, "K", "of rock and water at the beginning", gt=0)
     first: float = quantity(50.0, "days", "the first of two times", gt=0)
@@ -125,7 +123,8 @@ for time in (first * day, second * day):
     days = '%g days' % (time / day)
     line = [(k * length / 100, float(closed_form(np.float64(k * length / 100), 0.0, time))) for k in range(101)]
     if time == first * day:
-        pcdc chart create 'lauwerier' x-label 'distance along the fracture (m)' y-label 'relative cooling of the water (1)'
+        pcdc chart create 'lauwerier' x-label 'distance along the fracture (m)' \\
+            y-label 'relative cooling of the water (1)'
     pcdc chart add 'lauwerier' values [line] label ['Lauwerier, ' + days]
     points = [(float(a), float(b)) for a, b in zip(xs[at][order][::8], t[order][::8])]
     pcdc chart add 'lauwerier' values [points] label ['water, ' + days] style points

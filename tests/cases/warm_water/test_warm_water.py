@@ -4,6 +4,7 @@ draw (9.14: Lauwerier 1955; Gringarten & Sauty 1975, without caprock), and again
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
 
@@ -43,7 +44,7 @@ def test_cold_comes_through_between_two_wells(launch, tmp_path):
         assert one.account < 1e-9 and one.error < 0.08
         assert one.quarter == pytest.approx(one.exact_quarter, rel=0.2)
         came = [part for _, part, _ in one.curve]
-        assert 0.0 <= min(came) < 1e-3 and all(b >= a - 1e-12 for a, b in zip(came, came[1:])) and came[-1] < 1.0
+        assert 0.0 <= min(came) < 1e-3 and all(b >= a - 1e-12 for a, b in pairwise(came)) and came[-1] < 1.0
     assert half.breakthrough == pytest.approx(2.0 * done.breakthrough, rel=1e-12)
     assert half.quarter == pytest.approx(2.0 * done.quarter, rel=0.05)
     assert (tmp_path / "all" / "data" / "doublet.png").stat().st_size > 5000
