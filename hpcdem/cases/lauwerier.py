@@ -13,10 +13,10 @@ from hpcdem.cases.water import WARM, Warm
 
 @dataclass(frozen=True)
 class Front:
-    """error: largest difference of the water's temperature from the closed form at the times asked for, over that between
-    inflow and beginning; rock_error: the same of the rock at the distance `aside`; water, rock: (time [s], distance along
-    the fracture [m], part of the difference of temperature, of the closed form) at quarters of the way; account: what of
-    the heat does not add up."""
+    """error: largest difference of the water's temperature from the closed form at the times asked for, over that
+    between inflow and beginning; rock_error: the same of the rock at the distance `aside`; water, rock: (time [s],
+    distance along the fracture [m], part of the difference of temperature, of the closed form) at quarters of the way;
+    account: what of the heat does not add up."""
 
     error: float
     rock_error: float
@@ -39,10 +39,9 @@ class Lauwerier(Warm):
     coarse: float = quantity(5.0, "m", "edges far from it", gt=0)
     aperture: float = quantity(1e-3, "m", "hydraulic aperture of the fracture", gt=0)
     speed: float = quantity(0.01, "m/s", "of the water", gt=0)
-    along: float = quantity(1e-3, "1", "conductivity of the rock along the fracture over that across; the closed form has "
-                            "none", gt=0)  # fmt: skip
-    inflow_temperature: float = quantity(20.0, "K", "of the water that comes in, on any scale of degrees")
-    rock_temperature: float = quantity(100.0, "K", "of rock and water at the beginning")
+    along: float = quantity(1e-3, "1", "conductivity of the rock along the fracture over that across", gt=0)
+    inflow_temperature: float = quantity(293.15, "K", "of the water that comes in", gt=0)
+    rock_temperature: float = quantity(373.15, "K", "of rock and water at the beginning", gt=0)
     first: float = quantity(50.0, "days", "the first of two times", gt=0)
     second: float = quantity(150.0, "days", "the second one", gt=0)
     aside: float = quantity(5.0, "m", "distance from the fracture at which the rock is looked at", gt=0)
@@ -124,7 +123,8 @@ for time in (first * day, second * day):
     days = '%g days' % (time / day)
     line = [(k * length / 100, float(closed_form(np.float64(k * length / 100), 0.0, time))) for k in range(101)]
     if time == first * day:
-        pcdc chart create 'lauwerier' x-label 'along the fracture (m)' y-label 'part of the inflow in temperature (1)'
+        pcdc chart create 'lauwerier' x-label 'distance along the fracture (m)' \\
+            y-label 'relative cooling of the water (1)'
     pcdc chart add 'lauwerier' values [line] label ['Lauwerier, ' + days]
     points = [(float(a), float(b)) for a, b in zip(xs[at][order][::8], t[order][::8])]
     pcdc chart add 'lauwerier' values [points] label ['water, ' + days] style points

@@ -32,7 +32,8 @@ class Warm(Case):
 
 WARM = """\
 pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 1e6 \\
-    viscosity [viscosity/fluid_density] aperature-initial [aperture] aperature-minumum [0.5*aperture] RANGE
+    viscosity [viscosity/fluid_density] aperature-initial [aperture] \\
+    aperature-minumum [0.5*aperture] RANGE
 pcdc face-joint c-model t-f property conductivity [fluid_conductivity] capacity [fluid_capacity] \\
     transfer-coeficient [exchange] RANGE
 pcdc model option mechanical off                 # the rock stands still

@@ -38,6 +38,7 @@ MOST_EDGES = 4000
 NEAR = 1e-3
 """Corners nearer than this part of an edge share the mean of their stress."""
 LEVELS = 14
+ROUNDING = 1e-3  # of a step between contours: values that are so little outside are at the edge
 _LEFT, _BOTTOM, _TOP, _GAP, _BAR = 1.25, 1.05, 1.0, 0.5, 1.6  # cm around the panels, between them, for the colours
 
 
@@ -357,7 +358,7 @@ def lines(axes: Any, ends: np.ndarray, shade: str, width: float) -> None:
 CONTOURS = {
     STRESS: Contours(compression, stress_range, fluid.PRESSURES, "compressive stress", "YlOrBr"),
     PLASTIC: Contours(plastic_shear, plastic_range, ((0.01, "%"),), "plastic shear strain", "YlGn"),
-    TEMPERATURE: Contours(temperature, temperature_range, ((1.0, "K"),), "temperature", "inferno_r", of_corners=True),
+    TEMPERATURE: Contours(temperature, temperature_range, ((1.0, "K"),), "temperature", "RdYlBu_r", of_corners=True),
 }
 COLOURED: dict[str, Contours | fluid.Shown] = {**CONTOURS, **fluid.PICTURES}
 """Panels with a bar of colours."""
@@ -382,7 +383,10 @@ def contours(axes: Any, state: MeshState, shown: Contours, span: tuple[float, fl
     levels = nice_levels(span[0] / unit, span[1] / unit)
     points, triangles, values = (cornered if shown.of_corners else smoothed)(state, shown.values(state))
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
-    filled = axes.tricontourf(mesh, values / unit, levels=levels, cmap=shown.colours, extend="both", zorder=1)
+    values, slack = values / unit, ROUNDING * (levels[1] - levels[0])
+    inside = (values > levels[0] - slack) & (values < levels[-1] + slack)
+    values = np.where(inside, np.clip(values, levels[0], levels[-1]), values)
+    filled = axes.tricontourf(mesh, values, levels=levels, cmap=shown.colours, extend="both", zorder=1)
     joints = state.of_joints.get("state", np.empty(0))
     broken = (joints == BROKEN) | (joints == FREE)
     lines(axes, state.points[state.joints[broken]], INK, 0.5)
@@ -400,7 +404,7 @@ def nice_levels(low: float, high: float) -> np.ndarray:
     spread = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     power = 10.0 ** math.floor(math.log10(spread / LEVELS))
     step = next(s * power for s in (1.0, 2.0, 2.5, 5.0, 10.0) if spread / (s * power) <= LEVELS)
-    first, last = math.floor(low / step + 1e-9), math.ceil(high / step - 1e-9)
+    first, last = math.floor(low / step + ROUNDING), math.ceil(high / step - ROUNDING)
     return step * np.arange(first, max(last, first + 1) + 1)
 
 

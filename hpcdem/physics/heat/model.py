@@ -680,8 +680,8 @@ class Heat(SurfaceLoad):
         self.check_elements()
         if self.on and o.heat_dt > 0.0 and self._of_fluid() > 0.0:
             raise CommandError(
-                "heat in fluid goes with the time of flow: model time-step thermal 0, or model option hydraulic off for "
-                "water that flows on as it does now"
+                "heat in fluid goes with the time of flow: model time-step thermal 0, or model option hydraulic off "
+                "for water that flows on as it does now"
             )
         if self.on and o.mechanical and not o.dynamic and o.heat_dt == 0.0 == self._of_fluid():
             raise CommandError(
