@@ -854,7 +854,7 @@ class Charts(Words):
     ) -> None:
         """A curve of history y against history x (or time), of points, or of what fluid has now along the line of
         channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity",
-        "temperature"); style: "line" or "points"."""
+        "temperature", "concentration"); style: "line" or "points"."""
         given = {
             "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values,
             "profile": None if profile is None else _script_word(profile), "label": label, "style": style,
@@ -870,8 +870,8 @@ class Charts(Words):
         fluid: str | None = None,
         temperature: bool = False,
     ) -> None:
-        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture"
-        or "velocity"): beside it the model as it is now, with one of them."""
+        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture",
+        "velocity" or "concentration"): beside it the model as it is now, with one of them."""
         given = {
             "name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid,
             "temperature": temperature,

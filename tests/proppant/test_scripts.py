@@ -14,6 +14,8 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.proppant.model import Proppant
+from hpcdem.post import blocks
+from tests.flow.test_pictures import coloured
 from tests.pcdc.fake import Bench, Noted
 
 MEDIUM = "f-den 1000 f-bulk 2.2e9 vis 1e-6 a-initial 1e-2 a-min 1e-3 p-den 2650 p-s 5e-4 p-c-l 0.6"
@@ -54,8 +56,25 @@ def test_slurry_is_pumped_through_a_slot(tmp_path: Path) -> None:
     number, c = frame.of_joints["number"], frame.of_joints["proppant_concentration"]
     channels = fdem.queries.numbers(model, CHANNEL)
     assert c[np.isin(number, channels)] == pytest.approx(fdem.queries.values(model, CHANNEL, "concentration"))
+    assert "concentration" in blocks.panels_of(frame)
+    (seen,) = coloured(blocks.draw(frame, blocks.Looks(("concentration",))))
+    assert np.sort(np.asarray(seen)) == pytest.approx(np.sort(c[np.isfinite(c)]))
     assert np.nanmax(c) > 0.05 and not np.nanmax(frame.of_joints["pack_pressure"]) > 0.0
     assert fdem.queries.values(model, FLOW_NODE, "proppant").sum() == pytest.approx(account["stored"])
+
+
+def test_a_diagram_shows_where_it_is(tmp_path: Path) -> None:
+    chart = """
+pcdc model solve hydraulic time 100 dt 1
+pcdc chart create 'sand'
+pcdc chart add 'sand' profile concentration range x 0.2 0.2
+pcdc chart export 'sand' 'sand.png' fluid concentration
+"""
+    found = bench(tmp_path, FLOW + chart)
+    (curve,) = found.project.charts["sand"].curves
+    along, c = np.array(curve.points).T
+    assert (along[0], along[-1]) == (0.0, 2.0) and c[0] > 0.09 > 0.01 > c[-1]
+    assert found.project.result("sand.png").stat().st_size > 10_000
 
 
 def test_a_well_brings_it_too(tmp_path: Path) -> None:
@@ -97,11 +116,11 @@ def test_stokes_is_told_apart(tmp_path: Path) -> None:
     """Both laws are in the log, with the Reynolds number."""
     said = {}
     for stokes in ("off", "on"):
-        blocks = Blocks(SerialComm())
-        blocks.log = Noted()
+        sim = Blocks(SerialComm())
+        sim.log = Noted()
         more = f"pcdc face-joint property proppant-stokes {stokes}\npcdc model solve hydraulic time 1 dt 1\n"
-        Bench(tmp_path, blocks=blocks)(SCRIPT + more)
-        said[stokes] = "\n".join(blocks.log.lines)
+        Bench(tmp_path, blocks=sim)(SCRIPT + more)
+        said[stokes] = "\n".join(sim.log.lines)
     assert "after Schiller and Naumann, Reynolds number" in said["off"] and "does not hold" not in said["off"]
     assert "Stokes' law does not hold; after Schiller and Naumann a grain settles by" in said["on"]
 

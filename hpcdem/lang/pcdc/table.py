@@ -1026,7 +1026,8 @@ _RECORDS = (
              Option("y", (STRING,), "history along y"), Option("scale-x", (FLOAT,), "factor", default="1"),
              Option("scale-y", (FLOAT,), "factor", default="1"), Option("val{ues}", (VECTORS,), "points (x,y)"),
              Option("prof{ile}",
-                    (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"),),
+                    (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature",
+                            "concentration"),),
                     "of the fluid as it is now, along the line that the joints of the range make, over the distance "
                     "[m] from its left end"),
              Option("lab{el}", (STRING,), "in the legend"),
@@ -1038,8 +1039,8 @@ _RECORDS = (
             (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
              Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
              Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
-             Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity"),), "beside it the model as it "
-                    "is now, its channels coloured by that"))),
+             Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
+                    "beside it the model as it is now, its channels coloured by that"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
