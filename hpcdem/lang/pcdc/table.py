@@ -385,7 +385,13 @@ _GRAINS = tuple(
         "p{roppant}-sto{kes}", also={"aperature-factor": ("a{perture}-f{actor}",)}, uniform=True,
     )
 )  # fmt: skip
-GRAINS = Model("", "17", "", _GRAINS, of=PROPPANT_PROPERTIES)
+GRAINS = Model(
+    "",
+    "17",
+    "",  # p-s is the penalty of shear where cohesive models are changed too
+    tuple(replace(o, notation="prop{pant}-s{ize}") if o.name == "proppant-size" else o for o in _GRAINS),
+    of=PROPPANT_PROPERTIES,
+)
 PROPPANT = Model(
     "hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17",
     "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier and "

@@ -409,7 +409,7 @@ class Coupled:
         now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.n, 2))
         right[len(x) :, 0] = -now.residual
-        sizes = float(now.sizes.sum())
+        sizes = float((now.sizes + now.rounding).sum())
         lack = float(np.abs(now.residual).sum()) / sizes if sizes > 0.0 else 0.0
         if not math.isfinite(lack):
             return math.inf, right, now

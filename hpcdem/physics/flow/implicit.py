@@ -40,14 +40,16 @@ where nothing flows any more the rest is rounding."""
 class Balance:
     """A state of the fluid at trial positions and variables.
 
-    residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; fluid, volume
-    (n,) [m2]; state (n, kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a
-    complementarity; table (m, kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
+    residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; rounding:
+    what else counts as such, where pressure and height nearly balance; fluid, volume (n,) [m2]; state (n,
+    kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; table (m,
+    kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
     """
 
     residual: np.ndarray
     plain: np.ndarray
     sizes: np.ndarray
+    rounding: np.ndarray
     fluid: np.ndarray
     volume: np.ndarray
     state: np.ndarray
@@ -185,8 +187,8 @@ class Fluid:
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
         head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
         level = np.bincount(self.end, (table[:, kernels.CONDUCT] * head)[self.both], self.n) * dt
-        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * (np.abs(fluid) + level)
-        return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
+        sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
+        return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, table, q, lost)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------
 
