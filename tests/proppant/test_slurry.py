@@ -195,11 +195,12 @@ def test_kernels_compute_what_the_plain_loop_does() -> None:
         own.carry(ends[k : k + 1], one[k : k + 1], other[k : k + 1], carries[k : k + 1], x, q[k : k + 1],
                   table[k : k + 1], fluid, 2e-3, along[k], 0.0, state, out[k : k + 1])  # fmt: skip
     own.give(begin, channel, side, out, dt, nodes, state)
+    own.come(begin, channel, side, ends, out, dt, nodes, state)
     for _ in range(4):
         own.take(begin, channel, side, ends, out, dt, 0.6, 1.0, nodes, state, takes)
         state[:, own.TAKES] = takes
     before = nodes[:, own.N].copy()
-    own.move(begin, channel, side, ends, out, dt, 1.0, 0.6, 0.0, nodes, state)
+    own.move(begin, channel, side, ends, out, dt, 1.0, 0.6, -2.5, 0.0, nodes, state)
     held = ~carries | (delta < 2e-3)
     wanted = sub_step(ends, q, delta, along, held, before, room, packed, fluid[:, kernels.S], 0.6, dt, 4)
     assert nodes[:, own.N] == pytest.approx(wanted, rel=1e-12, abs=1e-20)

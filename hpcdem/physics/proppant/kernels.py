@@ -14,15 +14,15 @@ from numba import njit
 
 from hpcdem.physics.flow import kernels as flowing
 
-# Columns of nodes, copies too (n, 5): concentration, factors of what leaves and what comes, 1 if it is packed, pressure
-# of the pack on its walls [Pa].
-C, GIVES, TAKES, PACKED, PUSHES = range(5)
-STATE = 5
-# Columns of owned nodes (n, 7): proppant, what came and what left by conditions [m2]; room for slurry at the end of the
+# Columns of nodes, copies too (n, 6): concentration, factors of what leaves and what comes, 1 if it is packed, pressure
+# of the pack on its walls [Pa], viscosity of the slurry over that of the fluid.
+C, GIVES, TAKES, PACKED, PUSHES, THICK = range(6)
+STATE = 6
+# Columns of owned nodes (n, 8): proppant, what came and what left by conditions [m2]; room for slurry at the end of the
 # last step, and that now [m2]; what comes by conditions in a sub-step [m2], negative: part of the room that leaves; all
-# room between the walls [m2].
-N, CAME, LEFT, ROOM_BEFORE, ROOM, SOURCE, VOLUME = range(7)
-NODE = 7
+# room between the walls [m2]; what channels bring in a sub-step if it finds room [m2].
+N, CAME, LEFT, ROOM_BEFORE, ROOM, SOURCE, VOLUME, COMES = range(8)
+NODE = 8
 # Columns of what channels carry (m, 2) [m2/s]: from the first end, from the last.
 FORTH, BACK = range(2)
 HINDERED = 5.65
@@ -46,7 +46,7 @@ def carry(ends, one, other, carries, x, q, channels, fluid, narrow, vx, vy, stat
         a, b = ends[c, 0], ends[c, 1]
         forth = back = 0.0
         delta = channels[c, flowing.APERTURE]
-        if carries[c] and delta >= narrow:
+        if carries[c] and delta >= narrow and (state[a, C] > 0.0 or state[b, C] > 0.0):
             i, j = one[c], other[c]
             wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
             wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
@@ -106,28 +106,38 @@ def give(begin, channel, side, out, dt, nodes, state):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def come(begin, channel, side, ends, out, dt, nodes, state):
+    """What channels bring to the owned nodes in dt [s]."""
+    for i in range(len(nodes)):
+        comes = 0.0
+        for m in range(begin[i], begin[i + 1]):
+            c = channel[m]
+            far, its = (ends[c, 1], BACK) if side[m] < 0.0 else (ends[c, 0], FORTH)
+            comes += state[far, GIVES] * out[c, its]
+        nodes[i, COMES] = comes * dt
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def take(begin, channel, side, ends, out, dt, limit, part, nodes, state, takes):
     """Factors of what comes to the owned nodes, takes (n,): what leaves is what the others take by their present
     factors, and so never more than at the end; part: of the way from the room before to the room now."""
     for i in range(len(nodes)):
-        comes = leaves = 0.0
+        comes = nodes[i, COMES]
+        room = (1.0 - part) * nodes[i, ROOM_BEFORE] + part * nodes[i, ROOM]
+        free = limit * room - nodes[i, N]
+        if comes <= max(free, 0.0):
+            takes[i] = 1.0
+            continue
+        leaves = 0.0
         for m in range(begin[i], begin[i + 1]):
             c = channel[m]
-            if side[m] < 0.0:
-                far = ends[c, 1]
-                leaves += state[i, GIVES] * out[c, FORTH] * state[far, TAKES]
-                comes += state[far, GIVES] * out[c, BACK]
-            else:
-                far = ends[c, 0]
-                leaves += state[i, GIVES] * out[c, BACK] * state[far, TAKES]
-                comes += state[far, GIVES] * out[c, FORTH]
-        room = (1.0 - part) * nodes[i, ROOM_BEFORE] + part * nodes[i, ROOM]
-        free = (limit * room - nodes[i, N]) + dt * leaves
-        takes[i] = min(max(free, 0.0) / (dt * comes), 1.0) if comes > 0.0 else 1.0
+            far, mine = (ends[c, 1], FORTH) if side[m] < 0.0 else (ends[c, 0], BACK)
+            leaves += state[i, GIVES] * out[c, mine] * state[far, TAKES]
+        takes[i] = min(max(free + dt * leaves, 0.0) / comes, 1.0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def move(begin, channel, side, ends, out, dt, part, limit, modulus, nodes, state):
+def move(begin, channel, side, ends, out, dt, part, limit, power, modulus, nodes, state):
     """A sub-step: proppant of the owned nodes, then their concentration, whether they are packed, and the pressure of
     the pack: the modulus times what its room lacks for it (137), which no way there changes."""
     for i in range(len(nodes)):
@@ -140,13 +150,13 @@ def move(begin, channel, side, ends, out, dt, part, limit, modulus, nodes, state
             leaves = state[i, GIVES] * out[c, mine] * state[far, TAKES]
             into += comes - leaves
         nodes[i, N] = max(nodes[i, N] + dt * into, 0.0)
-    settle(part, limit, modulus, nodes, state)
+    settle(part, limit, power, modulus, nodes, state)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle(part, limit, modulus, nodes, state):
-    """Concentration, pack and its pressure of the owned nodes by their proppant and room. A pack is pressed by its
-    walls; of what fluid leaves it, it becomes no denser."""
+def settle(part, limit, power, modulus, nodes, state):
+    """Concentration, viscosity, pack and its pressure of the owned nodes by their proppant and room. power: beta of
+    (134). A pack is pressed by its walls; of what fluid leaves it, it becomes no denser."""
     for i in range(len(nodes)):
         room = (1.0 - part) * nodes[i, ROOM_BEFORE] + part * nodes[i, ROOM]
         n = nodes[i, N]
@@ -157,26 +167,25 @@ def settle(part, limit, modulus, nodes, state):
         packed = c >= LOOSE * limit if packed else c >= limit - FULL
         state[i, C], state[i, PACKED] = c, 1.0 if packed else 0.0
         state[i, PUSHES] = modulus * (1.0 - limit / c) if c > limit else 0.0
+        state[i, THICK] = (1.0 - min(c, NEAR * limit) / limit) ** power if c > 0.0 else 1.0
 
 
 @njit(cache=True, error_model="numpy")
-def _resistance(c, packed, limit, power, pack):
+def _resistance(thick, packed, pack):
     """Of half a channel over that of the fluid alone: a slurry is at most as stiff as the fluid in a pack."""
-    if packed > 0.0:
-        return pack
-    return min((1.0 - min(c, NEAR * limit) / limit) ** power, pack)
+    return pack if packed > 0.0 else min(thick, pack)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def thicken(ends, state, limit, power, factor, permeability, heavier, channels):
+def thicken(ends, state, factor, permeability, heavier, channels):
     """What proppant does to channels (m, flowing.CHANNEL): their conductance, of two halves one behind the other, and
-    the weight of what is in them over that of the fluid. power: beta of (134); factor: aperture of a pack over that of
-    the channel, 0: by its permeability [m2]; heavier: rho_p / rho_f - 1. A pack rests on its walls."""
+    the weight of what is in them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its
+    permeability [m2]; heavier: rho_p / rho_f - 1. A pack rests on its walls."""
     for c in range(len(ends)):
         a, b, delta = ends[c, 0], ends[c, 1], channels[c, flowing.APERTURE]
         pack = 1.0 / (factor * factor * factor) if factor > 0.0 else max(delta * delta / (12.0 * permeability), 1.0)
-        one = _resistance(state[a, C], state[a, PACKED], limit, power, pack)
-        other = _resistance(state[b, C], state[b, PACKED], limit, power, pack)
+        one = _resistance(state[a, THICK], state[a, PACKED], pack)
+        other = _resistance(state[b, THICK], state[b, PACKED], pack)
         channels[c, flowing.CONDUCT] *= 2.0 / (one + other)
         solid = 0.5 * ((1.0 - state[a, PACKED]) * state[a, C] + (1.0 - state[b, PACKED]) * state[b, C])
         channels[c, flowing.WEIGHT] = 1.0 + heavier * solid

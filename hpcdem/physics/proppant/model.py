@@ -206,7 +206,7 @@ class Proppant(SurfaceLoad):
     def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
         """`thicken` for all channels of the model; gathered: values of all flow nodes from those of this rank."""
         own = self.state[: len(self.number)]
-        found = {k: gathered(own[:, k]) for k in (kernels.C, kernels.PACKED)}
+        found = {k: gathered(own[:, k]) for k in (kernels.C, kernels.PACKED, kernels.THICK)}
         state = np.zeros((len(found[kernels.C]), kernels.STATE))
         for k, values in found.items():
             state[:, k] = values
@@ -221,7 +221,7 @@ class Proppant(SurfaceLoad):
         v = self.values
         limit, size = v["proppant_concentration_limit"], v["proppant_size"]
         kernels.thicken(
-            ends, state, limit, v["viscosity_power"], v["aperature_factor"], kernels.kozeny_carman(limit, size),
+            ends, state, v["aperature_factor"], kernels.kozeny_carman(limit, size),
             v["proppant_density"] / self.flow.fluid("fluid_density") - 1.0, table,
         )  # fmt: skip
 
@@ -286,7 +286,9 @@ class Proppant(SurfaceLoad):
 
     def _settle(self, part: float = 1.0) -> None:
         v = self.values
-        kernels.settle(part, v["proppant_concentration_limit"], v["proppant_modulus"], self.nodes, self.state)
+        kernels.settle(
+            part, v["proppant_concentration_limit"], v["viscosity_power"], v["proppant_modulus"], self.nodes, self.state
+        )
         self._refresh()
 
     def take_rooms(self) -> None:
@@ -363,7 +365,8 @@ class Proppant(SurfaceLoad):
         with self.blocks.timers("proppant"):
             self._advance(dt)
         self.cycles += 1
-        flow.find_geometry()
+        if not self.blocks.options.mechanical:  # else the flow does, before it goes on
+            flow.find_geometry()
 
     def _advance(self, dt: float) -> None:
         """As long [s] as the fluid has flowed."""
@@ -399,13 +402,15 @@ class Proppant(SurfaceLoad):
             )  # fmt: skip
             kernels.give(begin, channel, side, self._out, short, nodes, self.state)
             self._refresh()
+            kernels.come(begin, channel, side, ends, self._out, short, nodes, self.state)
             for _ in range(SWEEPS):
                 kernels.take(begin, channel, side, ends, self._out, short, limit, part, nodes, self.state, self._takes)
                 self.state[: len(nodes), kernels.TAKES] = self._takes
                 self._refresh()
             kernels.move(
-                begin, channel, side, ends, self._out, short, part, limit, v["proppant_modulus"], nodes, self.state
-            )
+                begin, channel, side, ends, self._out, short, part, limit, v["viscosity_power"], v["proppant_modulus"],
+                nodes, self.state,
+            )  # fmt: skip
             self._refresh()
         self.time = flow.time
         self._tell_refused(refused)

@@ -11,6 +11,7 @@
 | own-quads-20k | the same with the elastic law in a Python file of the user |
 | plastic-quads-20k, flowing-quads-20k | the same of a rock that can yield: none of it does, all of it flows |
 | wet-20k | intact-20k with a channel in every joint, half of them full, and one sub-step of flow per step |
+| sandy-20k | the same with proppant in the fluid, which settles |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
@@ -31,10 +32,11 @@ from bench.runs import say
 from bench.tables import Lines, Spread
 from hpcdem.physics.fdem import changes, convergence, diagnostics, user_laws
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.proppant.model import Proppant
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "wet": 6e6, "pairs": 3e6, "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
+    "flowing-quads": 3e6, "wet": 6e6, "sandy": 5e6, "pairs": 3e6, "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
@@ -67,6 +69,7 @@ WORKLOADS = {
         Workload("plastic-quads-20k", "plastic-quads", 141),
         Workload("flowing-quads-20k", "flowing-quads", 141),
         Workload("wet-20k", "wet", 100),
+        Workload("sandy-20k", "sandy", 100),
         Workload("pairs-20k", "pairs", 141),
         Workload("shattered-20k", "shattered", 100),
     )
@@ -282,6 +285,16 @@ def wet(sim: Any, side: int) -> None:
     sim.close_model()
 
 
+def sandy(sim: Any, side: int) -> None:
+    """The same with proppant in the fluid."""
+    wet(sim, side)
+    sim.gravity(0.0, -9.81)
+    proppant = Proppant.of(sim)
+    proppant.assign(None, {"proppant_density": 2650.0, "proppant_size": 1e-6, "proppant_concentration_limit": 0.6})
+    proppant.fill(None, 0.2)
+    sim.close_model()
+
+
 def pairs(sim: Any, side: int) -> None:
     """Each square is two triangles that lie on each other along its diagonal, pressed and sheared."""
     mesh = square(side, gap=0.01)
@@ -320,6 +333,6 @@ def _swell(sim: Any, factor: float) -> None:
 
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
-    "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "pairs": pairs, "shattered": shattered,
-    "own": own, "own-quads": own_quads,
+    "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "sandy": sandy, "pairs": pairs,
+    "shattered": shattered, "own": own, "own-quads": own_quads,
 }  # fmt: skip
