@@ -295,8 +295,8 @@ class FluidHeat:
 
     def _look_upstream(self) -> None:
         n = len(self.number)
-        kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self.state[:n],
-                         self.state)  # fmt: skip
+        kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self._held,
+                         self.state[:n], self.state)  # fmt: skip
         self._refresh()
 
     def advance(self, dt: float, table: np.ndarray) -> None:

@@ -263,8 +263,9 @@ FLUID_STATE = 6
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def upstream(begin, channel, side, ends, q, length, own, state):
-    """Columns U and FROM of own nodes (n, k); where nothing flows in they are the node's own."""
+def upstream(begin, channel, side, ends, q, length, held, own, state):
+    """Columns U and FROM of own nodes (n, k); where nothing flows in they are the node's own and 1, or where it is held
+    0; held (n,): -1: free."""
     for i in range(len(own)):
         total = heat = way = 0.0
         for m in range(begin[i], begin[i + 1]):
@@ -274,19 +275,25 @@ def upstream(begin, channel, side, ends, q, length, own, state):
                 total += into
                 heat += into * state[ends[c, 0 if side[m] > 0.0 else 1], T]
                 way += into * length[c]
-        own[i, U], own[i, FROM] = (heat / total, way / total) if total > 0.0 else (own[i, T], 1.0)
+        own[i, U], own[i, FROM] = own[i, T], 1.0 if held[i] < 0 else 0.0
+        if total > 0.0:
+            own[i, U], own[i, FROM] = heat / total, way / total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def faces(ends, q, length, second, dt, state, out):
     """Temperatures out (m,) of what flows in channels, q (m,) [m2/s]: that of the node upstream (first order), or with
-    the slope that the limiter of van Leer (1974) leaves, at the middle of what passes in dt [s] (second order)."""
+    the slope that the limiter of van Leer (1974) leaves, at the middle of what passes in dt [s] (second order). From a
+    held node into which nothing flows, that of the middle of the channel: a front begins at the node."""
     for c in range(len(ends)):
         up, down = (ends[c, 0], ends[c, 1]) if q[c] > 0.0 else (ends[c, 1], ends[c, 0])
         value = state[up, T]
         out[c] = value
         rise = state[down, T] - value
         if second and rise != 0.0 and q[c] != 0.0 and state[up, FULL] > 0.0:
+            if state[up, FROM] == 0.0:
+                out[c] = value + 0.5 * rise
+                continue
             r = (value - state[up, U]) / state[up, FROM] * length[c] / rise
             if r > 0.0:
                 out[c] = value + r / (1.0 + r) * rise * max(0.0, 1.0 - dt * abs(q[c]) / state[up, FULL])

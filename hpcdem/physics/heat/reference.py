@@ -76,7 +76,9 @@ def fluid_step(
     for (a, b), rate, way, delta in zip(ends.tolist(), q.tolist(), length.tolist(), aperture.tolist()):
         up, down = (a, b) if rate > 0.0 else (b, a)
         value = t[up]
-        if second and inflow[up] and t[down] != t[up]:
+        if second and up in held and not inflow[up]:
+            value = 0.5 * (t[up] + t[down])
+        elif second and inflow[up] and t[down] != t[up]:
             total = sum(one for one, _, _ in inflow[up])
             before = sum(one * t[node] for one, node, _ in inflow[up]) / total
             distance = sum(one * far for one, _, far in inflow[up]) / total
