@@ -140,7 +140,7 @@ def test_fronts_and_what_the_limiter_keeps_of_them() -> None:
         order = np.argsort(x)
         x, t = x[order], t[order]
         assert t.min() >= 0.0 and t.max() <= 50.0 * (1.0 + 1e-14) and (np.diff(t) <= 1e-12).all()
-        assert np.interp(-25.0, -t, x) == pytest.approx(5.0, abs=0.02)
+        assert np.interp(-25.0, -t, x) == pytest.approx(5.0, abs=0.02 if second else 0.06)
         width.append(np.interp(-5.0, -t, x) - np.interp(-45.0, -t, x))
         assert heat.account()["relative"] < 1e-13
     assert width[1] < width[0] / 2.5, width
@@ -156,13 +156,13 @@ def test_implicit_steps_are_backward_euler_of_the_same(second: float) -> None:
         heat.prescribe_fluid(at(sim, 0.0, 0.0), 50.0)
         if implicit:
             run = Implicit(sim)
-            for _ in range(400):
-                run.advance(10.0)
+            for _ in range(800):
+                run.advance(5.0)
             run.close()
             assert run.factors == 1
             assert run.unknowns == len(sim.mesh.points) + 20
         else:
-            step(sim, 4000.0, 400)
+            step(sim, 4000.0, 800)
         assert heat.account()["relative"] < 1e-12, heat.account()
         found.append(np.concatenate([of_nodes(flow), temperatures(sim)]))
     assert found[0][1:12].min() > 5.0 and found[0] == pytest.approx(found[1], abs=0.1)

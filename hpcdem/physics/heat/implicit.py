@@ -25,8 +25,8 @@ from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
 
 MOST, PLENTY, CHANGE = 100, 40, 1e-7
-"""Solutions of the linear system in a step with advection of second order: how many at most, from which on changes count
-half, and the change of temperatures, over their differences, at which one is the last but one."""
+"""Solutions of the linear system in a step with advection of second order: how many at most, from which on changes
+count half, and the change of temperatures, over their differences, at which one is the last but one."""
 
 
 class Implicit:
@@ -144,8 +144,8 @@ class Implicit:
         else:
             self._spread(old)
             raise CommandError(
-                f"heat time {heat.time:.6g} s: advection of second order finds no balance in {MOST} turns: a shorter dt, "
-                "or second-order off"
+                f"heat time {heat.time:.6g} s: advection of second order finds no balance in {MOST} turns: a "
+                "shorter dt, or second-order off"
             )
         self._spread(new)
         walls = np.zeros(count)

@@ -4,8 +4,8 @@ Fluid flows as it does at this moment:
 
     rho C W (T' - T) / dt = rho C sum(side q (T_face' - T')) + conduction + sum(a (T_wall' - T')),
 
-all at the end of the step; T_face: that of the node upstream, or of second order. The matrix is that of first order. By the
-limiter a node is the mean, with weights from 0 on, of those around it, so nothing goes beyond them.
+all at the end of the step; T_face: that of the node upstream, or of second order. The matrix is that of first order. By
+the limiter a node is the mean, with weights from 0 on, of those around it, so nothing goes beyond them.
 Everything here is known to all ranks and the same on all: it is little beside the factors.
 """
 
@@ -26,9 +26,10 @@ from hpcdem.physics.heat.model import Heat
 
 @dataclass
 class Fluid:
-    """The network of a model as arrays. ends (m, 2): rows of nodes; length (m,) [m]; q (m,) [m2/s]; conduct (m,), exchange (m, 2):
-    [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the rock, two at each
-    end; held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,): temperatures."""
+    """The network of a model as arrays. ends (m, 2): rows of nodes; length (m,) [m]; q (m,) [m2/s]; conduct (m,),
+    exchange (m, 2): [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the
+    rock, two at each end; held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,):
+    temperatures."""
 
     of: FluidHeat
     ends: np.ndarray
