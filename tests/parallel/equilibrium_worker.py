@@ -168,7 +168,8 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
     heat.assign(None, {**GRANITE, "transfer_coeficient": 20.0})
     heat.initial(None, 60.0)
     fluid = heat.of_fluid()
-    fluid.assign(None, {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 150.0})
+    fluid.assign(None, {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 150.0,
+                        "second_order": 1.0})  # fmt: skip
     heat.prescribe_fluid(network[x[network] == x[network].min()], 10.0)
     run = Implicit(sim, solver)
     for _ in range(10):

@@ -75,7 +75,7 @@ def test_cold_water_cools_the_rock(runs):
     found = runs(1, "direct-rinsed")
     given, commands, stored, fluid, removed = found["account"]
     assert abs(given + commands - stored - fluid - removed) < 1e-12 * stored and given < -1e5
-    assert found["water"].min() == 10.0 and 30.0 < found["water"].max() < 60.0
+    assert found["water"].min() == 10.0 and 30.0 < found["water"].max() < 60.0 + 1e-5
     assert found["temperature"].max() > 59.0 and found["temperature"].min() < 40.0
     assert found["steady"] == pytest.approx(10.0, abs=1e-6)
 
