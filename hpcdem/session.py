@@ -240,6 +240,12 @@ def _flow() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _proppant() -> WarmUp:
+    from hpcdem.physics.proppant import kernels, warm_up
+
+    return warm_up.warm_up, (kernels,)
+
+
 def _heat() -> WarmUp:
     from hpcdem.physics.heat import kernels, warm_up
 
@@ -282,6 +288,7 @@ KINDS = {
     "bolts": Kernels(_bolts),
     "liners": Kernels(_liners),
     "flow": Kernels(_flow),
+    "proppant": Kernels(_proppant, after=("flow",)),
     "heat": Kernels(_heat),
     "yielding": Kernels(_yielding),
     "creep": Kernels(_creep),
@@ -290,7 +297,7 @@ KINDS = {
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_BLOCKS = ("bolts", "liners", "flow", "heat", "yielding", "creep", "tangent", "plastic-tangent")
+OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent")
 """Those that come when a model of blocks asks for them."""
 
 

@@ -483,6 +483,21 @@ class Nodes(Objects):
         given = {"pressure": pressure, "flow_surface": flow_surface, "flow_rate": flow_rate}
         self._carry_out("boundary", given, where, "hydraulic-constant-flow-boundary")
 
+    def proppant(
+        self,
+        *,
+        proppant_volumetric_concentration: Number | None = None,
+        proppant_volumetric_flow_rate: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """One of them at flow nodes, of wells too: concentration of the slurry that comes in [1], or volume of grains
+        that does at each [m2/s]."""
+        given = {
+            "proppant_volumetric_concentration": proppant_volumetric_concentration,
+            "proppant_volumetric_flow_rate": proppant_volumetric_flow_rate,
+        }
+        self._carry_out("boundary", given, where, "hydraulic-proppant-boundary")
+
     def temperature(self, temperature: Number, *, where: Where = None) -> None:
         """Temperature of nodes from now on: a number or the name of a table over the time of heat."""
         self._carry_out("boundary", {"temperature": temperature}, where, "thermal-solid-boundary-condition")
@@ -589,10 +604,18 @@ class FlowNodes(Objects):
         """They have the groups of nodes: `sim.nodes.group`."""
         raise CommandError("flow nodes have the groups of nodes: sim.nodes.group")
 
-    def initial(self, *, pressure: float | None = None, saturation: float | None = None, where: Where = None) -> None:
-        """Fluid that they hold now: its pressure [Pa], or the part of their room that is filled. where: of nodes."""
-        chosen = chosen_by(where, g.NODE)
-        self._do("flow-node initial", {"pressure": pressure, "saturation": saturation}, chosen, g.NODE)
+    def initial(
+        self,
+        *,
+        pressure: float | None = None,
+        saturation: float | None = None,
+        concentration: float | None = None,
+        where: Where = None,
+    ) -> None:
+        """Fluid that they hold now: its pressure [Pa], or the part of their room that is filled; concentration of
+        proppant in it [1]. where: of nodes."""
+        given = {"pressure": pressure, "saturation": saturation, "concentration": concentration}
+        self._do("flow-node initial", given, chosen_by(where, g.NODE), g.NODE)
 
 
 @commands
@@ -831,7 +854,7 @@ class Charts(Words):
     ) -> None:
         """A curve of history y against history x (or time), of points, or of what fluid has now along the line of
         channels of a range (profile: "pressure", "saturation", "aperture", "flow-rate", "velocity",
-        "temperature"); style: "line" or "points"."""
+        "temperature", "concentration"); style: "line" or "points"."""
         given = {
             "name": name, "x": x, "y": y, "scale_x": scale_x, "scale_y": scale_y, "values": values,
             "profile": None if profile is None else _script_word(profile), "label": label, "style": style,
@@ -847,8 +870,8 @@ class Charts(Words):
         fluid: str | None = None,
         temperature: bool = False,
     ) -> None:
-        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture"
-        or "velocity"): beside it the model as it is now, with one of them."""
+        """Write a diagram as figure and CSV; cracks, plastic, temperature, fluid ("pressure", "saturation", "aperture",
+        "velocity" or "concentration"): beside it the model as it is now, with one of them."""
         given = {
             "name": name, "file": file, "cracks": cracks, "plastic": plastic, "fluid": fluid,
             "temperature": temperature,
@@ -921,14 +944,15 @@ class BlockCommands:
         hydraulic: bool | None = None,
         one_way: bool | None = None,
         thermal: bool | None = None,
+        proppant: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
         "refuse", "relax" or "keep"; rotations of elements; keep the energy budget; motion at all; flow of fluid, and
-        whether it does not push; flow of heat."""
+        whether it does not push; flow of heat; proppant that moves in the fluid."""
         given = {
             "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
             "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way,
-            "thermal": thermal,
+            "thermal": thermal, "proppant": proppant,
         }  # fmt: skip
         self._blocks("model option", given)
 
@@ -962,6 +986,11 @@ class BlockCommands:
     def fluid(self) -> dict[str, float]:
         """The account of the fluid [m2]: given, stored, leaked, removed; what does not add up. Collective."""
         return fdem.queries.fluid(self._blocks.project())
+
+    @property
+    def proppant(self) -> dict[str, float]:
+        """The account of proppant [m2]: came, stored, packed, left, removed; what does not add up. Collective."""
+        return fdem.queries.proppant(self._blocks.project())
 
     @property
     def heat(self) -> dict[str, float]:

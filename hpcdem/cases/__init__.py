@@ -27,7 +27,7 @@ CASES = {
     "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
-    "lauwerier": "Lauwerier", "doublet": "Doublet",
+    "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]

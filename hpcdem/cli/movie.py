@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hpcdem.post.series import Job
     from hpcdem.runtime.progress import Log
 
-FLUID = ("pressure", "saturation", "aperture", "velocity")
+FLUID = ("pressure", "saturation", "aperture", "velocity", "concentration")
 PANELS_SHOWN = {name: (name,) for name in ("cracks", "stress", "plastic", "temperature", *FLUID)} | {
     "both": ("cracks", "stress")
 }
@@ -38,7 +38,7 @@ PAGE = 17.0
 @click.option("--name", metavar="NAME", help="Frames of blocks NAME_<step>.vtkhdf [the name most of them have].")
 @click.option("--show", type=click.Choice(list(PANELS_SHOWN)), help="Of blocks: cracks by the way "
               "they broke, compressive stress, plastic strain, temperature, of fluid in joints pressure, saturation, "
-              "aperture or velocity; both: the first two [what there is].")  # fmt: skip
+              "aperture or velocity, concentration of proppant; both: the first two [what there is].")  # fmt: skip
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @looks
 def movie(**options: Any) -> None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.structures import Structure
     from hpcdem.physics.flow.model import Flow
     from hpcdem.physics.heat.model import Heat
+    from hpcdem.physics.proppant.model import Proppant
 
 
 def _bolts() -> type[Structure]:
@@ -46,7 +47,14 @@ def _heat() -> type[Heat]:
     return Heat
 
 
-PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Heat]]] = {
-    "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "heat": _heat,
+def _proppant() -> type[Proppant]:
+    from hpcdem.physics.proppant.model import Proppant
+
+    return Proppant
+
+
+PHYSICS: Mapping[str, Callable[[], type[Structure] | type[FreeField] | type[Flow] | type[Proppant] | type[Heat]]] = {
+    "bolts": _bolts, "liners": _liners, "free_field": _free_field, "fluid": _fluid, "proppant": _proppant,
+    "heat": _heat,
 }  # fmt: skip
 """How to get each class: its import brings kernels, which must wait for their cache folder."""

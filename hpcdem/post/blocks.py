@@ -159,6 +159,7 @@ class Contours:
 def panels_of(state: MeshState) -> tuple[str, ...]:
     """The panels that show what there is."""
     wet = (TEMPERATURE,) * ("temperature" in state.of_points) + ("pressure",) * fluid.there(state)
+    wet += ("concentration",) * fluid.with_proppant(state)
     if wet[:1] == (TEMPERATURE,) and plastic_range(state)[1] == 0.0:
         return (CRACKS if len(state.joints) else STRESS), *wet
     if plastic_range(state)[1] > 0.0:

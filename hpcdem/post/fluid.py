@@ -53,6 +53,7 @@ PICTURES = {
     "saturation": Shown("saturation", ((1.0, "-"),), "saturation", True, "Blues"),
     "aperture": Shown("aperture", LENGTHS, "aperture", True, "YlOrRd"),
     "velocity": Shown("fluid_velocity", SPEEDS, "fluid velocity", False, "PuRd"),
+    "concentration": Shown("proppant_concentration", ((1.0, "-"),), "proppant concentration", False, "YlOrBr"),
 }
 """By the word for each."""
 
@@ -60,6 +61,11 @@ PICTURES = {
 def there(state: MeshState) -> bool:
     """Whether a frame has channels."""
     return bool(np.isfinite(state.of_joints.get("aperture", np.empty(0))).any())
+
+
+def with_proppant(state: MeshState) -> bool:
+    """Whether the fluid of a frame carries proppant."""
+    return "proppant_concentration" in state.of_joints
 
 
 def ends(state: MeshState) -> np.ndarray:

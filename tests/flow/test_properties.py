@@ -103,7 +103,7 @@ def sheared(slip: float, **changed: float) -> np.ndarray:
     moved = np.zeros_like(sim.x)
     moved[sim.where[upper], 0::2] = slip
     sim.x += moved
-    flow._find_geometry()
+    flow.find_geometry()
     return flow._table[:, kernels.APERTURE]
 
 

@@ -9,5 +9,6 @@ from tests.flow.models import MODELS as FLOW
 from tests.heat.models import MODELS as HEAT
 from tests.liners.models import MODELS as LINERS
 from tests.parallel.model import Model
+from tests.proppant.models import MODELS as PROPPANT
 
-KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | HEAT | COUPLED
+KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | PROPPANT | HEAT | COUPLED

@@ -230,7 +230,6 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 
 LATER = [
-    ("face-joint c-model hydr-p-p-m f-den 1", "proppant comes later"),
     ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
     ("output image 'a'", "hpcdem movie"),
 ]

@@ -42,6 +42,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model option mechanical off hydraulic on one-way on",
      "sim.option(mechanical=False, hydraulic=True, one_way=True)"),
     ("pcdc model option thermal off", "sim.option(thermal=False)"),
+    ("pcdc model option proppant off", "sim.option(proppant=False)"),
     ("pcdc model time-step hydraulic 1e-3", "sim.time_step(hydraulic=1e-3)"),
     ("pcdc model time-step thermal 60", "sim.time_step(thermal=60)"),
     ("pcdc model sub-step mechanical 10 hydraulic 5", "sim.sub_step(mechanical=10, hydraulic=5)"),
@@ -181,10 +182,19 @@ SAME: list[tuple[str, str]] = [
     ("pcdc face-joint c-model t-f property con 0.6 cap 4200 t-c 100 second-order on range crack",
      "sim.joints.model('t-f', conductivity=0.6, capacity=4200, transfer_coeficient=100, second_order=True, "
      "where='crack')"),
+    ("pcdc face-joint c-model hydr-p-p-m property f-den 1000 f-bulk 2e9 vis 1e-6 a-initial 1e-2 a-min 1e-3 p-den 2650 "
+     "p-s 5e-4 p-c-l 0.6 p-sto on range crack",
+     "sim.joints.model('hydr-p-p-m', fluid_density=1000, fluid_bulk=2e9, viscosity=1e-6, aperature_initial=1e-2, "
+     "aperature_minumum=1e-3, proppant_density=2650, proppant_size=5e-4, proppant_concentration_limit=0.6, "
+     "proppant_stokes=True, where='crack')"),
     ("pcdc node boundary hydra-c-f-b pressure table 'v' range id 1", "sim.nodes.fluid(pressure='v', where='id 1')"),
     ("pcdc node boundary hydra-c-f-b flow-surface 2", "sim.nodes.fluid(flow_surface=2)"),
+    ("pcdc node boundary hydra-p-b p-v-c table 'v' range id 1",
+     "sim.nodes.proppant(proppant_volumetric_concentration='v', where='id 1')"),
+    ("pcdc node boundary hydra-p-b p-v-f-r 2", "sim.nodes.proppant(proppant_volumetric_flow_rate=2)"),
     ("pcdc node boundary hydra-c-f-b flow-rate 2", "sim.nodes.fluid(flow_rate=2)"),
     ("pcdc flow-node initial saturation 1 range x 0 1", "sim.flow_nodes.initial(saturation=1, where='x 0 1')"),
+    ("pcdc flow-node initial concentration 0.1", "sim.flow_nodes.initial(concentration=0.1)"),
     ("pcdc flow-node initial pressure 1e6", "sim.flow_nodes.initial(pressure=1e6)"),
     ("pcdc well create 'w' range geometry 'l'", "sim.wells.create('w', where=g.OnLayer('l'))"),
     ("pcdc well stage 'w' rate 1e-4 time 60 limit 8e6", "sim.wells.stage('w', rate=1e-4, time=60, limit=8e6)"),
@@ -402,7 +412,6 @@ WRONG = {
     "property of another model": ("sim.joints.property(young=3)", "joints.property: face-joint property has no young"),
     "no such model": ("sim.elements.model('elastic', density=1)", "elements.model: there is no model 'elastic'"),
     "model that is no text": ("sim.elements.model(3)", "elements.model: expected the name of a model, got 3"),
-    "model of later": ("sim.joints.model('hydraulic-porous-proppant-medium', proppant_size=1)", "is not there yet"),
     "incomplete model": ("sim.elements.model('mech-iso-elastic', density=1, young=3)",
                          "needs young and poisson_ratio or shear and bulk"),
     "missing property": ("sim.elements.model('mech-iso-elastic', young=3, poisson_ratio=0.2)", "needs density"),

@@ -20,6 +20,7 @@ from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.network import path as path_of
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
 
 
 def create(project: Project, name: str, title: str = "", x_label: str = "", y_label: str = "") -> None:
@@ -53,8 +54,8 @@ def add(
 
 
 def _profile(project: Project, name: str, where: Range | None) -> list[tuple[float, float]]:
-    """(distance [m], value) along channels: pressure, saturation and temperature of their nodes, else of their
-    middles."""
+    """(distance [m], value) along channels: pressure, saturation, temperature and concentration of their nodes, else of
+    their middles."""
     channels = everything(project, CHANNEL, where)
     flow, at = Flow.of(project.blocks), project.positions()
     network = flow.network
@@ -69,7 +70,9 @@ def _profile(project: Project, name: str, where: Range | None) -> list[tuple[flo
     s = np.append(0.0, np.cumsum(np.hypot(*np.diff(at[points], axis=0).T)))
     if name == "temperature" and name not in flow.more:
         raise CommandError("the fluid has no heat: face-joint c-model thermal-fluid comes first")
-    if name in ("pressure", "saturation", "temperature"):
+    if name == "concentration" and name not in flow.more:
+        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
+    if name in ("pressure", "saturation", "temperature", "concentration"):
         values = _by_number(flow.values(FLOW_NODE, name, np.sort(points)), points)
     else:
         s = 0.5 * (s[1:] + s[:-1])
@@ -87,8 +90,8 @@ def export(
     temperature: bool = False,
 ) -> None:  # fmt: skip
     """Write the diagram as a figure into the folder of the results, and its curves as CSV beside it: curve, x, y, one
-    row per point. cracks, plastic, temperature, fluid (pressure, saturation, aperture or velocity): the figure also
-    shows the model at this moment, with one of them. Collective."""
+    row per point. cracks, plastic, temperature, fluid (pressure, saturation, aperture, velocity or concentration): the
+    figure also shows the model at this moment, with one of them. Collective."""
     from hpcdem.post.charts import draw
 
     chart, figure = _chart(project, name), project.result(path)
@@ -100,6 +103,8 @@ def export(
         raise CommandError("there is no heat: element c-model thermal-iso-heat comes first")
     if fluid and Flow.there(project.ready(use=False)) is None:
         raise CommandError("there are no channels yet: face-joint c-model hydraulic-porous-medium comes first")
+    if fluid == "concentration" and Proppant.there(project.ready(use=False)) is None:
+        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
     curves = [(curve.label, curve.style, _points(project, curve)) for curve in chart.curves]
     if not any(points for _, _, points in curves):
         raise CommandError(f"chart '{name}' has no points yet")

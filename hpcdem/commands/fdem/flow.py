@@ -18,6 +18,8 @@ from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.properties import POROUS
 from hpcdem.physics.heat.properties import FLUID_HEAT
+from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.properties import PROPPANT, split
 
 _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
 
@@ -38,16 +40,57 @@ def model(project: Project, properties: Mapping[str, Value], where: Range | None
         raise
 
 
+def with_proppant(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
+    """The same, and the fluid carries proppant there (physics.proppant.properties)."""
+    fluid, grains = split(dict(properties))
+    joints = chosen(project, JOINT, where)
+    PROPPANT.complete({name: value for name, value in grains.items() if isinstance(value, (int, float))})
+    model(project, fluid, where)
+    blocks = project.ready()
+    Proppant.of(blocks).assign(joints, grains)
+
+
+def _proppant(project: Project) -> Proppant:
+    found = Proppant.there(project.ready())
+    if found is None:
+        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
+    return found
+
+
+def proppant_condition(
+    project: Project,
+    proppant_volumetric_concentration: Number | None = None,
+    proppant_volumetric_flow_rate: Number | None = None,
+    where: Range | None = None,
+) -> None:
+    """Concentration of the slurry that comes in at flow nodes [1], or volume of proppant that does [m2/s, at each]; the
+    last one holds."""
+    given = {CONCENTRATION: proppant_volumetric_concentration, RATE: proppant_volumetric_flow_rate}
+    said = {kind: value for kind, value in given.items() if value is not None}
+    if len(said) != 1:
+        raise CommandError(
+            "proppant that comes in at a flow node has one of proppant-volumetric-concentration, "
+            "proppant-volumetric-flow-rate"
+        )
+    kind, value = said.popitem()
+    _proppant(project).prescribe(chosen(project, NODE, where), kind, value)
+
+
 def joint_property(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Change some properties of cohesive models, of channels, and of heat in these, each of the joints that a range
     chooses; without a range of all that have them."""
     of_fluid = {name: value for name, value in properties.items() if POROUS.has(name)}
     of_heat = {name: value for name, value in properties.items() if FLUID_HEAT.has(name)}
-    others = {name: value for name, value in properties.items() if name not in of_fluid | of_heat}
+    of_grains = {name: value for name, value in properties.items() if PROPPANT.has(name)}
+    others = {name: value for name, value in properties.items() if name not in of_fluid | of_heat | of_grains}
     if of_fluid:
         _flow(project).adjust(chosen(project, JOINT, where), of_fluid)
     if of_heat:
         heat_of(project).of_fluid().adjust(chosen(project, JOINT, where), of_heat)
+    if of_grains:
+        if where is not None:
+            raise CommandError("there is one proppant in all channels: its properties are changed without a range")
+        _proppant(project).adjust(of_grains)
     if others:
         assignments.joint_property(project, others, where)
 
@@ -77,16 +120,26 @@ def condition(
 
 def remove_conditions(project: Project, where: Range | None = None) -> None:
     """Nothing is prescribed at flow nodes any more; without fluid there is nothing to do."""
-    found = Flow.there(project.ready())
-    if found is not None:
-        found.remove_conditions(chosen(project, NODE, where))
+    for found in (Flow.there(project.ready()), Proppant.there(project.ready())):
+        if found is not None:
+            found.remove_conditions(chosen(project, NODE, where))
 
 
 def initial(
-    project: Project, pressure: float | None = None, saturation: float | None = None, where: Range | None = None
+    project: Project,
+    pressure: float | None = None,
+    saturation: float | None = None,
+    concentration: float | None = None,
+    where: Range | None = None,
 ) -> None:
-    """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled."""
-    _flow(project).fill(chosen(project, NODE, where), pressure, saturation)
+    """Fluid that flow nodes hold now: its pressure [Pa], or the part of their room that is filled; concentration of
+    proppant in it."""
+    nodes = chosen(project, NODE, where)
+    grains = None if concentration is None else _proppant(project)
+    if (pressure, saturation) != (None, None) or grains is None:
+        _flow(project).fill(nodes, pressure, saturation)
+    if grains is not None and concentration is not None:
+        grains.fill(nodes, concentration)
 
 
 def well(project: Project, name: str, where: Range | None = None) -> None:

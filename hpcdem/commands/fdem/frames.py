@@ -151,6 +151,12 @@ FLUID = {
     "fluid_velocity": "velocity",
 }  # fmt: skip
 """Columns of joints that are channels, and the quantities of channels in them."""
+OF_OTHERS = {
+    "fluid_temperature": "temperature",
+    "proppant_concentration": "concentration",
+    "pack_pressure": "pack_pressure",
+}
+"""The same of quantities that are there with further physics."""
 
 
 def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -160,7 +166,7 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     if flow is None or not len(flow.network.channels):
         return joints
     mesh = blocks.the_mesh()
-    columns = FLUID | ({"fluid_temperature": "temperature"} if flow.more else {})
+    columns = FLUID | {column: name for column, name in OF_OTHERS.items() if name in flow.more}
     fluid = flow.owned_values(CHANNEL, list(columns.values()))
     new = np.setdiff1d(fluid["number"], joints["number"])
     ends = mesh.points[face_points(mesh.cells, new)]

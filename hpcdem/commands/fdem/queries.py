@@ -15,6 +15,7 @@ from hpcdem.physics.fdem.groups import FLOW, SUPPORTS, Range
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
 
 
 def numbers(project: Project, kind: str, where: Range | None = None) -> np.ndarray:
@@ -63,6 +64,14 @@ def fluid(project: Project) -> dict[str, float]:
     found = Flow.there(project.ready(use=False))
     if found is None:
         raise CommandError("there is no fluid: face-joint c-model hydraulic-porous-medium comes first")
+    return found.account()
+
+
+def proppant(project: Project) -> dict[str, float]:
+    """The account of proppant [m2], see `Proppant.account`. Collective."""
+    found = Proppant.there(project.ready(use=False))
+    if found is None:
+        raise CommandError("there is no proppant: face-joint c-model hydraulic-porous-proppant-medium comes first")
     return found.account()
 
 

@@ -16,6 +16,7 @@ from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
@@ -56,6 +57,7 @@ UNITS = {
         "gravity_work": "J/m", "outside_work": "J/m", "disc_work": "J/m", "bolt_work": "J/m", "liner_work": "J/m",
         "heat_work": "J/m", "energy_error": "J/m",
         "flow_time": "s", "fluid_given": "m2", "fluid_stored": "m2", "fluid_leaked": "m2",
+        "proppant_came": "m2", "proppant_stored": "m2", "proppant_packed": "m2", "proppant_left": "m2",
         "heat_time": "s", "heat_given": "J/m", "heat_stored": "J/m", "heat_in_fluid": "J/m",
     },
 }  # fmt: skip
@@ -77,6 +79,14 @@ def _of_fluid(name: str) -> Callable[[Any], float]:
         if flow is None:
             return 0.0
         return float(flow.time) if name == "time" else flow.account()[name]
+
+    return measure
+
+
+def _of_proppant(name: str) -> Callable[[Any], float]:
+    def measure(blocks: Blocks) -> float:
+        found = Proppant.there(blocks)
+        return 0.0 if found is None else found.account()[name]
 
     return measure
 
@@ -118,6 +128,7 @@ _OF_MODEL: dict[str, Callable[[Any], float]] = {
     "fluid_given": _of_fluid("given"),
     "fluid_stored": _of_fluid("stored"),
     "fluid_leaked": _of_fluid("leaked"),
+    **{f"proppant_{name}": _of_proppant(name) for name in ("came", "stored", "packed", "left")},
     "heat_time": _of_heat("time"),
     "heat_given": _of_heat("given"),
     "heat_stored": _of_heat("stored"),

@@ -33,13 +33,17 @@ def option(
     hydraulic: bool | None = None,
     one_way: bool | None = None,
     thermal: bool | None = None,
+    proppant: bool | None = None,
 ) -> None:
     """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal: see `Blocks.parts`."""
+    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
-    if (mechanical, hydraulic, one_way, thermal) != (None, None, None, None):
-        project.blocks.parts(mechanical=mechanical, hydraulic=hydraulic, one_way=one_way, thermal=thermal)
+    parts = {
+        "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way, "thermal": thermal, "proppant": proppant,
+    }  # fmt: skip
+    if any(value is not None for value in parts.values()):
+        project.blocks.parts(**parts)
     if dynamic is not None:
         project.dynamic = dynamic
     if (dynamic, collision, large_strain, overlap) != (None, None, None, None):

@@ -13,6 +13,7 @@ from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import Proppant
 
 ENERGY_WORDS = {
     "kinetic": "stored: motion",
@@ -56,6 +57,12 @@ FLUID_WORDS = {
     "closing": "closing error",
 }
 """The same of the account of the fluid, volumes at its density without pressure."""
+PROPPANT_WORDS = {
+    "came": "came by conditions and at the beginning", "stored": "in the channels", "packed": "of it packed",
+    "left": "left with fluid that was taken out", "removed": "gone with channels that were taken away",
+    "closing": "closing error",
+}  # fmt: skip
+"""The same of the account of proppant."""
 HEAT_WORDS = {
     "given": "given by conditions", "commands": "brought by commands", "stored": "stored in elements, above zero",
     "fluid": "in the fluid",
@@ -98,6 +105,10 @@ def close(project: Project, figure: bool = True) -> None:
     if flow is not None:
         found = flow.account()
         log.table("fluid", ("volume", "m2"), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
+    proppant = Proppant.there(blocks)
+    if proppant is not None:
+        found = proppant.account()
+        log.table("proppant", ("volume", "m2"), [(PROPPANT_WORDS[k], f"{found[k]:.6g}") for k in PROPPANT_WORDS])
     heat = Heat.there(blocks)
     if heat is not None:
         found = heat.account()

@@ -16,6 +16,8 @@ from hpcdem.lang.pcdc.table import (
     FLUID_TEMPERATURE,
     ISO_HEAT,
     POROUS,
+    PROPPANT,
+    PROPPANT_CONDITION,
     TEMPERATURE,
 )
 from hpcdem.lang.pcdc.trial import python
@@ -183,6 +185,9 @@ def _joint_model(call: Call) -> None:
     if trial.MODELS[call["model"]] is POROUS.of:
         fdem.flow.model(call.project, call.properties(), call.where)
         return
+    if trial.MODELS[call["model"]] is PROPPANT.of:
+        fdem.flow.with_proppant(call.project, call.properties(), call.where)
+        return
     if trial.MODELS[call["model"]] is FLUID_HEAT.of:
         fdem.heat.fluid_model(call.project, call.properties(), call.where)
         return
@@ -210,6 +215,8 @@ def _node_condition(call: Call) -> None:
             commands.move(call.project, kind, along[0] if along else (0.0, 0.0), call.where)
         case FLOW_CONDITION.keyword.name:
             fdem.flow.condition(call.project, **given, where=call.where)
+        case PROPPANT_CONDITION.keyword.name:
+            fdem.flow.proppant_condition(call.project, **_over_time(call), where=call.where)
         case TEMPERATURE.keyword.name:
             fdem.heat.condition(call.project, **_over_time(call), where=call.where)
         case FLUID_TEMPERATURE.keyword.name:
@@ -251,10 +258,10 @@ def _face_condition(call: Call) -> None:
 
 
 def _over_time(call: Call) -> dict[str, Any]:
-    """Properties of a condition of heat."""
+    """Properties of a condition of heat or proppant."""
     for name, value in call.arguments["properties"].items():
         if isinstance(value, FunctionName):
-            raise CommandError(f"{name} is a number or a table over the time of heat, no function of place")
+            raise CommandError(f"{name} is a number or a table of time, no function of place")
     return call.properties()
 
 

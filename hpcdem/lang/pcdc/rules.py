@@ -49,7 +49,7 @@ def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None)
 
 
 def _fluid(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if len(arguments) > 1:
+    if "pressure" in arguments and "saturation" in arguments:
         raise ValueError("pressure and saturation exclude each other: below full saturation there is no pressure")
 
 

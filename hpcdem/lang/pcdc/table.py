@@ -47,9 +47,10 @@ from hpcdem.physics.flow.properties import POROUS as POROUS_PROPERTIES
 from hpcdem.physics.heat.properties import FLUID_HEAT as FLUID_HEAT_PROPERTIES
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT_PROPERTIES
 from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
+from hpcdem.physics.proppant.properties import MEDIUM as MEDIUM_PROPERTIES
+from hpcdem.physics.proppant.properties import PROPPANT as PROPPANT_PROPERTIES
 
 THREE_D = "this version computes in two dimensions"
-PROPPANT = "proppant comes later; this version computes mechanics"
 
 
 @dataclass(frozen=True)
@@ -311,10 +312,14 @@ FLUID_TEMPERATURE = Model(
     "there; times of tables are those of heat.",
     (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
 )  # fmt: skip
-_LATER_NODE = (
-    Model("hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that is injected.",
-          (Option("p{roppant}-v{olumetric}-c{oncentration}", (FLOAT,), "", "1"),
-           Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (FLOAT,), "", "m3/s")), later=PROPPANT),
+PROPPANT_CONDITION = Model(
+    "hydra{ulic}-p{roppant}-b{oundary}", "18", "Proppant that comes in at flow nodes, of wells too, one of these; "
+    "times of tables are those of flow. A node that is packed takes none.",
+    (Option("p{roppant}-v{olumetric}-c{oncentration}", (TABLED,), "concentration of the slurry that conditions and "
+            "wells bring: volume of grains over that of the slurry", "1"),
+     Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that comes in at each node, in the "
+            "slurry that is there", "m2/s")),
+    any_of=True,
 )  # fmt: skip
 CONST_HEAT = Model(
     "therm{al}-c{onst}-h{eat}", "16",
@@ -373,15 +378,26 @@ FLUID_HEAT = Model(
         also={"transfer-coeficient": _COEFFICIENTS["transfer-coeficient"]})),
     of=FLUID_HEAT_PROPERTIES,
 )  # fmt: skip
-_LATER_JOINT = (
-    Model("hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17", "Fluid with proppant in joints.",
-          (*_POROUS, Option("p{roppant}-den{sity}", (POSITIVE,), "", "kg/m3"),
-           Option("p{roppant}-s{ize}", (POSITIVE,), "", "m"),
-           Option("p{roppant}-s{ize}-f{actor}", (POSITIVE,), "", "1"),
-           Option("a{perature}-f{actor}", (POSITIVE,), "", "1", also=("a{perture}-f{actor}",)),
-           Option("p{roppant}-c{oncentration}-l{imit}", (POSITIVE,), "", "1"),
-           Option("p{roppant}-m{odulus}", (POSITIVE,), "", "Pa"), Option("vis{cosity}-p{ower}", (FLOAT,), "", "1")),
-          later=PROPPANT),
+_GRAINS = tuple(
+    replace(o, values=(BOOL,), unit="", default="off") if o.name == "proppant-stokes" else o for o in declared(
+        PROPPANT_PROPERTIES, "p{roppant}-den{sity}", "p{roppant}-s{ize}", "p{roppant}-s{ize}-f{actor}",
+        "a{perature}-f{actor}", "p{roppant}-c{oncentration}-l{imit}", "p{roppant}-m{odulus}", "vis{cosity}-p{ower}",
+        "p{roppant}-sto{kes}", also={"aperature-factor": ("a{perture}-f{actor}",)}, uniform=True,
+    )
+)  # fmt: skip
+GRAINS = Model(
+    "",
+    "17",
+    "",  # p-s is the penalty of shear where cohesive models are changed too
+    tuple(replace(o, notation="prop{pant}-s{ize}") if o.name == "proppant-size" else o for o in _GRAINS),
+    of=PROPPANT_PROPERTIES,
+)
+PROPPANT = Model(
+    "hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17",
+    "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier and "
+    "more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no grains pass "
+    "it, fluid does, and the walls lean on it.",
+    (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES,
 )  # fmt: skip
 
 # ---- bolts (tables 19 to 21) ---------------------------------------------------------------------------------------
@@ -489,9 +505,9 @@ RECORDED = {
     },
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s",
-                  "temperature": "K"},
+                  "temperature": "K", "concentration": "1", "proppant": "m2", "pack-pressure": "Pa"},
     "flow-channel": {"pressure": "Pa", "saturation": "1", "aperture": "m", "flow-rate": "m2/s", "velocity": "m/s",
-                     "temperature": "K"},
+                     "temperature": "K", "concentration": "1", "pack-pressure": "Pa"},
     "well": {"pressure": "Pa", "rate": "m2/s", "injected": "m2", "stage": "1"},
     "liner-node": {
         "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
@@ -511,6 +527,7 @@ RECORDED = {
         "gravity-work": "J/m", "outside-work": "J/m", "disc-work": "J/m", "bolt-work": "J/m", "liner-work": "J/m",
         "heat-work": "J/m", "energy-error": "J/m",
         "flow-time": "s", "fluid-given": "m2", "fluid-stored": "m2", "fluid-leaked": "m2",
+        "proppant-came": "m2", "proppant-stored": "m2", "proppant-packed": "m2", "proppant-left": "m2",
         "heat-time": "s", "heat-given": "J/m", "heat-stored": "J/m", "heat-in-fluid": "J/m",
     },
 }  # fmt: skip
@@ -574,7 +591,8 @@ _MODEL = (
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
                        "the stress that they bring, stay as they are", default="on"),
-                Option("prop{pant}", (BOOL,), "", later=PROPPANT)),
+                Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
+                       "where they are", default="on")),
             needs_option=True, manual=True),
     Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
             "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
@@ -844,12 +862,12 @@ _OBJECTS = (
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
-            models=(COHESIVE, POROUS, FLUID_HEAT, *_LATER_JOINT), ranged="face-joint"),
+            models=(COHESIVE, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint"),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
-            options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT)),
+            options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
             ranged="face-joint", needs_option=True),
     Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
             ("pcdc face-joint reset state",), ranged="face-joint"),
@@ -861,7 +879,7 @@ _OBJECTS = (
              "pcdc node boundary hydra-c-f-b pressure 1e6 range group 'hole'",
              "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
-            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, TEMPERATURE, FLUID_TEMPERATURE, *_LATER_NODE),
+            models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
             ranged="node"),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
@@ -881,7 +899,8 @@ _OBJECTS = (
             "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
-                     Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1")),
+                     Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1"),
+                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
             ranged="node", needs_option=True),
     Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
             "Stages say what it does; without one it is shut in.",
@@ -1013,7 +1032,8 @@ _RECORDS = (
              Option("y", (STRING,), "history along y"), Option("scale-x", (FLOAT,), "factor", default="1"),
              Option("scale-y", (FLOAT,), "factor", default="1"), Option("val{ues}", (VECTORS,), "points (x,y)"),
              Option("prof{ile}",
-                    (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature"),),
+                    (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature",
+                            "concentration"),),
                     "of the fluid as it is now, along the line that the joints of the range make, over the distance "
                     "[m] from its left end"),
              Option("lab{el}", (STRING,), "in the legend"),
@@ -1025,8 +1045,8 @@ _RECORDS = (
             (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
              Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
              Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
-             Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity"),), "beside it the model as it "
-                    "is now, its channels coloured by that"))),
+             Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
+                    "beside it the model as it is now, its channels coloured by that"))),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),

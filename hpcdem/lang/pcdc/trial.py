@@ -21,6 +21,8 @@ from hpcdem.lang.pcdc.table import (
     LINER,
     MOHR_COULOMB,
     POROUS,
+    PROPPANT,
+    PROPPANT_CONDITION,
     USER,
     Command,
 )
@@ -30,6 +32,7 @@ from hpcdem.physics.fdem.tables import Drawn, Over, Table
 from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
+from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
 
 MODELS = {
     model.keyword.name: model.of
@@ -43,6 +46,7 @@ MODELS = {
         BOLT,
         LINER,
         POROUS,
+        PROPPANT,
         ISO_HEAT,
         FLUID_HEAT,
     )
@@ -69,7 +73,7 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
             _model(arguments["model"], arguments["properties"])
         elif command.name in _OF_COMMAND:
             given, model = _given(arguments), _OF_COMMAND[command.name]
-            others = {properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID), properties.SOLID.name: (HEAT,)}
+            others = {properties.COHESIVE.name: (FLUID, HEAT_OF_FLUID, GRAINS), properties.SOLID.name: (HEAT,)}
             for other in others.get(model.name, ()):
                 _changes(other, {name: v for name, v in given.items() if other.has(name)})
                 given = {name: v for name, v in given.items() if not other.has(name)}
@@ -120,7 +124,7 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
         for axis in "xy":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
-    elif name == FLOW_CONDITION.keyword.name and len(arguments) > 1:
+    elif name in (FLOW_CONDITION.keyword.name, PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
         raise CommandError(f"{' and '.join(arguments)} exclude each other: a flow node has one of them")
 
 
@@ -138,7 +142,7 @@ def _changes(model: properties.Model, given: dict[str, Any]) -> None:
         rock = {"density": 1.0, "young": 1.0, "poisson_ratio": 0.0, "cohesion": 0.0, "tensile": 0.0}
         model.complete({**rock, "friction": given["friction"], "dilation": given["dilation"]})
     if (
-        model in (BOLT.of, LINER.of, POROUS.of, ISO_HEAT.of, FLUID_HEAT.of)
+        model in (BOLT.of, LINER.of, POROUS.of, PROPPANT.of, ISO_HEAT.of, FLUID_HEAT.of)
         and {p.name for p in model.properties if p.default is None and not p.optional} <= given.keys()
     ):
         model.complete(given)

@@ -75,6 +75,11 @@ class Model:
         return self._look(lambda: fdem.queries.fluid(self._project))
 
     @property
+    def proppant(self) -> dict[str, float]:
+        """The account of proppant [m2]: came, stored, packed, left, removed, closing, relative."""
+        return self._look(lambda: fdem.queries.proppant(self._project))
+
+    @property
     def heat(self) -> dict[str, float]:
         """The account of heat [J/m]: given, commands, stored, fluid, removed, closing, relative."""
         return self._look(lambda: fdem.queries.heat(self._project))

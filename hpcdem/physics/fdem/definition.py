@@ -80,10 +80,10 @@ class Traction:
 class Options:
     """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
     of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
-    one_way: fluid does not push; flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps
-    (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in
-    cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s],
-    stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
+    one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles of
+    flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
+    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
+    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -98,6 +98,7 @@ class Options:
     mechanical: bool = True
     hydraulic: bool = True
     one_way: bool = False
+    proppant: bool = True
     flow_every: int = 1
     flow_steps: int = 0
     flow_dt: float = 0.0
@@ -747,10 +748,14 @@ class ModelDefinition:
         hydraulic: bool | None = None,
         one_way: bool | None = None,
         thermal: bool | None = None,
+        proppant: bool | None = None,
     ) -> None:
-        """What is computed: motion of the blocks (on), flow (on), heat (on); one_way (off): fluid does not push on
-        blocks."""
-        given = {"mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way, "thermal": thermal}
+        """What is computed: motion of the blocks (on), flow (on), heat (on), grains in the fluid (on); one_way (off):
+        fluid does not push on blocks."""
+        given = {
+            "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way, "thermal": thermal,
+            "proppant": proppant,
+        }  # fmt: skip
         self._set(**{name: bool(value) for name, value in given.items() if value is not None})
 
     def flow_clock(self, every: int | None = None, steps: int | None = None, dt: float | None = None) -> None:

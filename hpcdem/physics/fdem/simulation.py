@@ -288,7 +288,7 @@ class Blocks(State):
                 raise CommandError(
                     "without mechanics time passes by flow and heat: model option dynamic on comes first"
                 )
-            others = [load.name for load in self.surface_loads if load.name not in ("fluid", "heat")]
+            others = [load.name for load in self.surface_loads if load.name not in ("fluid", "proppant", "heat")]
             if others:
                 raise CommandError(f"{others[0].replace('_', '-')} move with the blocks: model option mechanical on")
             if self.creep.on:

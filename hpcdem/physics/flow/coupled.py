@@ -95,7 +95,7 @@ class Coupled:
         """CommandError for what implicit steps cannot do."""
         sim = self.sim
         for load in sim.surface_loads:
-            if load.name != "fluid" and self.moves:
+            if load.name not in ("fluid", "proppant") and self.moves:
                 raise CommandError(
                     f"implicit steps of flow know no {load.name}: model step and model solve step blocks with them"
                 )
@@ -107,6 +107,11 @@ class Coupled:
             )
         if not self.moves:
             return
+        if self.flow.slurry is not None and self.flow.slurry.values["proppant_modulus"] > 0.0:
+            raise CommandError(
+                "implicit steps of flow know no pack of proppant that bears: proppant-modulus 0, mechanical off, or "
+                "steps of the blocks"
+            )
         if sim.options.dynamic:
             raise CommandError(
                 "implicit steps keep blocks in static equilibrium: model option dynamic off comes first, or mechanical "
@@ -124,11 +129,14 @@ class Coupled:
         sim.close_model()
         if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
+        if flow.slurry is not None:
+            flow.slurry.check_start()
         self._take_nodes()
         if self.moves:
             equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)
             sim.before_change()
             sim.close_model()
+        flow.implicit = True
         self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
         self.solver = self._solver()
         if self.moves:
@@ -141,6 +149,7 @@ class Coupled:
         return self
 
     def __exit__(self, *error: Any) -> None:
+        self.flow.implicit = False
         if self.moves:
             sim = self.sim
             if sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
@@ -248,6 +257,8 @@ class Coupled:
         self.count.steps += 1
         flow.implicit_dt = min(self._next(now, found), self.longest)
         self.sim.clock.step += 1
+        if flow.slurry is not None:
+            flow.slurry.flowed()
 
     def _next(self, dt: float, found: _Found) -> float:
         """The time step after one of dt [s]: joints pass their peak every few steps, and Newton's method is quick."""
@@ -398,7 +409,7 @@ class Coupled:
         now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.n, 2))
         right[len(x) :, 0] = -now.residual
-        sizes = float(now.sizes.sum())
+        sizes = float((now.sizes + now.rounding).sum())
         lack = float(np.abs(now.residual).sum()) / sizes if sizes > 0.0 else 0.0
         if not math.isfinite(lack):
             return math.inf, right, now

@@ -16,6 +16,7 @@ Everything here is known to all ranks and is the same on all: the numbers of a s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -31,21 +32,24 @@ if TYPE_CHECKING:
 LEAST_PRESSURE = 1e4
 """p0 is at least this [Pa]."""
 ROUNDING = 1e-8
-"""Part of the fluid of a node that counts as flowing: where nothing flows any more the rest is rounding."""
+"""Part of the fluid of a node, and of what would flow if pressure and height did not balance, that counts as flowing:
+where nothing flows any more the rest is rounding."""
 
 
 @dataclass
 class Balance:
     """A state of the fluid at trial positions and variables.
 
-    residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; fluid, volume
-    (n,) [m2]; state (n, kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a
-    complementarity; table (m, kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
+    residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; rounding:
+    what else counts as such, where pressure and height nearly balance; fluid, volume (n,) [m2]; state (n,
+    kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; table (m,
+    kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
     """
 
     residual: np.ndarray
     plain: np.ndarray
     sizes: np.ndarray
+    rounding: np.ndarray
     fluid: np.ndarray
     volume: np.ndarray
     state: np.ndarray
@@ -80,6 +84,7 @@ class Fluid:
     flow: Flow
     p0: float
     u: np.ndarray = field(init=False)
+    thicken: Callable[[np.ndarray, np.ndarray], None] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         flow, blocks = self.flow, self.flow.blocks
@@ -136,6 +141,8 @@ class Fluid:
     def begin(self, dt: float, x: np.ndarray) -> tuple[Step, np.ndarray]:
         """A step of dt [s] from here, and the variables (n,) to begin with."""
         after = self.flow.time + dt
+        slurry = self.flow.slurry
+        self.thicken = None if slurry is None else slurry.everywhere(self._gathered)
         conditions = self.flow.conditions_at(after)
         does, value = conditions[self.condition].T
         energy = self.state_of(self.u, x)[:, kernels.E]
@@ -153,6 +160,8 @@ class Fluid:
         corners = np.ascontiguousarray(x[self.at].reshape(self.m, 8))
         begin, table = 8 * np.arange(self.m), np.empty((self.m, kernels.CHANNEL))
         kernels.geometry(1, begin, begin + 4, self.law, self.laws, corners, self.flow.viscosity, table)
+        if self.thicken is not None:
+            self.thicken(self.ends, table)
         does, value = step.conditions[self.condition].T
         state = self.state_of(u, x)
         q, lost = np.empty(self.m), np.zeros(self.m)
@@ -176,8 +185,10 @@ class Fluid:
         dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
         held = step.known | out | dry
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
+        head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
+        level = np.bincount(self.end, (table[:, kernels.CONDUCT] * head)[self.both], self.n) * dt
         sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
-        return Balance(residual, plain, sizes, fluid, volume, state, held, table, q, lost)
+        return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, table, q, lost)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------
 
@@ -209,13 +220,13 @@ class Fluid:
     ) -> Pieces:
         """Of flow, leak-off and volume of channels by the variables at their ends and the corners of their faces."""
         ends, state = self.ends[mine], now.state
-        delta, conduct, half = now.table[mine].T
+        delta, conduct, half, weight = now.table[mine].T
         m, dt = len(ends), step.dt
         p_u, s_u = self._rises(u)
         s_u = np.where(u > -1.0, s_u, 0.0)
         p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
         s = np.maximum(s, 0.0)
-        head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1])
+        head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1]) * weight
         mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
         up = np.where(down, s[:, 0], s[:, 1])
         wet = np.minimum(mean, up)
@@ -291,6 +302,8 @@ class Fluid:
         nodes[:, kernels.LEAKED] += gone[mine]
         nodes[:, kernels.INFLOW] = given[mine] / step.dt
         self.show(now.state)
+        if flow.carried is not None:
+            flow.carried = step.dt * now.q[np.searchsorted(self.channels, flow.channels_here)]
         self.fluid, self.u = fluid, np.where(now.state[:, kernels.P] > 0.0, now.state[:, kernels.P] / self.p0,
                                              now.state[:, kernels.S] - 1.0)  # fmt: skip
         flow.time = step.after

@@ -20,9 +20,9 @@ INITIAL, LEAST, MOST, LEAK, PORE, DILATE, GAIN = range(7)
 LAW = 7
 # What is prescribed at nodes.
 FREE, PRESSURE, SURFACE, RATE = range(4)
-# Columns of the table of channels (m, 3) of `geometry`.
-APERTURE, CONDUCT, HALF = range(3)
-CHANNEL = 3
+# Columns of the table of channels (m, 4) of `geometry`; the last: weight of what flows over that of the fluid alone.
+APERTURE, CONDUCT, HALF, WEIGHT = range(4)
+CHANNEL = 4
 # Columns of nodes (n, 6): fluid, room for it, and what came and went [m2]; by conditions in the last sub-step [m2/s].
 W, V, GIVEN, LEAKED, REMOVED, INFLOW = range(6)
 NODE = 6
@@ -51,12 +51,13 @@ def _geometry(t, threads, one, other, law, laws, x, viscosity, out):
         out[c, APERTURE] = delta
         out[c, CONDUCT] = delta * delta * delta / (12.0 * viscosity * h)
         out[c, HALF] = 0.5 * delta * h
+        out[c, WEIGHT] = 1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def geometry(threads, *args):
     """Aperture [m] (79) with what slip adds, conductance delta^3 / (12 mu L) [m2 / (Pa s)] and half of the volume [m2]
-    of channels, out (m, 3). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic
+    of channels, out (m, 4). one, other (m,): where both faces begin in x; law (m,): rows of laws; viscosity: dynamic
     [Pa s]."""
     for t in range(threads):
         _geometry(t, threads, *args)
@@ -87,7 +88,7 @@ def longest_step(begin, channel, ends, channels, nodes, state, bulk):
         k = 0.0
         for m in range(begin[i], begin[i + 1]):
             c = channel[m]
-            rise = abs(state[ends[c, 0], E] - state[ends[c, 1], E])
+            rise = abs(state[ends[c, 0], E] - state[ends[c, 1], E]) * channels[c, WEIGHT]
             k += channels[c, CONDUCT] * (bulk + STEEPEST * rise)
         if k > 0.0:
             least = min(least, 0.5 * nodes[i, V] / k)
@@ -99,7 +100,7 @@ def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, s
     n = len(ends)
     for c in range(n * t // threads, n * (t + 1) // threads):
         a, b = ends[c, 0], ends[c, 1]
-        head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E])
+        head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
         s = 0.5 * (state[a, S] + state[b, S])
         up = state[a, S] if head > 0.0 else state[b, S]
         q[c] = channels[c, CONDUCT] * part(min(s, up)) * head
@@ -186,14 +187,15 @@ def fill_threaded(threads, begin, channel, side, q, leaks, lost, dt, condition, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def loads(edge, ends, nodes, x, state, applied):
-    """Add the pressure on faces to what is applied to corners [N/m]: linear between the nodes (k, 2), L (2 p1 + p2) / 6
-    on the first. edge (k,): where faces begin in x; ends (k, 2): their corners in `applied` (flat)."""
+def loads(edge, ends, nodes, x, state, column, applied):
+    """Add the pressure on faces, a column of state, to what is applied to corners [N/m]: linear between the nodes
+    (k, 2), L (2 p1 + p2) / 6 on the first. edge (k,): where faces begin in x; ends (k, 2): their corners in `applied`
+    (flat)."""
     x, applied = x.reshape(x.size), applied.reshape(applied.size)
     for m in range(len(edge)):
         a = edge[m]
         nx, ny = x[a + 3] - x[a + 1], x[a] - x[a + 2]  # outward, as long as the face
-        p, q = state[nodes[m, 0], P], state[nodes[m, 1], P]
+        p, q = state[nodes[m, 0], column], state[nodes[m, 1], column]
         first, last = (2.0 * p + q) / 6.0, (p + 2.0 * q) / 6.0
         applied[ends[m, 0]] -= first * nx
         applied[ends[m, 0] + 1] -= first * ny

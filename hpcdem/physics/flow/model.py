@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -62,6 +62,9 @@ NODE_QUANTITIES: dict[str, tuple[str, str]] = {
     "volume": ("m2", "room for fluid: half of each channel"),
     "inflow": ("m2/s", "fluid that a condition brings, in the last sub-step"),
     "temperature": ("K", "temperature of the fluid; NaN without a thermal model of it"),
+    "concentration": ("1", "volume of proppant over that of the slurry; NaN without proppant"),
+    "proppant": ("m2", "volume of proppant; NaN without it"),
+    "pack_pressure": ("Pa", "what a pack of proppant presses its walls apart with; NaN without proppant"),
 }
 CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "pressure": ("Pa", "mean pressure of its ends"),
@@ -70,9 +73,34 @@ CHANNEL_QUANTITIES: dict[str, tuple[str, str]] = {
     "flow_rate": ("m2/s", "volume that flows along the lower face of the joint, from its first corner on"),
     "velocity": ("m/s", "that over the aperture"),
     "temperature": ("K", "mean temperature of the fluid at its ends; NaN without a thermal model of it"),
+    "concentration": ("1", "mean concentration of proppant at its ends; NaN without it"),
+    "pack_pressure": ("Pa", "mean pressure of packs at its ends; NaN without proppant"),
 }
+_OF_OTHERS = ("temperature", "concentration", "proppant", "pack_pressure")
+"""Of these, what other physics keep."""
 QUANTITIES = {FLOW_NODE: NODE_QUANTITIES, CHANNEL: CHANNEL_QUANTITIES}
 """What can be asked of flow nodes and channels: unit and meaning."""
+
+
+class Slurry(Protocol):
+    """What grains in the fluid do to it; rows of nodes and channels are those of the flow. values: their properties."""
+
+    values: dict[str, float]
+
+    def check_start(self) -> None:
+        """CommandError if it cannot move in this run. Collective."""
+
+    def thicken(self, ends: np.ndarray, table: np.ndarray) -> None:
+        """Conductance and weight of this rank's channels, in place. Not collective."""
+
+    def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
+        """The same for all channels of the model; gathered: values of all flow nodes from those of this rank."""
+
+    def filled(self) -> None:
+        """A command has given fluid to nodes, or taken it."""
+
+    def flowed(self) -> None:
+        """The fluid has flowed by a step, also an implicit one. Collective."""
 
 
 class Flow(SurfaceLoad):
@@ -115,6 +143,12 @@ class Flow(SurfaceLoad):
         self.held = np.empty(0, np.int64)
         self.more: dict[str, Callable[[], np.ndarray]] = {}
         """By name quantities (n,) of this rank's flow nodes that other physics keep."""
+        self.slurry: Slurry | None = None
+        """Grains in the fluid, which make it heavier and more viscous."""
+        self.implicit = False
+        """Implicit steps are being done."""
+        self.kept = np.empty(0)
+        """Part of the fluid of this rank's nodes (n,) that the last change of channels left there."""
         self.carried: np.ndarray | None = None
         """Volumes [m2] that flowed along the channels of this rank in the last cycle; None: nobody asks."""
         self._told: tuple[float, float] = (0.0, 0.0)
@@ -250,6 +284,8 @@ class Flow(SurfaceLoad):
         self.nodes[mine, kernels.W] = w
         self._find_state(mine)
         self._refresh()
+        if self.slurry is not None:
+            self.slurry.filled()
 
     def flow_nodes(self, points: np.ndarray | None) -> np.ndarray:
         """Those of these points (None: all) that are flow nodes."""
@@ -306,7 +342,7 @@ class Flow(SurfaceLoad):
                 "number": self.number, "pressure": self.state[: len(self.number), kernels.P],
                 "saturation": self.state[: len(self.number), kernels.S], "fluid": self.nodes[:, kernels.W],
                 "volume": self.nodes[:, kernels.V], "inflow": self.nodes[:, kernels.INFLOW],
-                "temperature": self._of_others("temperature")[: self.owned],
+                **{name: self._of_others(name)[: self.owned] for name in _OF_OTHERS},
             }  # fmt: skip
         else:
             blocks = self.blocks
@@ -314,12 +350,13 @@ class Flow(SurfaceLoad):
             mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
             ends, table = self._ends[mine], self._table[mine]
             self._find_flows(0.0)
-            others = self._of_others("temperature", copies="temperature" in names)
+            wanted = [name for name in names if name in _OF_OTHERS]
+            others = {name: self._of_others(name, copies=True)[ends].mean(axis=1) for name in wanted}
             made = {
                 "number": self._channels[mine], "aperture": table[:, kernels.APERTURE], "flow_rate": self._q[mine],
                 "pressure": self.state[ends, kernels.P].mean(axis=1),
                 "saturation": self.state[ends, kernels.S].mean(axis=1),
-                "velocity": self._q[mine] / table[:, kernels.APERTURE], "temperature": others[ends].mean(axis=1),
+                "velocity": self._q[mine] / table[:, kernels.APERTURE], **others,
             }  # fmt: skip
         return {name: made[name].copy() for name in ("number", *names)}
 
@@ -340,6 +377,27 @@ class Flow(SurfaceLoad):
         """Where channels (k,) are among those of this rank, -1: not there. Not collective."""
         at = np.minimum(np.searchsorted(self._channels, channels), max(len(self._channels) - 1, 0))
         return np.where(self._channels[at] == channels, at, -1) if len(self._channels) else np.full(len(channels), -1)
+
+    @property
+    def links(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Rows of the ends (m, 2) of this rank's channels, and channels by its nodes, see network.at_nodes. Not
+        collective."""
+        return self._ends, self._begin, self._channel, self._side
+
+    @property
+    def sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where both faces of this rank's channels begin in x (m,). Not collective."""
+        return self._sides
+
+    @property
+    def channels_here(self) -> np.ndarray:
+        """Numbers of this rank's channels (m,), ascending. Not collective."""
+        return self._channels
+
+    @property
+    def channel_table(self) -> np.ndarray:
+        """Of this rank's channels (m, kernels.CHANNEL). Not to be changed. Not collective."""
+        return self._table
 
     def apertures(self) -> np.ndarray:
         """Of this rank's channels [m]. Not to be changed. Not collective."""
@@ -415,13 +473,17 @@ class Flow(SurfaceLoad):
         opening and the length in the mesh: where things are must not count, as a restart finds masses again."""
         if not self.pushes or blocks.options.flow_every > 1:
             return None
+        return self.springs_of(blocks, self.fluid("fluid_bulk"))
+
+    def springs_of(self, blocks: Any, modulus: float) -> np.ndarray:
+        """Stiffness (n_own, 4) that what fills the channels brings to corners, by its modulus [Pa]."""
         faces, mesh = self.wet(), self.blocks.the_mesh()
         lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
         there = (self.row[lower] > 0) & blocks.joint_exists()[lower]
         faces, laws = faces[there], self.laws()[self.row[lower[there]] - 1]
         way = np.diff(mesh.points[face_points(mesh.cells, faces)], axis=1)[:, 0]
         delta = np.clip(laws[:, kernels.INITIAL], laws[:, kernels.LEAST], laws[:, kernels.MOST])
-        each = 0.5 * self.fluid("fluid_bulk") * np.hypot(way[:, 0], way[:, 1]) / delta
+        each = 0.5 * modulus * np.hypot(way[:, 0], way[:, 1]) / delta
         out = np.zeros((blocks.n_own, 4))
         row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
         np.add.at(out, (row, k), each)
@@ -524,7 +586,7 @@ class Flow(SurfaceLoad):
         self._law_table = self.laws()
         self._table = np.empty((len(ends), kernels.CHANNEL))
         self.carried = None if self.carried is None else np.empty(0)
-        self._find_geometry()
+        self.find_geometry()
         lost = int(comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:
             raise PhysicsError(
@@ -557,17 +619,22 @@ class Flow(SurfaceLoad):
         """Room of the nodes after a change of channels: fluid that has no room any more is gone."""
         before = self.nodes[:, kernels.V].copy()
         self._find_volumes()
+        self.kept = np.ones(len(self.number))
         if self._reshaped:
             less = np.flatnonzero((self.nodes[:, kernels.V] < before) & (before > 0.0))
-            w = self.nodes[less, kernels.W] * (self.nodes[less, kernels.V] / before[less])
+            self.kept[less] = self.nodes[less, kernels.V] / before[less]
+            w = self.nodes[less, kernels.W] * self.kept[less]
             self.nodes[less, kernels.REMOVED] += self.nodes[less, kernels.W] - w
             self.nodes[less, kernels.W] = w
             self._find_state(slice(None))
 
-    def _find_geometry(self) -> None:
+    def find_geometry(self) -> None:
+        """Apertures and conductances where the blocks are now. Not collective."""
         blocks, (one, other) = self.blocks, self._sides
         kernel = kernels.geometry if blocks.threads == 1 else kernels.geometry_threaded
         kernel(blocks.threads, one, other, self._law, self._law_table, blocks.x, self.viscosity, self._table)
+        if self.slurry is not None:
+            self.slurry.thicken(self._ends, self._table)
 
     def _find_volumes(self) -> None:
         kernels.volumes(self._begin, self._channel, self._table, self.nodes)
@@ -701,7 +768,7 @@ class Flow(SurfaceLoad):
         self.waited = 0
         with blocks.timers("flow"):
             if o.mechanical:
-                self._find_geometry()
+                self.find_geometry()
                 self._find_volumes()
                 if o.gx != 0.0 or o.gy != 0.0:
                     self._take_heights()
@@ -794,9 +861,14 @@ class Flow(SurfaceLoad):
     # ---- forces --------------------------------------------------------------------------------------------------
 
     def add_to(self, applied: np.ndarray) -> None:
+        self.push(self.state, kernels.P, applied)
+
+    def push(self, state: np.ndarray, column: int, applied: np.ndarray) -> None:
+        """Add a pressure on faces to what is applied to corners: a column of rows like those of `state`, copies too.
+        Not collective."""
         if self.pushes:
             kernels.loads(
-                self._push_edge, self._push_corner, self._push_node, self.blocks.x, self.state, applied
+                self._push_edge, self._push_corner, self._push_node, self.blocks.x, state, column, applied
             )  # fmt: skip
 
     def balanced(self) -> None:

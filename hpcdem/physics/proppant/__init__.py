@@ -1,0 +1,1 @@
+"""Proppant in the fluid of joints."""

@@ -1,0 +1,484 @@
+"""Proppant in the fluid of a model of blocks: what is said of it, and its step.
+
+Grains move between the flow nodes with the slurry of each cycle of flow, and settle in it, in sub-steps of their own
+(kernels.py). They make the slurry heavier and more viscous, bridge in narrow channels, and where a node is filled to
+the limit they are a pack: nothing but fluid passes, and the walls lean on it. Rows of nodes and channels are those of
+the flow, whose order of sums is kept: bits depend on neither ranks nor threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.halo.copies import Copies, moved
+from hpcdem.numerics.exact_sum import exact_sum
+from hpcdem.physics.fdem import said
+from hpcdem.physics.fdem.said import Number
+from hpcdem.physics.fdem.surface_loads import SurfaceLoad
+from hpcdem.physics.flow import kernels as flowing
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.proppant import kernels, settling
+from hpcdem.physics.proppant.properties import NAMES, PROPPANT
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.simulation import Blocks
+
+COURANT = 0.1
+"""Part of its slurry that a node may lose in a sub-step, or a little more where the flow has just changed."""
+LOOK = 100
+"""Cycles of flow, by explicit steps, after which sub-steps are counted again."""
+SWEEPS = 4
+"""Over the nodes, for the factors of what they take."""
+MANY = 100_000
+"""Sub-steps in one step of flow that are too many to be meant."""
+NO_STOKES = 1.0
+"""Reynolds number of a single grain beyond which Stokes' law is far off."""
+CONCENTRATION, RATE = "concentration", "rate"
+_COLUMNS = ("proppant", "came", "left", "room", "volume", "given", "packed")
+"""Of nodes, as they are saved; given: fluid that conditions had given."""
+
+
+_SAVED = [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM, kernels.VOLUME]
+
+
+class Proppant(SurfaceLoad):
+    """The proppant of a model with fluid. Methods are collective unless they say otherwise; CommandError, alike on all
+    ranks, for what makes no sense.
+
+    values: properties by name; carries (4 ne,) bool: channels that grains can pass, by joint; condition (np,): row of
+    the conditions (kind, value), by node. nodes (n, kernels.NODE), state (n + copies, kernels.STATE): rows of the flow.
+    """
+
+    name: ClassVar[str] = "proppant"
+    kernel_kind: ClassVar[str] = "proppant"
+    of_mesh: ClassVar[bool] = True
+    stays: ClassVar[bool] = True
+
+    def __init__(self, blocks: Blocks, flow: Flow) -> None:
+        self.blocks, self.flow = blocks, flow
+        mesh = blocks.the_mesh()
+        self.values: dict[str, float] = {}
+        self.carries = np.zeros(mesh.cells.size, bool)
+        self.condition = np.zeros(len(mesh.points), np.int32)
+        self.conditions: list[tuple[str, Number]] = [("", 0.0)]
+        self.number = np.empty(0, np.int64)
+        self.nodes = np.empty((0, kernels.NODE))
+        self.state = np.empty((0, kernels.STATE))
+        self.given = np.empty(0)
+        self.accounts = dict.fromkeys(("came", "left", "removed"), 0.0)
+        """Of nodes that are gone, and what went with room that is gone [m2]."""
+        self.time = flow.time
+        self.cycles, self.sub_steps = 0, 1
+        self._held: np.ndarray | None = None
+        self._copies: Copies | None = None
+        self._refused = self._told = 0.0
+        flow.slurry = self
+        flow.carried = np.empty(0) if flow.carried is None else flow.carried
+        flow.more["concentration"] = lambda: self.state[: len(self.number), kernels.C]
+        flow.more["proppant"] = lambda: self.nodes[:, kernels.N]
+        flow.more["pack_pressure"] = lambda: self.state[: len(self.number), kernels.PUSHES]
+
+    @staticmethod
+    def there(blocks: Blocks) -> Proppant | None:
+        """That of a model, None if it has none. Not collective."""
+        return next((load for load in blocks.surface_loads if isinstance(load, Proppant)), None)
+
+    @staticmethod
+    def of(blocks: Blocks) -> Proppant:
+        """That of a model with fluid, made on the first call. Not collective."""
+        found = Proppant.there(blocks)
+        if found is None:
+            found = Proppant(blocks, Flow.of(blocks))
+            blocks.surface_loads.add(found)
+        return found
+
+    # ---- what is said --------------------------------------------------------------------------------------------
+
+    def assign(self, joints: np.ndarray | None, given: Mapping[str, Any]) -> None:
+        """Channels among these joints (None: all) carry proppant with these properties."""
+        at = self.blocks.numbers_of_joints(joints)
+        self._say(given, {} if not self.carries.any() else self.values)
+        self.blocks.before_change()
+        self.carries[at] = True
+        self.blocks.changed()
+
+    def adjust(self, given: Mapping[str, Any]) -> None:
+        """Change some properties."""
+        self._say({**self.values, **given}, {})
+        self.blocks.before_change()
+        self.blocks.changed()
+
+    def _say(self, given: Mapping[str, Any], before: Mapping[str, float]) -> None:
+        for name, value in given.items():
+            if not isinstance(value, (int, float)):
+                raise CommandError(f"there is one proppant in all channels: {name} must be a number")
+        values = PROPPANT.complete(given)
+        for name in before:
+            if before[name] != values[name]:
+                raise CommandError(
+                    f"there is one proppant in all channels, but {name} is {before[name]:g} and {values[name]:g}"
+                )
+        limit = values["proppant_concentration_limit"]
+        for row in np.unique(self.condition).tolist():
+            kind, value = self.conditions[row]
+            if kind == CONCENTRATION and said.checked(self.blocks.tables, value, kind).max() > limit:
+                raise CommandError(f"slurry that comes in would be thicker than a pack, {limit:g}: change it first")
+        self.values = values
+
+    def prescribe(self, nodes: np.ndarray | None, kind: str, value: Number) -> None:
+        """The concentration of slurry that comes in at flow nodes among these points (None: all) from now on, or a
+        volume rate of proppant [m2/s] at each of them."""
+        at = self.flow.flow_nodes(nodes)
+        values = said.checked(self.blocks.tables, value, f"the {kind} of proppant")
+        limit = self.values["proppant_concentration_limit"]
+        if values.min() < 0.0 or (kind == CONCENTRATION and values.max() > limit):
+            most = f" and at most that of a pack, {limit:g}" if kind == CONCENTRATION else ""
+            wrong = values.min() if values.min() < 0.0 else values.max()
+            raise CommandError(f"the {kind} of proppant must not be negative{most}, got {wrong:g}")
+        self.blocks.before_change()
+        if (kind, value) not in self.conditions:
+            self.conditions.append((kind, value))
+        self.condition[at] = self.conditions.index((kind, value))
+        self.blocks.changed(stiffness=False)
+
+    def remove_conditions(self, nodes: np.ndarray | None) -> None:
+        """Take back what is prescribed at these points (None: all)."""
+        self.blocks.before_change()
+        self.condition[slice(None) if nodes is None else nodes] = 0
+        self.blocks.changed(stiffness=False)
+
+    def fill(self, nodes: np.ndarray | None, concentration: float) -> None:
+        """The slurry of flow nodes among these points (None: all) has this concentration now."""
+        limit = self.values["proppant_concentration_limit"]
+        if not 0.0 <= concentration <= limit:
+            raise CommandError(
+                f"the concentration of proppant lies between 0 and that of a pack, {limit:g}, got {concentration:g}"
+            )
+        at = self.flow.flow_nodes(nodes)
+        self.blocks.close_model()
+        self.take_rooms()
+        mine = np.isin(self.number, at)
+        new = concentration * self.nodes[mine, kernels.ROOM]
+        self.nodes[mine, kernels.CAME] += new - self.nodes[mine, kernels.N]
+        self.nodes[mine, kernels.N] = new
+        self._settle()
+        self.flow.find_geometry()
+
+    def uses_table(self, name: str) -> bool:
+        return any(self.conditions[row][1] == name for row in np.unique(self.condition).tolist())
+
+    # ---- what is asked -------------------------------------------------------------------------------------------
+
+    @property
+    def on(self) -> bool:
+        """It moves. Not collective."""
+        return self.blocks.options.proppant and self.blocks.options.hydraulic and len(self.flow.network.channels) > 0
+
+    def account(self) -> dict[str, float]:
+        """Volumes of proppant [m2]: came by conditions and at the beginning, stored (suspended, packed), left with
+        fluid that was taken out, removed with channels; closing: what does not add up, relative: over the largest."""
+        self.blocks.close_model()
+        comm, nodes = self.blocks.comm, self.nodes
+        packed = self.state[: len(self.number), kernels.PACKED]
+        n = nodes[:, kernels.N]
+        found = {"stored": exact_sum(n, comm), "packed": exact_sum(n * packed, comm)}
+        for name, column in (("came", kernels.CAME), ("left", kernels.LEFT)):
+            gone = self.accounts[name] if comm.rank == 0 else 0.0
+            found[name] = exact_sum(np.append(nodes[:, column], gone), comm)
+        found["removed"] = self.accounts["removed"]
+        largest = max(map(abs, found.values()))
+        found["closing"] = found["came"] - found["stored"] - found["left"] - found["removed"]
+        found["relative"] = abs(found["closing"]) / largest if largest > 0.0 else 0.0
+        return found
+
+    def speed(self) -> float:
+        """Of a single grain that settles [m/s], up if negative. Not collective."""
+        o, flow, v = self.blocks.options, self.flow, self.values
+        law = settling.stokes if v["proppant_stokes"] > 0.0 else settling.terminal
+        gravity = math.hypot(o.gx, o.gy)
+        return law(v["proppant_size"], v["proppant_density"], flow.fluid("fluid_density"), flow.viscosity, gravity)
+
+    def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
+        """`thicken` for all channels of the model; gathered: values of all flow nodes from those of this rank."""
+        own = self.state[: len(self.number)]
+        found = {k: gathered(own[:, k]) for k in (kernels.C, kernels.PACKED)}
+        state = np.zeros((len(found[kernels.C]), kernels.STATE))
+        for k, values in found.items():
+            state[:, k] = values
+        return lambda ends, table: self._thicken(ends, state, table)
+
+    def thicken(self, ends: np.ndarray, table: np.ndarray) -> None:
+        """What proppant does to the channels of this rank. Not collective."""
+        if self._held is self.flow.held:  # else rows are about to be found
+            self._thicken(ends, self.state, table)
+
+    def _thicken(self, ends: np.ndarray, state: np.ndarray, table: np.ndarray) -> None:
+        v = self.values
+        limit, size = v["proppant_concentration_limit"], v["proppant_size"]
+        kernels.thicken(
+            ends, state, limit, v["viscosity_power"], v["aperature_factor"], kernels.kozeny_carman(limit, size),
+            v["proppant_density"] / self.flow.fluid("fluid_density") - 1.0, table,
+        )  # fmt: skip
+
+    # ---- tables of this rank -------------------------------------------------------------------------------------
+
+    def corners(self, blocks: Any) -> np.ndarray:
+        return self.flow.corners(blocks)
+
+    def springs(self, blocks: Any) -> np.ndarray | None:
+        """A pack is as stiff as its modulus over the aperture without opening, as the flow counts its fluid."""
+        modulus = self.values.get("proppant_modulus", 0.0)
+        return self.flow.springs_of(blocks, modulus) if modulus > 0.0 and self.flow.pushes else None
+
+    def storage_rebuilt(self) -> None:
+        flow, comm, network = self.flow, self.blocks.comm, self.flow.network
+        self._forget(~network.there[self.number])
+        if not len(network.channels):
+            return
+        n, mine = len(self.number), flow.number
+        wanted = flow.held[len(mine) :]
+        had = np.column_stack([
+            self.nodes[:, _SAVED], self.given,
+            self.state[:n, kernels.PACKED], np.ones(n),
+        ])  # fmt: skip
+        rows, owner = moved(comm, len(network.there), self.number, had, mine, wanted)
+        self.number = mine.copy()
+        self.nodes = np.zeros((len(mine), kernels.NODE))
+        self.nodes[:, _SAVED] = rows[:, :5]
+        self.nodes[:, kernels.ROOM_BEFORE] = self.nodes[:, kernels.ROOM]
+        self.given = rows[:, 5].copy()
+        self.close()
+        self.state = np.zeros((len(flow.held), kernels.STATE))
+        self.state[: len(mine), kernels.PACKED] = rows[:, 6]
+        self._copies = Copies(comm, mine, wanted, owner, self.state)
+        self._held = flow.held
+        new = rows[:, 7] == 0.0
+        if comm.any(bool(new.any())):
+            self.given[new] = flow.nodes[new, flowing.GIVEN]
+        lost = self.nodes[:, kernels.N] * (1.0 - flow.kept)
+        self.nodes[:, kernels.N] -= lost
+        if comm.any(bool(lost.any())):
+            self.accounts["removed"] += exact_sum(lost, comm)
+            self.nodes[:, [kernels.ROOM, kernels.VOLUME]] *= flow.kept[:, None]
+        channels = flow.channels_here
+        self._carries = self.carries[channels]
+        self._out = np.zeros((len(channels), 2))
+        self._takes = np.zeros(len(mine))
+        self._prescribed = self.condition[mine].astype(np.int64)
+        self._settle(part=1.0)
+        flow.find_geometry()
+
+    def _forget(self, gone: np.ndarray) -> None:
+        """Proppant of nodes (n,) bool that are no longer there is gone with them."""
+        comm = self.blocks.comm
+        if not comm.any(bool(gone.any())):
+            return
+        self.accounts["removed"] += exact_sum(self.nodes[gone, kernels.N], comm)
+        for name, column in (("came", kernels.CAME), ("left", kernels.LEFT)):
+            self.accounts[name] += exact_sum(self.nodes[gone, column], comm)
+        self.state = self.state[: len(gone)][~gone]
+        self.number, self.nodes, self.given = self.number[~gone], self.nodes[~gone], self.given[~gone]
+
+    def _settle(self, part: float = 1.0) -> None:
+        v = self.values
+        kernels.settle(part, v["proppant_concentration_limit"], v["proppant_modulus"], self.nodes, self.state)
+        self._refresh()
+
+    def take_rooms(self) -> None:
+        """Slurry of the nodes is as it is now, whatever commands have said. Not collective."""
+        room = self._find_rooms()
+        self.nodes[:, kernels.ROOM_BEFORE] = room
+        self.given = self.flow.nodes[:, flowing.GIVEN].copy()
+        self.time = self.flow.time
+
+    def _find_rooms(self) -> np.ndarray:
+        """That for slurry is returned."""
+        volume = self.flow.nodes[:, flowing.V]
+        self.nodes[:, kernels.VOLUME] = volume
+        self.nodes[:, kernels.ROOM] = room = np.minimum(self.flow.nodes[:, flowing.W], volume)
+        return room
+
+    def filled(self) -> None:
+        """A command has given fluid to nodes, or taken it; their proppant stays."""
+        if self._held is self.flow.held:
+            self.take_rooms()
+            self._settle()
+
+    def elements_removed(self, elements: np.ndarray) -> None:
+        self._held = None
+
+    def mesh_replaced(self) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the requests back to MPI."""
+        if self._copies is not None:
+            self._copies.close()
+            self._copies = None
+
+    def _refresh(self) -> None:
+        if self._copies is not None:
+            self._copies.refresh()
+
+    # ---- the step ------------------------------------------------------------------------------------------------
+
+    def check_start(self) -> None:
+        channels = self.flow.network.channels
+        if not self.on:
+            return
+        if not self.carries[channels].any():
+            raise CommandError("no channel carries proppant any more: model option proppant off, or assign it again")
+        v, flow = self.speed(), self.flow
+        size, density = self.values["proppant_size"], flow.fluid("fluid_density")
+        found = settling.reynolds(v, size, density, flow.viscosity)
+        if self.blocks.log is not None and v != self._told:
+            self._told = v
+            stokes = self.values["proppant_stokes"] > 0.0
+            law = "Stokes" if stokes else "Schiller and Naumann"
+            self.blocks.log.info(f"proppant: a grain settles by {v:.4g} m/s after {law}, Reynolds number {found:.3g}")
+            if stokes and found > NO_STOKES:
+                slow = settling.terminal(size, self.values["proppant_density"], density, flow.viscosity,
+                                         math.hypot(self.blocks.options.gx, self.blocks.options.gy))  # fmt: skip
+                self.blocks.log.warn(
+                    f"proppant-stokes: at a Reynolds number of {found:.3g} Stokes' law does not hold; after Schiller "
+                    f"and Naumann a grain settles by {slow:.4g} m/s"
+                )
+
+    def follow(self) -> None:
+        self.flowed()
+
+    def flowed(self) -> None:
+        flow = self.flow
+        dt = flow.time - self.time
+        if not dt > 0.0:
+            return
+        if not self.on:
+            self.take_rooms()
+            return
+        with self.blocks.timers("proppant"):
+            self._advance(dt)
+        self.cycles += 1
+        flow.find_geometry()
+
+    def _advance(self, dt: float) -> None:
+        """As long [s] as the fluid has flowed."""
+        flow, v, o, nodes, comm = self.flow, self.values, self.blocks.options, self.nodes, self.blocks.comm
+        nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
+        self._find_rooms()
+        ends, begin, channel, side = flow.links
+        assert flow.carried is not None
+        q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
+        if flow.implicit or self.cycles % LOOK == 0:
+            least = kernels.fastest(begin, channel, side, q, table, abs(speed), flow.nodes, nodes)
+            least = float(comm.min_into(np.array([least]))[0])
+            self.sub_steps = max(1, math.ceil(dt / (COURANT * least)))
+            if self.sub_steps > MANY:
+                raise CommandError(
+                    f"proppant would need {self.sub_steps} sub-steps in a step of flow of {dt:.3g} s: shorter ones are "
+                    "needed"
+                )
+        count = self.sub_steps
+        short = dt / count
+        self._sources(dt, count)
+        g = math.hypot(o.gx, o.gy)
+        vx, vy = (speed * o.gx / g, speed * o.gy / g) if g > 0.0 else (0.0, 0.0)
+        limit, narrow = v["proppant_concentration_limit"], v["proppant_size_factor"] * v["proppant_size"]
+        one, other = flow.sides
+        refused = 0.0
+        for k in range(1, count + 1):
+            part = k / count
+            refused += kernels.pour(short, limit, nodes, self.state)
+            kernels.carry(
+                ends, one, other, self._carries, self.blocks.x, q, table, flow.state, narrow, vx, vy, self.state,
+                self._out,
+            )  # fmt: skip
+            kernels.give(begin, channel, side, self._out, short, nodes, self.state)
+            self._refresh()
+            for _ in range(SWEEPS):
+                kernels.take(begin, channel, side, ends, self._out, short, limit, part, nodes, self.state, self._takes)
+                self.state[: len(nodes), kernels.TAKES] = self._takes
+                self._refresh()
+            kernels.move(
+                begin, channel, side, ends, self._out, short, part, limit, v["proppant_modulus"], nodes, self.state
+            )
+            self._refresh()
+        self.time = flow.time
+        self._tell_refused(refused)
+
+    def _sources(self, dt: float, count: int) -> None:
+        """What conditions bring or take in each sub-step of the owned nodes."""
+        flow, tables = self.flow, self.blocks.tables
+        came = flow.nodes[:, flowing.GIVEN] - self.given
+        self.given = flow.nodes[:, flowing.GIVEN].copy()
+        kinds = np.array([kind == RATE for kind, _ in self.conditions])[self._prescribed]
+        value = np.array([said.now(tables, value, flow.time) for _, value in self.conditions])[self._prescribed]
+        room = np.maximum(self.nodes[:, kernels.ROOM_BEFORE], 1e-300)
+        leaves = np.minimum(came, 0.0) / room
+        self.nodes[:, kernels.SOURCE] = np.where(
+            kinds, value * (dt / count), np.where(came > 0.0, value * came, leaves) / count
+        )
+
+    def _tell_refused(self, refused: float) -> None:
+        self._refused += refused
+        log = self.blocks.log
+        if self.cycles % LOOK == LOOK - 1 or self.flow.implicit:
+            total = float(self.blocks.comm.sum_into(np.array([self._refused]))[0])
+            self._refused = 0.0
+            if total > 0.0 and log is not None:
+                log.warn_once(
+                    "proppant refused", f"nodes where proppant comes in are packed: {total:.3g} m2 of it found no room"
+                )
+
+    # ---- forces --------------------------------------------------------------------------------------------------
+
+    def add_to(self, applied: np.ndarray) -> None:
+        if self.values["proppant_modulus"] > 0.0:
+            self.flow.push(self.state, kernels.PUSHES, applied)
+
+    # ---- state on disk -------------------------------------------------------------------------------------------
+
+    def saved_state(self) -> dict[str, Any]:
+        return {
+            "values": self.values, "conditions": [list(one) for one in self.conditions], "accounts": self.accounts,
+            "time": self.time, "cycles": self.cycles, "sub_steps": self.sub_steps,
+        }  # fmt: skip
+
+    def saved_tables(self) -> dict[str, dict[str, np.ndarray]]:
+        """Channels that carry it, and prescribed nodes, of all ranks."""
+        channels, points = np.flatnonzero(self.carries), np.flatnonzero(self.condition)
+        return {
+            "proppant_channels": {"number": channels},
+            "proppant_conditions": {"number": points, "row": self.condition[points].astype(np.int64)},
+        }
+
+    def saved_rows(self) -> dict[str, dict[str, np.ndarray]]:
+        """What this rank's flow nodes hold."""
+
+        held = [*self.nodes[:, _SAVED].T, self.given, self.state[: len(self.number), kernels.PACKED]]
+        columns = {name: np.ascontiguousarray(values) for name, values in zip(_COLUMNS, held)}
+        return {"proppant_nodes": {"number": self.number, **columns}}
+
+    @staticmethod
+    def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
+        """Inverse of these: the blocks have this proppant; nodes go to their owners with the first storage."""
+        made = Proppant.of(blocks)
+        made.values = {name: float(state["values"][name]) for name in NAMES}
+        made.conditions = [(str(kind), value) for kind, value in state["conditions"]]
+        made.accounts, made.time = dict(state["accounts"]), state["time"]
+        made.cycles, made.sub_steps = state["cycles"], state["sub_steps"]
+        channels, points, nodes = (tables[f"proppant_{name}"] for name in ("channels", "conditions", "nodes"))
+        made.carries[channels["number"]] = True
+        made.condition[points["number"]] = points["row"]
+        made.number = nodes["number"].astype(np.int64)
+        n = len(made.number)
+        made.nodes = np.zeros((n, kernels.NODE))
+        for name, column in zip(_COLUMNS, _SAVED):
+            made.nodes[:, column] = nodes[name]
+        made.given = np.array(nodes["given"])
+        made.state = np.zeros((n, kernels.STATE))
+        made.state[:, kernels.PACKED] = nodes["packed"]

@@ -1,0 +1,33 @@
+"""A crack full of slurry between two blocks, which calls every kernel of proppant once."""
+
+from __future__ import annotations
+
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.warm_up import ROCK
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.warm_up import WATER
+from hpcdem.physics.proppant.model import CONCENTRATION, Proppant
+
+SAND = {
+    "proppant_density": 2650.0, "proppant_size": 1e-5, "proppant_concentration_limit": 0.6, "proppant_modulus": 1e6,
+}  # fmt: skip
+
+
+def warm_up(threads: int = 1) -> None:
+    """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    flow = Flow.of(sim)
+    flow.assign(None, WATER)
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(None, kernels.PRESSURE, 1.0)
+    proppant = Proppant.of(sim)
+    proppant.assign(None, SAND)
+    proppant.prescribe(None, CONCENTRATION, 0.1)
+    proppant.fill(None, 0.1)
+    sim.step()

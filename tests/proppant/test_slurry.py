@@ -1,0 +1,226 @@
+"""Sand that flows: fronts, what conditions bring, bridges, and what it does to the fluid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.proppant import kernels as own
+from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.reference import sub_step
+from tests.flow.support import at, hold, until
+from tests.proppant.support import OIL, SAND, nodes_up, over, profile, slot
+
+FAST = 1e-5
+"""Flow of the slots below [m2/s]."""
+
+
+def flowing(
+    n: int = 50, fluid: dict[str, float] = OIL, rate: float = FAST, **changes: float
+) -> tuple[Blocks, Flow, Proppant]:
+    """A slot of 1 m without gravity, through which fluid flows up."""
+    sim, flow, proppant = slot(n, 1.0, fluid, **changes)
+    sim.gravity(0.0, 0.0)
+    low, *_, top = nodes_up(sim)
+    flow.prescribe(np.array([low]), kernels.RATE, rate)
+    hold(flow, np.array([top]), 1e5)
+    return sim, flow, proppant
+
+
+def bring(sim: Blocks, proppant: Proppant, c: float, kind: str = CONCENTRATION) -> None:
+    proppant.prescribe(nodes_up(sim)[:1], kind, c)
+
+
+def test_a_front_goes_with_the_slurry() -> None:
+    """9.15: dilute slurry comes in at one end; half of it has come where the fluid is."""
+    sim, flow, proppant = flowing()
+    bring(sim, proppant, 0.01)
+    y = sim.mesh.points[nodes_up(sim), 1]
+    for time in (100.0, 300.0):
+        over(sim, time - flow.time, 20)
+        now = profile(sim, flow)
+        front = float(np.interp(-0.005, -now, y))
+        assert front == pytest.approx(FAST / 5e-3 * time, abs=0.03)
+        assert now.max() <= 0.01 + 1e-9
+        found = proppant.account()
+        assert found["came"] == pytest.approx(0.01 * FAST * time, rel=1e-9) and found["relative"] < 1e-12
+
+
+def test_explicit_cycles_carry_it_as_far() -> None:
+    """Fluid that yields to pressure, so that cycles are long."""
+    fluid = {**OIL, "fluid_bulk": 1e4, "viscosity": 1e-3}
+    found = []
+    for implicit in (True, False):
+        sim, flow, proppant = flowing(20, fluid, rate=1e-4)
+        hold(flow, nodes_up(sim)[-1:], 0.0)
+        flow.fill(None, saturation=1.0)
+        bring(sim, proppant, 0.05)
+        if implicit:
+            over(sim, 20.0, 400)
+        else:
+            until(sim, 20.0)
+            assert flow.cycles > 100
+        found.append(profile(sim, flow))
+        account = proppant.account()
+        assert account["relative"] < 1e-12
+        assert account["came"] == pytest.approx(0.05 * 1e-4 * flow.time, rel=1e-6)
+    assert found[0] == pytest.approx(found[1], abs=5e-4) and found[0][8] > 0.005
+
+
+def test_a_rate_brings_sand_without_fluid() -> None:
+    sim, flow, proppant = flowing()
+    sim.table("sand", [(0.0, 0.0), (100.0, 2e-7), (1e9, 2e-7)])
+    bring(sim, proppant, "sand", RATE)
+    over(sim, 200.0, 200)
+    found = proppant.account()
+    assert found["came"] == pytest.approx(0.5 * 100.0 * 2e-7 + 100.0 * 2e-7, rel=0.01)
+    assert found["relative"] < 1e-12
+    proppant.remove_conditions(None)
+    over(sim, 50.0, 20)
+    assert proppant.account()["came"] == found["came"]
+
+
+def test_what_comes_out_is_counted() -> None:
+    """Through the whole slot: at last as much leaves as comes."""
+    sim, flow, proppant = flowing()
+    bring(sim, proppant, 0.1)
+    over(sim, 1500.0, 100)
+    before = proppant.account()
+    over(sim, 100.0, 20)
+    after = proppant.account()
+    assert after["left"] - before["left"] == pytest.approx(0.1 * FAST * 100.0, rel=1e-3)
+    assert after["relative"] < 1e-12
+    assert profile(sim, flow) == pytest.approx(0.1, rel=1e-3)
+
+
+def test_narrow_channels_carry_none() -> None:
+    """They bridge: sand packs before them, up to the limit and not beyond, and the rest finds no room."""
+    for factor, passes in ((9.9, True), (10.1, False)):
+        sim, flow, proppant = flowing(proppant_size_factor=factor)
+        proppant.fill(nodes_up(sim)[:10], 0.1)
+        over(sim, 200.0, 20)
+        assert (profile(sim, flow)[15:].max() > 0.05) == passes
+    for limit in (0.6, 0.4):
+        sim, flow, proppant = flowing(20, proppant_concentration_limit=limit, aperature_factor=0.3)
+        y = sim.mesh.points[nodes_up(sim), 1]
+        edges = sim.mesh.edges()
+        upper = edges.faces[(sim.mesh.points[edges.points][:, :, 1] > 0.74).all(axis=1), 0]
+        flow.adjust(np.intersect1d(upper, flow.network.channels), {"aperature_initial": 1e-3})
+        bring(sim, proppant, 0.2)
+        over(sim, 500.0, 50)
+        now = profile(sim, flow)
+        full = now >= limit - 1e-6
+        assert now.max() <= limit + 1e-9 and full.any() and now[y > 0.8].max() == 0.0
+        room = profile(sim, flow, "volume")
+        assert proppant.account()["packed"] == pytest.approx(limit * room[full].sum(), rel=1e-5)
+        assert proppant.account()["relative"] < 1e-12
+
+
+@pytest.mark.parametrize(("power", "factor"), [(-2.0, 2.25), (-2.5, 1.5**2.5), (-1.0, 1.5)])
+def test_a_slurry_is_more_viscous(power: float, factor: float) -> None:
+    """9.15: C = 0.2, limit 0.6."""
+    drops = []
+    for c in (0.0, 0.2):
+        sim, flow, proppant = flowing(20, viscosity_power=power)
+        proppant.fill(None, c)
+        bring(sim, proppant, c)
+        over(sim, 1.0, 5)
+        pressure = profile(sim, flow, "pressure")
+        drops.append(pressure[2] - pressure[17])
+    assert drops[0] == pytest.approx(12.0 * 0.1 * FAST * 0.75 / 5e-3**3, rel=1e-6)
+    assert drops[1] / drops[0] == pytest.approx(factor, rel=1e-4)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.2])
+def test_a_pack_lets_fluid_through(factor: float) -> None:
+    """By its permeability (Kozeny & Carman), or as a channel of a part of the aperture."""
+    sim, flow, proppant = flowing(20, aperature_factor=factor, rate=1e-9)
+    proppant.fill(None, 0.6)
+    over(sim, 200.0, 20)
+    pressure = profile(sim, flow, "pressure")
+    permeability = 0.4**3 * 5e-4**2 / (180.0 * 0.6**2)
+    assert own.kozeny_carman(0.6, 5e-4) == pytest.approx(permeability)
+    resistance = 12.0 * 0.1 / (factor * 5e-3) ** 3 if factor else 0.1 / (permeability * 5e-3)
+    assert pressure[2] - pressure[17] == pytest.approx(1e-9 * 0.75 * resistance, rel=1e-4)
+    over(sim, 1.0, 1)
+    assert profile(sim, flow) == pytest.approx(0.6, rel=1e-6)  # nothing of it is washed out
+
+
+def test_a_slurry_weighs_more() -> None:
+    """What the lower end of a slot bears more than its upper one; a pack rests on its walls."""
+    for c, density in ((0.0, 1000.0), (0.2, 1330.0), (0.6, 1000.0)):
+        sim, flow, proppant = slot(20, 1.0)
+        proppant.fill(None, c)
+        over(sim, 2.0, 10)
+        pressure = profile(sim, flow, "pressure")
+        assert pressure[0] - pressure[-1] == pytest.approx(density * 9.81, rel=2e-3)
+
+
+def test_kernels_compute_what_the_plain_loop_does() -> None:
+    """A network with a closed channel and a pack, in which what comes finds too little room."""
+    rng = np.random.default_rng(5)
+    n, m = 12, 20
+    ends = np.array([rng.choice(n, 2, replace=False) for _ in range(m)])
+    q, along = rng.normal(0.0, 2e-2, m), rng.normal(0.0, 0.1, m)
+    delta, room = rng.uniform(1e-3, 5e-3, m), rng.uniform(1e-4, 2e-4, n)
+    c = rng.choice([0.0, 0.1, 0.59], n)
+    c[3] = 0.6
+    packed = c >= 0.6
+    carries = rng.random(m) > 0.2
+    nodes = np.zeros((n, own.NODE))
+    nodes[:, own.N] = c * room
+    for column in (own.ROOM_BEFORE, own.ROOM, own.VOLUME):
+        nodes[:, column] = room
+    state = np.zeros((n, own.STATE))
+    state[:, own.C], state[:, own.PACKED] = c, packed
+    table = np.zeros((m, kernels.CHANNEL))
+    table[:, kernels.APERTURE] = delta
+    # Both faces of a channel along x, a unit long: corners that begin at 4 c of x and of the other half.
+    x = np.zeros((2 * m, 4))
+    x[:m, 2], x[m:, 0] = 1.0, 1.0
+    x = x.reshape(-1)
+    one, other = 4 * np.arange(m), 4 * (m + np.arange(m))
+    both = np.concatenate([ends[:, 0], ends[:, 1]])
+    order = np.argsort(both, kind="stable")
+    begin = np.searchsorted(both[order], np.arange(n + 1))
+    channel, side = np.tile(np.arange(m), 2)[order], np.repeat([-1.0, 1.0], m)[order]
+    out, takes, dt = np.zeros((m, 2)), np.zeros(n), 0.02
+    fluid = np.zeros((n, kernels.STATE))
+    fluid[:, kernels.S] = rng.choice([0.3, 1.0], n)
+    for k in range(m):  # a grain's velocity is one for all: channels one by one
+        own.carry(ends[k : k + 1], one[k : k + 1], other[k : k + 1], carries[k : k + 1], x, q[k : k + 1],
+                  table[k : k + 1], fluid, 2e-3, along[k], 0.0, state, out[k : k + 1])  # fmt: skip
+    own.give(begin, channel, side, out, dt, nodes, state)
+    for _ in range(4):
+        own.take(begin, channel, side, ends, out, dt, 0.6, 1.0, nodes, state, takes)
+        state[:, own.TAKES] = takes
+    before = nodes[:, own.N].copy()
+    own.move(begin, channel, side, ends, out, dt, 1.0, 0.6, 0.0, nodes, state)
+    held = ~carries | (delta < 2e-3)
+    wanted = sub_step(ends, q, delta, along, held, before, room, packed, fluid[:, kernels.S], 0.6, dt, 4)
+    assert nodes[:, own.N] == pytest.approx(wanted, rel=1e-12, abs=1e-20)
+    assert nodes[:, own.N].sum() == pytest.approx(before.sum(), rel=1e-13)
+    assert (nodes[:, own.N] <= 0.6 * room * (1.0 + 1e-12)).all() and state[:, own.TAKES].min() < 1.0
+    assert not np.allclose(wanted, before, rtol=0.01) and state[:, own.GIVES].min() < 1.0
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    sim, flow, proppant = flowing(5)
+    bring(sim, proppant, 0.1)
+    for act, message in (
+        (lambda: bring(sim, proppant, 0.7), "at most that of a pack, 0.6"),
+        (lambda: bring(sim, proppant, -0.1), "negative"), (lambda: bring(sim, proppant, "no such"), "no table"),
+        (lambda: proppant.fill(None, 0.61), "between 0 and that of a pack"),
+        (lambda: proppant.fill(at(sim, x=0.2), 0.1), "no channel ends"),
+        (lambda: proppant.adjust({"viscosity_power": -4.0}), "viscosity_power"),
+        (lambda: proppant.adjust({"proppant_concentration_limit": 0.8}), "proppant_concentration_limit"),
+        (lambda: proppant.adjust({"proppant_size": 0.0}), "proppant_size"),
+        (lambda: proppant.adjust({"proppant_concentration_limit": 0.05}), "thicker than a pack, 0.05"),
+        (lambda: proppant.assign(None, {**SAND, "proppant_size": 1e-3}), "there is one proppant"),
+    ):  # fmt: skip
+        with pytest.raises(CommandError, match=message):
+            act()
