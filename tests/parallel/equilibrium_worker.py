@@ -3,7 +3,7 @@
 python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
-SOLVER-pumped: a joint that fluid opens by implicit steps, or SOLVER-cooled: a jointed bar that cools, or SOLVER-rinsed:
+SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools, or SOLVER-rinsed:
 rock that water cools; one after the other. Files are RUN.npz.
 """
 
@@ -25,10 +25,13 @@ from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
+from hpcdem.physics.proppant.model import CONCENTRATION, Proppant
 from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
 from tests.flow.support import WATER
 from tests.heat.support import GRANITE
 from tests.parallel.model import communicator
+
+SAND = {"proppant_density": 2650.0, "proppant_size": 1e-6, "proppant_concentration_limit": 0.6}
 
 NAMES = (
     "stress_xx", "stress_yy", "stress_xy", "stress_zz", "displacement_x", "displacement_y", "velocity_x", "velocity_y",
@@ -91,7 +94,7 @@ def stamp(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
-def pumped(sim: Blocks, solver: str, out: str) -> None:
+def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
     sim.take_mesh(rectangle(24, 8, 2.4, 0.8, y0=-0.4, kind="mixed"))
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     joints = np.unique(np.minimum(*(lambda faces: (faces, sim.partner[faces]))(near(sim.the_mesh(), 1, 0.0, True))))
@@ -105,6 +108,11 @@ def pumped(sim: Blocks, solver: str, out: str) -> None:
     flow = Flow.of(sim)
     flow.assign(joints, {**WATER, "aperature_initial": 5e-6})
     flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
+    if propped:
+        proppant = Proppant.of(sim)
+        proppant.assign(joints, SAND)
+        proppant.prescribe(None, CONCENTRATION, 0.2)
+        sim.gravity(5.0, 0.0)
     with Coupled(sim, 0.05, solver) as run:
         while flow.time < 1.0:
             run.advance(1.0)
@@ -113,8 +121,15 @@ def pumped(sim: Blocks, solver: str, out: str) -> None:
         found[name] = flow.values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])
+    if propped:
+        found |= {name: flow.values("flow-node", name) for name in ("concentration", "proppant")}
+        found["sand"] = np.array(list(proppant.account().values())[:5])
     if sim.comm.rank == 0:
         np.savez(out, **found)
+
+
+def propped(sim: Blocks, solver: str, out: str) -> None:
+    pumped(sim, solver, out, propped=True)
 
 
 def cooled(sim: Blocks, solver: str, out: str) -> None:
@@ -168,7 +183,8 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
     heat.assign(None, {**GRANITE, "transfer_coeficient": 20.0})
     heat.initial(None, 60.0)
     fluid = heat.of_fluid()
-    fluid.assign(None, {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 150.0})
+    fluid.assign(None, {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 150.0,
+                        "second_order": 1.0})  # fmt: skip
     heat.prescribe_fluid(network[x[network] == x[network].min()], 10.0)
     run = Implicit(sim, solver)
     for _ in range(10):
@@ -185,6 +201,6 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
 if __name__ == "__main__":
     for run in sys.argv[1:]:
         solver, _, kind = run.partition("-")
-        {"": excavation, "yields": stamp, "pumped": pumped, "cooled": cooled, "rinsed": rinsed}[kind](
-            Blocks(communicator()), solver, f"{run}.npz"
-        )
+        {"": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed}[
+            kind
+        ](Blocks(communicator()), solver, f"{run}.npz")

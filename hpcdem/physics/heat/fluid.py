@@ -267,8 +267,6 @@ class FluidHeat:
         wet = np.minimum(self.state[ends[:, 0], kernels.S], self.state[ends[:, 1], kernels.S])
         self._conduct = self.constant("conductivity") * delta * wet / self._length
         self._second = self.constant("second_order") > 0.0
-        if self._second:
-            self._look_upstream()
         self.rate = self._least_rate(w0, w, least)
 
     def _least_rate(self, w0: np.ndarray, w: np.ndarray, least: np.ndarray) -> float:
@@ -294,9 +292,11 @@ class FluidHeat:
         return float(self.blocks.comm.max_into(np.array([rate.max(initial=0.0)]))[0])
 
     def _look_upstream(self) -> None:
-        n = len(self.number)
-        kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self.state[:n],
-                         self.state)  # fmt: skip
+        n, t = len(self.number), self.heat.t.reshape(-1)
+        kernels.upstream(self._begin, self._channel, self._side, self._ends, self._q, self._length, self._held,
+                         self.state[:n], self.state)  # fmt: skip
+        kernels.rises(self._begin, self._channel, self._side, self._ends, self._conduct, self._walls, self._exchange, t,
+                      self._held, self.rho_c, self.state[:n], self.state)  # fmt: skip
         self._refresh()
 
     def advance(self, dt: float, table: np.ndarray) -> None:
@@ -317,16 +317,15 @@ class FluidHeat:
         for k in range(count):
             share = min(1.0, (self._passed + (k + 1) * short) / self._period) if self._period > 0.0 else 1.0
             w = self._w0 + share * (w1 - self._w0) if share < 1.0 else w1.copy()
+            if self._second:
+                self._look_upstream()
             kernels.faces(self._ends, self._q, self._length, self._second, short, self.state, face)
             kernels.carry(
                 short, self._begin, self._channel, self._side, self._ends, self._q, face, self._conduct, self._walls,
                 self._exchange, t, self._held, table, self.had, w, self.rho_c, self.state, fresh, self.given,
             )  # fmt: skip
             self.state[:n, kernels.T], self.state[:n, kernels.FULL], self.had = fresh, w, w
-            if self._second:
-                self._look_upstream()
-            else:
-                self._refresh()
+            self._refresh()
             kernels.to_walls(short / dt, self._ends, self._walls, self._exchange, t, self.state, self.wall_heat)
         self._passed += dt
 

@@ -3,7 +3,8 @@
 (C / dt + K) (T' - T) = Q(T') with the conductances, capacities and conditions of the explicit steps, at the end of the
 step; fluid in channels, and surfaces that touch, are in the same system. Temperatures that are prescribed are put in
 first; what the others then lack is the right-hand side, so the answer is exact to rounding whatever the linear solver
-leaves: it is solved for twice.
+leaves: it is solved for twice. What advection of second order has beyond that of first order stands on the right-hand
+side, turn by turn, until it changes no more.
 
 Nodes of heat are known to all ranks meanwhile, as those of the blocks are in the static solve.
 """
@@ -23,8 +24,9 @@ from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.implicit_fluid import Fluid
 from hpcdem.physics.heat.model import CAPACITY, GIVEN, Heat
 
-PASSES = 2
-"""Solutions of the linear system in a step: the second one takes what rounding left of the first."""
+MOST, PLENTY, CHANGE = 100, 40, 1e-7
+"""Solutions of the linear system in a step with advection of second order: how many at most, from which on changes
+count half, and the change of temperatures, over their differences, at which one is the last but one."""
 
 
 class Implicit:
@@ -115,21 +117,40 @@ class Implicit:
         of_fluid = np.empty(0)
         if fluid is not None:
             of_fluid = np.where(fluid.held >= 0, np.append(heat.held_at(after), 0.0)[fluid.held], fluid.t)
-        for _ in range(PASSES):
+        beyond = np.zeros(0 if fluid is None else len(fluid.q))
+        settled = fluid is None or not fluid.second
+        for turn in range(MOST):
+            if fluid is not None and not settled:
+                before, beyond = beyond, fluid.beyond(of_fluid)
+                if turn >= PLENTY:  # it goes back and forth
+                    beyond = 0.5 * (before + beyond)
             self._spread(new)
             force = np.zeros((count + len(of_fluid), 2))
             lack = np.where(held >= 0, 0.0, self._inflow(after) - inertia * (new - old))
             force[:count, 0] = self._everywhere(lack)
             if fluid is not None:
-                got, walls = fluid.inflow(of_fluid, self._everywhere(new))
+                rock = self._everywhere(new)
+                got, walls = fluid.inflow(of_fluid, rock, beyond)
                 force[:count, 0] += walls
                 force[count:, 0] = got - fluid.capacity / dt * (of_fluid - fluid.t)
             change = self.solver.solve(force, 0.0)[:, 0]
             new, of_fluid = new + change[heat.node_ids], of_fluid + change[count:]
+            if turn and settled:
+                break
+            if turn and fluid is not None:
+                there = np.concatenate([fluid.t, of_fluid, rock])
+                differences = max(np.ptp(there), 1e-5 * np.abs(there).max())
+                settled = bool(np.abs(change[count:]).max() <= CHANGE * differences)
+        else:
+            self._spread(old)
+            raise CommandError(
+                f"heat time {heat.time:.6g} s: advection of second order finds no balance in {MOST} turns: a "
+                "shorter dt, or second-order off"
+            )
         self._spread(new)
         walls = np.zeros(count)
         if fluid is not None:
-            got, walls = fluid.inflow(of_fluid, self._everywhere(new))
+            got, walls = fluid.inflow(of_fluid, self._everywhere(new), beyond)
             fluid.take(dt, of_fluid, got)
         self._book(dt, after, old, new, walls[heat.node_ids])
 

@@ -1,10 +1,12 @@
 """The fluid in implicit steps of heat: its flow nodes are unknowns beside the nodes of the rock.
 
-Fluid flows as it does at this moment, with its first-order upwind temperatures:
+Fluid flows as it does at this moment:
 
-    rho C W (T' - T) / dt = rho C sum(side q (T_up' - T')) + conduction + sum(a (T_wall' - T')),
+    rho C W (T' - T) / dt = rho C sum(side q (T_face' - T')) + conduction + sum(a (T_wall' - T')),
 
-all at the end of the step. Everything here is known to all ranks and the same on all: it is little beside the factors.
+all at the end of the step; T_face: that of the node upstream, or of second order. The matrix is that of first order. By
+the limiter a node is the mean, with weights from 0 on, of those around it, so nothing goes beyond them.
+Everything here is known to all ranks and the same on all: it is little beside the factors.
 """
 
 from __future__ import annotations
@@ -13,22 +15,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.linear import Pieces
+from hpcdem.physics.flow.network import at_nodes
+from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.fluid import FluidHeat, part
 from hpcdem.physics.heat.model import Heat
 
 
 @dataclass
 class Fluid:
-    """The network of a model as arrays. ends (m, 2): rows of nodes; q (m,) [m2/s]; conduct (m,), exchange (m, 2):
-    [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the rock, two at each
-    end; held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,): temperatures."""
+    """The network of a model as arrays. ends (m, 2): rows of nodes; length (m,) [m]; q (m,) [m2/s]; conduct (m,),
+    exchange (m, 2): [W/(m K)] along channels, and with each wall at their ends; walls (m, 4): nodes of heat of the
+    rock, two at each end; held (n,): row of the prescribed temperatures, -1: free; capacity (n,) [J/(m K)]; t (n,):
+    temperatures."""
 
     of: FluidHeat
     ends: np.ndarray
+    length: np.ndarray
     q: np.ndarray
     conduct: np.ndarray
     exchange: np.ndarray
@@ -43,8 +48,6 @@ class Fluid:
         fluid = heat.flowing
         if fluid is None:
             return None
-        if fluid.constant("second_order") > 0.0:
-            raise CommandError("implicit steps of heat take advection of first order: second-order off for them")
         flow, network, sim = fluid.flow, fluid.flow.network, heat.blocks
         row_of = np.full(len(network.there), -1, np.int64)
         row_of[network.nodes] = np.arange(len(network.nodes))
@@ -60,7 +63,7 @@ class Fluid:
             for f in (lower, sim.partner[lower])
         )
         return Fluid(
-            fluid, ends, q, fluid.constant("conductivity") * aperture * wet / length, exchange,
+            fluid, ends, length, q, fluid.constant("conductivity") * aperture * wet / length, exchange,
             np.column_stack([a, r, b, p]), fluid.held[network.nodes].astype(np.int64) - 1, fluid.rho_c * w, t,
         )  # fmt: skip
 
@@ -78,14 +81,32 @@ class Fluid:
             total = total + np.bincount(self.ends[:, end], into + self.conduct + 2.0 * self.exchange[:, end], n)
         return (self.held < 0) & (total > 0.0)
 
-    def inflow(self, t: np.ndarray, rock: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heat [W/m] that nodes (n,) of these temperatures get, and nodes of the rock (k,) of theirs."""
+    @property
+    def second(self) -> bool:
+        """Advection is of second order."""
+        return self.of.constant("second_order") > 0.0
+
+    def upstream(self, t: np.ndarray) -> np.ndarray:
+        """Of temperatures (n,) of nodes those (m,) upstream in the channels."""
+        return t[np.where(self.q > 0.0, *self.ends.T)]
+
+    def beyond(self, t: np.ndarray) -> np.ndarray:
+        """By how much temperatures (m,) of what flows in channels are, in second order, beyond those upstream."""
+        state, out = np.zeros((len(t), kernels.FLUID_STATE)), np.empty(len(self.q))
+        state[:, kernels.T], state[:, kernels.FULL] = t, self.capacity
+        kernels.upstream(*at_nodes(self.ends, len(t)), self.ends, self.q, self.length, self.held, state, state)
+        kernels.faces(self.ends, self.q, self.length, True, 0.0, state, out)
+        return out - self.upstream(t)
+
+    def inflow(self, t: np.ndarray, rock: np.ndarray, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heat [W/m] that nodes (n,) of these temperatures get, and nodes of the rock (k,) of theirs; beyond (m,): see
+        there, 0 in first order."""
         n, (a, b) = len(t), self.ends.T
         rho_c, out = self.of.rho_c, np.zeros(len(rock))
-        up = np.where(self.q > 0.0, t[a], t[b])
+        face = self.upstream(t) + beyond
         along = self.conduct * (t[a] - t[b])
-        got = np.bincount(b, rho_c * self.q * (up - t[b]) + along, n)
-        got += np.bincount(a, -rho_c * self.q * (up - t[a]) - along, n)
+        got = np.bincount(b, rho_c * self.q * (face - t[b]) + along, n)
+        got += np.bincount(a, -rho_c * self.q * (face - t[a]) - along, n)
         for k in range(4):
             passed = self.exchange[:, k // 2] * (t[self.ends[:, k // 2]] - rock[self.walls[:, k]])
             got -= np.bincount(self.ends[:, k // 2], passed, n)

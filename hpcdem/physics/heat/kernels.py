@@ -257,14 +257,16 @@ def thermal_stress(quad, t, stiffness, unstressed, out):
 # ---- fluid in channels -----------------------------------------------------------------------------------------------
 
 # Columns of flow nodes: temperature; saturation, and the part of the exchange with walls that goes with it; the
-# temperature of what flows in, by its rate, and how far that comes from [m]; their fluid [m2].
-T, S, X, U, FROM, FULL = range(6)
-FLUID_STATE = 6
+# temperature of what flows in, by its rate, and how far that comes from [m]; their fluid [m2]; how fast they get warmer
+# by other heat than what flows in [K/s].
+T, S, X, U, FROM, FULL, RISE = range(7)
+FLUID_STATE = 7
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def upstream(begin, channel, side, ends, q, length, own, state):
-    """Columns U and FROM of own nodes (n, k); where nothing flows in they are the node's own."""
+def upstream(begin, channel, side, ends, q, length, held, own, state):
+    """Columns U and FROM of own nodes (n, k); where nothing flows in they are the node's own and 1, or where it is held
+    0; held (n,): -1: free."""
     for i in range(len(own)):
         total = heat = way = 0.0
         for m in range(begin[i], begin[i + 1]):
@@ -274,22 +276,46 @@ def upstream(begin, channel, side, ends, q, length, own, state):
                 total += into
                 heat += into * state[ends[c, 0 if side[m] > 0.0 else 1], T]
                 way += into * length[c]
-        own[i, U], own[i, FROM] = (heat / total, way / total) if total > 0.0 else (own[i, T], 1.0)
+        own[i, U], own[i, FROM] = own[i, T], 1.0 if held[i] < 0 else 0.0
+        if total > 0.0:
+            own[i, U], own[i, FROM] = heat / total, way / total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rises(begin, channel, side, ends, conduct, walls, exchange, t, held, rho_c, own, state):
+    """Column RISE of own nodes (n, k), see `carry`; 0 where they are held or dry."""
+    for i in range(len(own)):
+        got, capacity = 0.0, rho_c * own[i, FULL]
+        for m in range(begin[i], begin[i + 1]):
+            c, end = channel[m], 0 if side[m] < 0.0 else 1
+            got += conduct[c] * (state[ends[c, 1 - end], T] - own[i, T])
+            for k in range(2 * end, 2 * end + 2):
+                got += exchange[c] * own[i, X] * (t[walls[c, k]] - own[i, T])
+        own[i, RISE] = got / capacity if held[i] < 0 and capacity > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def faces(ends, q, length, second, dt, state, out):
     """Temperatures out (m,) of what flows in channels, q (m,) [m2/s]: that of the node upstream (first order), or with
-    the slope that the limiter of van Leer (1974) leaves, at the middle of what passes in dt [s] (second order)."""
+    the slope that the limiter of van Leer (1974) leaves, in the middle of dt [s], between those of both ends (second
+    order). From a held node into which nothing flows, that of the middle of the channel: a front begins at the node."""
     for c in range(len(ends)):
         up, down = (ends[c, 0], ends[c, 1]) if q[c] > 0.0 else (ends[c, 1], ends[c, 0])
         value = state[up, T]
         out[c] = value
         rise = state[down, T] - value
         if second and rise != 0.0 and q[c] != 0.0 and state[up, FULL] > 0.0:
+            if state[up, FROM] == 0.0:
+                later = 0.5 * rise
+                if state[down, FULL] > 0.0:
+                    later += 0.25 * dt * (state[down, RISE] - abs(q[c]) / state[down, FULL] * rise)
+                out[c] = value + (min(max(later, 0.0), rise) if rise > 0.0 else max(min(later, 0.0), rise))
+                continue
             r = (value - state[up, U]) / state[up, FROM] * length[c] / rise
             if r > 0.0:
-                out[c] = value + r / (1.0 + r) * rise * max(0.0, 1.0 - dt * abs(q[c]) / state[up, FULL])
+                beyond = r / (1.0 + r) * rise
+                later = beyond * (1.0 - dt * abs(q[c]) / state[up, FULL]) + 0.5 * dt * state[up, RISE]
+                out[c] = value + (min(max(later, 0.0), beyond) if rise > 0.0 else max(min(later, 0.0), beyond))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

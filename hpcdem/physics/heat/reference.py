@@ -72,24 +72,32 @@ def fluid_step(
             inflow[b].append((rate, a, way))
         elif rate < 0.0:
             inflow[a].append((-rate, b, way))
-    heat, passes = np.zeros(len(points)), np.zeros(len(points))
+    heat, passes, rise = (np.zeros(len(points)) for _ in range(3))
+    for (a, b), way, delta in zip(ends.tolist(), length.tolist(), aperture.tolist()):
+        for node, other in ((a, b), (b, a)):
+            passes[node] += 2.0 * h * 0.5 * way * s[node] ** 2 * (3.0 - 2.0 * s[node])
+            rise[node] += k * delta * min(s[a], s[b]) / way * (t[other] - t[node])
+    rise = (rise + passes * (rock - t)) / (rho_c * w)
+    rise[list(held)] = 0.0
     for (a, b), rate, way, delta in zip(ends.tolist(), q.tolist(), length.tolist(), aperture.tolist()):
         up, down = (a, b) if rate > 0.0 else (b, a)
         value = t[up]
-        if second and inflow[up] and t[down] != t[up]:
+        if second and up in held and not inflow[up]:
+            later = t[down] + 0.5 * dt * (rise[down] + abs(rate) / w[down] * (t[up] - t[down]))
+            value = np.clip(0.5 * (t[up] + later), *sorted((t[up], t[down])))
+        elif second and inflow[up] and t[down] != t[up]:
             total = sum(one for one, _, _ in inflow[up])
             before = sum(one * t[node] for one, node, _ in inflow[up]) / total
             distance = sum(one * far for one, _, far in inflow[up]) / total
             r = (t[up] - before) / distance / ((t[down] - t[up]) / way)
             limiter = (r + abs(r)) / (1.0 + abs(r))
-            value += 0.5 * limiter * (t[down] - t[up]) * max(0.0, 1.0 - dt * abs(rate) / w[up])
+            most = 0.5 * limiter * (t[down] - t[up])
+            value += np.clip(most * (1.0 - dt * abs(rate) / w[up]) + 0.5 * dt * rise[up], *sorted((0.0, most)))
         heat[down] += rho_c * abs(rate) * (value - t[down])
         heat[up] -= rho_c * abs(rate) * (value - t[up])
         along = k * delta * min(s[a], s[b]) / way * (t[a] - t[b])
         heat[b] += along
         heat[a] -= along
-        for node in (a, b):
-            passes[node] += 2.0 * h * 0.5 * way * s[node] ** 2 * (3.0 - 2.0 * s[node])
     after = t + dt * (heat + passes * (rock - t)) / (rho_c * w + dt * passes)
     for node, value in held.items():
         after[node] = value

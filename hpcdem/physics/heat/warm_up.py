@@ -35,7 +35,8 @@ def _fluid() -> None:
     ends, walls, held = np.array([[0, 1]]), np.zeros((1, 4), np.int64), np.full(2, -1)
     one, two, state = np.ones(1), np.ones(2), np.ones((2, kernels.FLUID_STATE))
     face, out, wall_heat = np.empty(1), np.empty(2), np.zeros((1, 4))
-    kernels.upstream(begin, channel, side, ends, one, one, state[:2], state)
+    kernels.upstream(begin, channel, side, ends, one, one, held, state[:2], state)
+    kernels.rises(begin, channel, side, ends, one, walls, one, one, held, 1.0, state[:2], state)
     kernels.faces(ends, one, one, True, 1.0, state, face)
     kernels.carry(
         1.0, begin, channel, side, ends, one, face, one, walls, one, one, held, one, two, two, 1.0, state, out, out
