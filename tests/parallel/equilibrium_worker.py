@@ -3,8 +3,8 @@
 python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
-SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools, or SOLVER-rinsed:
-rock that water cools; one after the other. Files are RUN.npz.
+SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools,
+or SOLVER-rinsed: rock that water cools; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -197,6 +197,10 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
     if sim.comm.rank == 0:
         np.savez(out, **found)
 
+
+KINDS = {
+    "": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed,
+}  # fmt: skip
 
 if __name__ == "__main__":
     for run in sys.argv[1:]:

@@ -16,6 +16,7 @@ WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 pytestmark = pytest.mark.ranks
 SLOW = pytest.mark.slow
+KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed")
 Found = dict[str, np.ndarray]
 
 
@@ -34,9 +35,7 @@ def runs(tmp_path_factory) -> Callable[[int, str], Found]:
                 found[name] = dict(values)
         return found
 
-    return lambda ranks, name: started(
-        ranks, *(name.split("-")[0] + kind for kind in ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed"))
-    )[name]
+    return lambda ranks, name: started(ranks, *(name.split("-")[0] + kind for kind in KINDS))[name]
 
 
 @pytest.fixture(scope="module")
