@@ -4,7 +4,8 @@ Published (Li et al., abstract of the 2017 CGU meeting, shown on the author's pa
 cohesion 2e7 Pa, 10 km of shortening): friction 0.2 and 0.3 give imbricate forethrusts packed near the wall, 0.0 and 0.1
 fore- and backthrusts in pairs (pop-ups) that reach farther; strain on the detachment runs 5 to 10 km ahead of the
 deformation of the surface. Here the bed is half as long and half as thick and is pushed half as far, with the same
-material: style and order are compared, not lengths.
+material: style and order are compared, not lengths. Which thrust forms next is chaotic: the share of backthrusts in one
+bed on a frictionless detachment lies between 0.24 and 0.46, so styles are compared over five beds.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from tests.published import measure
 from tests.published.conftest import Series
 
 FRICTION = (0.0, 0.1, 0.2, 0.3)
+BEDS = (31, 32, 33, 34, 35)
+"""Seeds."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,21 @@ def share_back(frames: list[measure.Grains]) -> float:
 
 @pytest.fixture(scope="module")
 def belts(push: Series) -> dict[float, Belt]:
-    runs = push([dict(seed=31, detachment=mu, tension=1e7, way=5000.0, speed=2.5) for mu in FRICTION])
+    runs = push([_run(31, mu) for mu in FRICTION])
     return {mu: belt(frames) for mu, frames in zip(FRICTION, runs)}
+
+
+@pytest.fixture(scope="module")
+def styles(push: Series) -> dict[float, list[Belt]]:
+    """Of all beds, on the weakest and on the strong detachments."""
+    found = {}
+    for mu in (0.0, 0.2, 0.3):
+        found[mu] = [belt(frames) for frames in push([_run(seed, mu) for seed in BEDS])]
+    return found
+
+
+def _run(seed: int, mu: float) -> dict[str, float]:
+    return dict(seed=seed, detachment=mu, tension=1e7, way=5000.0, speed=2.5)
 
 
 @pytest.mark.slow
@@ -79,19 +95,28 @@ def test_a_weak_detachment_spreads_the_deformation(belts: dict[float, Belt]) -> 
 
 
 @pytest.mark.slow
-def test_pop_ups_on_a_weak_detachment_forethrusts_on_a_strong_one(belts: dict[float, Belt]) -> None:
-    def slip(b: Belt, vergence: int) -> float:
-        return sum(t.slip for t in b.thrusts if t.vergence == vergence)
+def test_pop_ups_on_a_weak_detachment_forethrusts_on_a_strong_one(
+    belts: dict[float, Belt], styles: dict[float, list[Belt]]
+) -> None:
+    """Both vergences alike on the weak one: in the mean over the beds its share of backthrusting is larger by at least
+    twice the standard error."""
 
-    weak, strong = belts[0.0], (belts[0.2], belts[0.3])
-    assert weak.back > 0.4
+    def slip(beds: list[Belt], vergence: int) -> float:
+        return sum(t.slip for b in beds for t in b.thrusts if t.vergence == vergence)
+
+    back = {mu: np.array([b.back for b in beds]) for mu, beds in styles.items()}
+    print(back)
+    weak = styles[0.0]
     assert slip(weak, 1) < 1.5 * slip(weak, -1)
-    assert {t.vergence for t in weak.thrusts if t.slip > 300.0} == {1, -1}
-    for b in strong:
-        assert b.back < 0.35
-        assert slip(b, 1) > 1.5 * slip(b, -1)
-        assert max(b.thrusts, key=lambda t: t.slip).vergence == 1
-    assert belts[0.1].back > min(b.back for b in strong)
+    assert all({t.vergence for t in b.thrusts if t.slip > 300.0} == {1, -1} for b in weak)
+    for mu in (0.2, 0.3):
+        strong = styles[mu]
+        error = np.sqrt((back[0.0].var(ddof=1) + back[mu].var(ddof=1)) / len(BEDS))
+        assert back[0.0].mean() > back[mu].mean() + 2.0 * error and back[0.0].mean() > 1.3 * back[mu].mean()
+        assert back[mu].max() < 0.35
+        assert slip(strong, 1) > 1.5 * slip(strong, -1)
+        assert all(max(b.thrusts, key=lambda t: t.slip).vergence == 1 for b in strong)
+    assert belts[0.1].back > min(belts[0.2].back, belts[0.3].back)
 
 
 @pytest.mark.slow
