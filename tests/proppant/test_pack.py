@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
@@ -76,11 +76,14 @@ def test_fluid_that_does_not_push_leaves_the_pack_where_it_is() -> None:
         assert np.abs(diagnostics.values(sim, "stress_yy")).max() == 0.0, switch
 
 
-def test_implicit_steps_refuse_a_pack_that_bears() -> None:
+def test_implicit_steps_and_the_static_solve_refuse_a_pack_that_bears() -> None:
     sim, flow, proppant = closed(0.0, proppant_modulus=1e7)
     sim.option(large_strain=False)
     with pytest.raises(CommandError, match="no pack of proppant that bears: proppant-modulus 0"), Coupled(sim, 1.0):
         pass
+    with pytest.raises(CommandError, match="the static solve knows no proppant"):
+        equilibrium.solve_elastic(sim)
     proppant.adjust({"proppant_modulus": 0.0})
+    equilibrium.solve_elastic(sim)
     with Coupled(sim, 1.0) as steps:
         steps.advance(1.0)

@@ -22,10 +22,13 @@ class SurfaceLoad(ABC):
 
     name: ClassVar[str]
     of_mesh: ClassVar[bool] = False
-    stays: ClassVar[bool] = False
-    """Its forces stay as they are while the static solve looks for equilibrium."""
     kernel_kind: ClassVar[str] = ""
     """Kind of the kernels that it needs besides those of blocks, see `session.KINDS`."""
+
+    @property
+    def stays(self) -> bool:
+        """Its forces stay as they are while the static solve looks for equilibrium."""
+        return False
 
     @abstractmethod
     def corners(self, blocks: Any) -> np.ndarray:

@@ -115,7 +115,6 @@ class Flow(SurfaceLoad):
     name: ClassVar[str] = "fluid"
     kernel_kind: ClassVar[str] = "flow"
     of_mesh: ClassVar[bool] = True
-    stays: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
@@ -152,6 +151,10 @@ class Flow(SurfaceLoad):
         self.carried: np.ndarray | None = None
         """Volumes [m2] that flowed along the channels of this rank in the last cycle; None: nobody asks."""
         self._told: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def stays(self) -> bool:
+        return True
 
     @staticmethod
     def there(blocks: Blocks) -> Flow | None:

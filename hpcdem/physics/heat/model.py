@@ -68,7 +68,6 @@ class Heat(SurfaceLoad):
     name: ClassVar[str] = "heat"
     kernel_kind: ClassVar[str] = "heat"
     of_mesh: ClassVar[bool] = True
-    stays: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
@@ -97,6 +96,10 @@ class Heat(SurfaceLoad):
         self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
         self._told = 0.0
         self._limit = math.inf
+
+    @property
+    def stays(self) -> bool:
+        return True
 
     @staticmethod
     def there(blocks: Blocks) -> Heat | None:

@@ -57,7 +57,6 @@ class Proppant(SurfaceLoad):
     name: ClassVar[str] = "proppant"
     kernel_kind: ClassVar[str] = "proppant"
     of_mesh: ClassVar[bool] = True
-    stays: ClassVar[bool] = True
 
     def __init__(self, blocks: Blocks, flow: Flow) -> None:
         self.blocks, self.flow = blocks, flow
@@ -82,6 +81,11 @@ class Proppant(SurfaceLoad):
         flow.more["concentration"] = lambda: self.state[: len(self.number), kernels.C]
         flow.more["proppant"] = lambda: self.nodes[:, kernels.N]
         flow.more["pack_pressure"] = lambda: self.state[: len(self.number), kernels.PUSHES]
+
+    @property
+    def stays(self) -> bool:
+        """Not if a pack pushes on walls, the less the farther they go."""
+        return not self.values.get("proppant_modulus", 0.0) > 0.0
 
     @staticmethod
     def there(blocks: Blocks) -> Proppant | None:
