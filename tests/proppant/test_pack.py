@@ -76,6 +76,23 @@ def test_fluid_that_does_not_push_leaves_the_pack_where_it_is() -> None:
         assert np.abs(diagnostics.values(sim, "stress_yy")).max() == 0.0, switch
 
 
+def test_what_a_pack_does_is_work_from_outside() -> None:
+    """A pack that becomes too thick for its room throws its walls apart; the budget of energy closes."""
+    sim, flow = split(dynamic=True, fluid_bulk=1e3)
+    changes.crack(sim, flow.network.channels)
+    flow.fill(None, saturation=1.0)
+    proppant = Proppant.of(sim)
+    proppant.assign(flow.network.channels, {**FINE, "proppant_modulus": 1e7})
+    proppant.fill(None, 0.6)
+    diagnostics.account_energy(sim)
+    run(sim, 10)
+    assert diagnostics.energies(sim)["kinetic"] < 1e-6
+    proppant.adjust({"proppant_concentration_limit": 0.5})
+    run(sim, 500)
+    energies = diagnostics.energies(sim)
+    assert energies["kinetic"] > 0.1 and energies["work_outside"] > 0.1 and energies["relative"] < 0.02
+
+
 def test_implicit_steps_and_the_static_solve_refuse_a_pack_that_bears() -> None:
     sim, flow, proppant = closed(0.0, proppant_modulus=1e7)
     sim.option(large_strain=False)
