@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 NEWTON = 1000.0
 """Reynolds number beyond which the drag coefficient is 0.44."""
 
@@ -28,6 +26,8 @@ def stokes(size: float, density: float, fluid: float, viscosity: float, gravity:
 
 def terminal(size: float, density: float, fluid: float, viscosity: float, gravity: float) -> float:
     """The same after Schiller and Naumann."""
+    from scipy.optimize import brentq  # as long to import as all of this package
+
     slow = stokes(size, density, fluid, viscosity, gravity)
     if slow == 0.0:
         return 0.0
