@@ -18,7 +18,7 @@ from hpcdem.physics.flow import wells as w
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.properties import POROUS
 from hpcdem.physics.heat.properties import FLUID_HEAT
-from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
+from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant, checked
 from hpcdem.physics.proppant.properties import PROPPANT, split
 
 _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_rate": kernels.RATE}
@@ -38,16 +38,18 @@ def model(project: Project, properties: Mapping[str, Value], where: Range | None
         if known is None:
             blocks.surface_loads.remove(flow)
         raise
+    proppant = Proppant.there(blocks)
+    if proppant is not None:
+        proppant.leave(joints)
 
 
 def with_proppant(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """The same, and the fluid carries proppant there (physics.proppant.properties)."""
     fluid, grains = split(dict(properties))
     joints = chosen(project, JOINT, where)
-    PROPPANT.complete({name: value for name, value in grains.items() if isinstance(value, (int, float))})
+    checked(grains)
     model(project, fluid, where)
-    blocks = project.ready()
-    Proppant.of(blocks).assign(joints, grains)
+    Proppant.of(project.ready()).assign(joints, grains)
 
 
 def _proppant(project: Project) -> Proppant:

@@ -46,6 +46,14 @@ _COLUMNS = ("proppant", "came", "left", "room", "volume", "given", "packed")
 _SAVED = [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM, kernels.VOLUME]
 
 
+def checked(given: Mapping[str, Any]) -> dict[str, float]:
+    """These properties, with defaults for others."""
+    for name, value in given.items():
+        if not isinstance(value, (int, float)):
+            raise CommandError(f"there is one proppant in all channels: {name} must be a number")
+    return PROPPANT.complete(given)
+
+
 class Proppant(SurfaceLoad):
     """The proppant of a model with fluid. Methods are collective unless they say otherwise; CommandError, alike on all
     ranks, for what makes no sense.
@@ -111,6 +119,23 @@ class Proppant(SurfaceLoad):
         self.carries[at] = True
         self.blocks.changed()
 
+    def leave(self, joints: np.ndarray | None) -> None:
+        """Channels among these joints (None: all) carry none any more."""
+        at = self.blocks.numbers_of_joints(joints)
+        self.blocks.before_change()
+        self.carries[at] = False
+        self.blocks.changed()
+
+    def _nodes(self, points: np.ndarray | None) -> np.ndarray:
+        """Those of these points (None: all) at which a channel ends that carries proppant."""
+        network = self.flow.network
+        asked = self.flow.flow_nodes(points)
+        found = np.intersect1d(asked, network.ends[self.carries[network.channels]])
+        if not len(found):
+            raise CommandError(f"no channel that carries proppant ends at node {asked[0]}" + " nor at the others" * (
+                len(asked) > 1))  # fmt: skip
+        return found
+
     def adjust(self, given: Mapping[str, Any]) -> None:
         """Change some properties."""
         self._say({**self.values, **given}, {})
@@ -118,10 +143,7 @@ class Proppant(SurfaceLoad):
         self.blocks.changed()
 
     def _say(self, given: Mapping[str, Any], before: Mapping[str, float]) -> None:
-        for name, value in given.items():
-            if not isinstance(value, (int, float)):
-                raise CommandError(f"there is one proppant in all channels: {name} must be a number")
-        values = PROPPANT.complete(given)
+        values = checked(given)
         for name in before:
             if before[name] != values[name]:
                 raise CommandError(
@@ -137,7 +159,7 @@ class Proppant(SurfaceLoad):
     def prescribe(self, nodes: np.ndarray | None, kind: str, value: Number) -> None:
         """The concentration of slurry that comes in at flow nodes among these points (None: all) from now on, or a
         volume rate of proppant [m2/s] at each of them."""
-        at = self.flow.flow_nodes(nodes)
+        at = self._nodes(nodes)
         values = said.checked(self.blocks.tables, value, f"the {kind} of proppant")
         limit = self.values["proppant_concentration_limit"]
         if values.min() < 0.0 or (kind == CONCENTRATION and values.max() > limit):
@@ -163,10 +185,12 @@ class Proppant(SurfaceLoad):
             raise CommandError(
                 f"the concentration of proppant lies between 0 and that of a pack, {limit:g}, got {concentration:g}"
             )
-        at = self.flow.flow_nodes(nodes)
+        at = self._nodes(nodes)
         self.blocks.close_model()
         self.take_rooms()
         mine = np.isin(self.number, at)
+        if concentration > 0.0 and not self.blocks.comm.any(bool((self.nodes[mine, kernels.ROOM] > 0.0).any())):
+            raise CommandError("these flow nodes are dry: flow-node initial pressure or saturation comes first")
         new = concentration * self.nodes[mine, kernels.ROOM]
         self.nodes[mine, kernels.CAME] += new - self.nodes[mine, kernels.N]
         self.nodes[mine, kernels.N] = new
