@@ -41,9 +41,8 @@ NO_STOKES = 1.0
 CONCENTRATION, RATE = "concentration", "rate"
 _COLUMNS = ("proppant", "came", "left", "room", "volume", "given", "packed")
 """Of nodes, as they are saved; given: fluid that conditions had given."""
-
-
 _SAVED = [kernels.N, kernels.CAME, kernels.LEFT, kernels.ROOM, kernels.VOLUME]
+"""The first of these."""
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, float]:
@@ -270,10 +269,7 @@ class Proppant(SurfaceLoad):
             return
         n, mine = len(self.number), flow.number
         wanted = flow.held[len(mine) :]
-        had = np.column_stack([
-            self.nodes[:, _SAVED], self.given,
-            self.state[:n, kernels.PACKED], np.ones(n),
-        ])  # fmt: skip
+        had = np.column_stack([self.nodes[:, _SAVED], self.given, self.state[:n, kernels.PACKED], np.ones(n)])
         rows, owner = moved(comm, len(network.there), self.number, had, mine, wanted)
         self.number = mine.copy()
         self.nodes = np.zeros((len(mine), kernels.NODE))
@@ -298,7 +294,7 @@ class Proppant(SurfaceLoad):
         self._out = np.zeros((len(channels), 2))
         self._takes = np.zeros(len(mine))
         self._prescribed = self.condition[mine].astype(np.int64)
-        self._settle(part=1.0)
+        self._settle()
         flow.find_geometry()
 
     def _forget(self, gone: np.ndarray) -> None:
@@ -312,10 +308,10 @@ class Proppant(SurfaceLoad):
         self.state = self.state[: len(gone)][~gone]
         self.number, self.nodes, self.given = self.number[~gone], self.nodes[~gone], self.given[~gone]
 
-    def _settle(self, part: float = 1.0) -> None:
+    def _settle(self) -> None:
         v = self.values
         kernels.settle(
-            part, v["proppant_concentration_limit"], v["viscosity_power"], v["proppant_modulus"], self.nodes, self.state
+            1.0, v["proppant_concentration_limit"], v["viscosity_power"], v["proppant_modulus"], self.nodes, self.state
         )
         self._refresh()
 

@@ -8,6 +8,7 @@ Stokes' 24 / Re is the limit of small Re.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 NEWTON = 1000.0
 """Reynolds number beyond which the drag coefficient is 0.44."""
@@ -24,6 +25,7 @@ def stokes(size: float, density: float, fluid: float, viscosity: float, gravity:
     return (density - fluid) * size * size * gravity / (18.0 * viscosity)
 
 
+@lru_cache(maxsize=8)
 def terminal(size: float, density: float, fluid: float, viscosity: float, gravity: float) -> float:
     """The same after Schiller and Naumann."""
     from scipy.optimize import brentq  # as long to import as all of this package
