@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.proppant.model import Proppant
 from hpcdem.post import blocks
-from tests.flow.test_pictures import coloured
+from hpcdem.post.measure import report
+from hpcdem.post.measure.scene import Request
+from tests.flow.test_pictures import Quiet, coloured
 from tests.pcdc.fake import Bench, Noted
 
 MEDIUM = "f-den 1000 f-bulk 2.2e9 vis 1e-6 a-initial 1e-2 a-min 1e-3 p-den 2650 p-s 5e-4 p-c-l 0.6"
@@ -75,6 +78,12 @@ pcdc chart export 'sand' 'sand.png' fluid concentration
     along, c = np.array(curve.points).T
     assert (along[0], along[-1]) == (0.0, 2.0) and c[0] > 0.09 > 0.01 > c[-1]
     assert found.project.result("sand.png").stat().st_size > 10_000
+    frames.vtk(found.project, "sand")
+    frames.settle(found.project)
+    report.run(SerialComm(), Quiet(), Request(found.project.outdir, ("fluid",)))
+    rows = list(csv.DictReader((found.project.outdir / "measure" / "fluid_last.csv").open()))
+    assert max(float(row["concentration"]) for row in rows) > 0.09 and "temperature[K]" not in rows[0]
+    assert {float(row["pack_pressure[Pa]"]) for row in rows} == {0.0}
 
 
 def test_a_well_brings_it_too(tmp_path: Path) -> None:

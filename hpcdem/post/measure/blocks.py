@@ -311,6 +311,14 @@ def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
     return [Sheet("fragments", head, rows()), Sheet("fragments_last", names, each)]
 
 
+OF_CHANNELS = {
+    "state": "state", "pressure[Pa]": "fluid_pressure", "saturation": "saturation", "aperture[m]": "aperture",
+    "flow_rate[m2/s]": "flow_rate", "velocity[m/s]": "fluid_velocity", "temperature[K]": "fluid_temperature",
+    "concentration": "proppant_concentration", "pack_pressure[Pa]": "pack_pressure",
+}  # fmt: skip
+"""Columns of channels, and in frames; the last ones are there with further physics."""
+
+
 def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) -> list[Sheet]:
     """Over time, and each channel of a frame, the last one."""
     head = (
@@ -319,15 +327,12 @@ def fluid_sheets(parts: Sequence[Part], state: MeshState, wanted: np.ndarray) ->
     )  # fmt: skip
     some = [(one, one.fluid) for one in parts if one.fluid is not None]
     rows = ((one.step, one.time, *astuple(fluid)) for one, fluid in some)
-    names = ("joint", "x[m]", "y[m]", "length[m]", "state", "pressure[Pa]", "saturation", "aperture[m]",
-             "flow_rate[m2/s]", "velocity[m/s]")  # fmt: skip
     at = channels(state, wanted)
     j, middle = state.of_joints, state.points[state.joints[at]].mean(axis=1)
-    given = (j[name][at] for name in ("state", "fluid_pressure", "saturation", "aperture", "flow_rate",
-                                      "fluid_velocity"))  # fmt: skip
-    columns = (j["number"][at].astype(np.int64), *middle.T, _lengths(state)[at], *given)
+    there = {name: column for name, column in OF_CHANNELS.items() if column in j}
+    columns = (j["number"][at].astype(np.int64), *middle.T, _lengths(state)[at], *(j[c][at] for c in there.values()))
     each = zip(*(c.tolist() for c in columns), strict=True)
-    return [Sheet("fluid", head, rows), Sheet("fluid_last", names, each)]
+    return [Sheet("fluid", head, rows), Sheet("fluid_last", ("joint", "x[m]", "y[m]", "length[m]", *there), each)]
 
 
 @dataclass(frozen=True)
