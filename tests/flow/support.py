@@ -7,6 +7,7 @@ import numpy as np
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from tests.blocks.support import model, rectangle
 
@@ -64,3 +65,14 @@ def until(sim: Blocks, time: float) -> None:
     """To this flow time [s] or a little further."""
     while sim.clock.time < time:
         sim.step()
+
+
+def over(sim: Blocks, time: float, steps: int) -> Coupled:
+    """So much time [s] in so many equal implicit steps at most."""
+    flow = Flow.of(sim)
+    end = flow.time + time
+    flow.implicit_dt = 0.0
+    with Coupled(sim, time / steps) as run:
+        while flow.time < end * (1.0 - 1e-12):
+            run.advance(end)
+    return run

@@ -17,19 +17,7 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.pre.mesh import structured
 from tests.blocks.support import JOINT, ROCK, jointed, model, near, rectangle, shaken
 from tests.flow import exact
-from tests.flow.support import WATER, at, hold, inner, line, standing
-
-
-def over(sim: Blocks, time: float, steps: int) -> Coupled:
-    """So much time [s] in so many equal steps at most."""
-    flow = Flow.of(sim)
-    end = flow.time + time
-    flow.implicit_dt = 0.0
-    with Coupled(sim, time / steps) as run:
-        while flow.time < end * (1.0 - 1e-12):
-            run.advance(end)
-    return run
-
+from tests.flow.support import WATER, at, hold, inner, line, over, standing
 
 # ---- flow alone ---------------------------------------------------------------------------------------------------
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant.model import Proppant
 from tests.blocks.support import rectangle
@@ -40,13 +39,3 @@ def nodes_up(sim: Blocks) -> np.ndarray:
 def profile(sim: Blocks, flow: Flow, name: str = "concentration") -> np.ndarray:
     """A quantity of the nodes of the row, from below."""
     return flow.values("flow-node", name, nodes_up(sim))
-
-
-def over(sim: Blocks, time: float, steps: int) -> None:
-    """So much time [s] in so many equal implicit steps."""
-    flow = Flow.of(sim)
-    end = flow.time + time
-    flow.implicit_dt = 0.0
-    with Coupled(sim, time / steps) as run:
-        while flow.time < end * (1.0 - 1e-12):
-            run.advance(end)

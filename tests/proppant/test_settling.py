@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hpcdem.physics.proppant import settling
-from tests.proppant.support import OIL, nodes_up, over, profile, slot
+from tests.flow.support import over
+from tests.proppant.support import OIL, nodes_up, profile, slot
 
 
 @pytest.mark.parametrize("reynolds", [0.01, 0.1, 1.0, 10.0, 77.0, 300.0, 999.0])

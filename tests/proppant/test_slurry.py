@@ -12,8 +12,8 @@ from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant import kernels as own
 from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
 from hpcdem.physics.proppant.reference import sub_step
-from tests.flow.support import at, hold, until
-from tests.proppant.support import OIL, SAND, nodes_up, over, profile, slot
+from tests.flow.support import at, hold, over, until
+from tests.proppant.support import OIL, SAND, nodes_up, profile, slot
 
 FAST = 1e-5
 """Flow of the slots below [m2/s]."""
