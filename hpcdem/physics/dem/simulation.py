@@ -445,12 +445,12 @@ class Simulation(Model):
             )  # fmt: skip
             self._fast_rows, self._fast_at = self.fast.among(p["gid"])
             self.clumps.close(p, halo, self._lists, self.clock.step, rebuild_state.side)
-            self._count_bonds(hist)
             self._hist = None
             rebuild_state.age = 0
             self.rebuilds += 1
             self._tables_stale = True
             self.refresh_tables()
+            self._count_bonds(hist)  # last: what is wrong is still written as a frame
 
     def _count_bonds(self, hist: Histories) -> None:
         """Every bond must have found its place in the new lists (a bond is remembered by both its ends)."""
