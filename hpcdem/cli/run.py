@@ -237,6 +237,8 @@ def reproduction(session: Session, options: Options) -> Reproduction | None:
 
 
 _BEGINS_ZDEM = re.compile(rb"(star?t?|res(t(o(r(e)?)?)?)?\b[^=]*|load?\b[^=]*)\s*([#!;].*)?", re.IGNORECASE)
+_SETS = re.compile(rb"\w+\s*=\s*[-+.\d]")
+"""A line that sets a parameter, which may come before."""
 
 
 def speaks_zdem(path: Path) -> bool:
@@ -245,7 +247,7 @@ def speaks_zdem(path: Path) -> bool:
     try:
         with open(path, "rb") as file:
             lines = (line.strip().removeprefix(b"\xef\xbb\xbf").strip() for line in file)
-            first = next((line for line in lines if line and line[:1] not in b"#!;"), b"")
+            first = next((line for line in lines if line and line[:1] not in b"#!;" and not _SETS.match(line)), b"")
     except OSError:
         return False
     return _BEGINS_ZDEM.fullmatch(first) is not None

@@ -46,6 +46,11 @@ class FolderLock:
                 raise
             self.works = self._handle >= 0
 
+    @property
+    def descriptors(self) -> tuple[int, ...]:
+        """What a child has to inherit to hold the lock as well, until it ends; none where there are no locks."""
+        return (self._handle,) if self._handle >= 0 else ()
+
     def release(self) -> None:
         """Give it back and remove the file."""
         if self._handle >= 0:

@@ -7,7 +7,7 @@ several words or several lines together are in `rules` and `plan`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,6 +17,7 @@ from hpcdem.lang.zdem import lexer, plan, rules
 from hpcdem.lang.zdem import table as t
 from hpcdem.lang.zdem.lexer import Line, Token
 from hpcdem.lang.zdem.nearest import hint
+from hpcdem.lang.zdem.parameters import Parameter, Parameters
 from hpcdem.lang.zdem.statement import Statement
 
 LONGEST_NAME = 255
@@ -26,11 +27,12 @@ LONGEST_NAME = 255
 @dataclass(frozen=True)
 class Script:
     """A script that was read and found correct. file: as in messages; statements: up to STOP, which is among them;
-    text: all of it, as it was read."""
+    text: all of it, as it was read; parameters: by their names."""
 
     file: str
     statements: tuple[Statement, ...]
     text: str = ""
+    parameters: dict[str, Parameter] = field(default_factory=dict)
 
     @property
     def directory(self) -> Path:
@@ -52,8 +54,12 @@ def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDE
     if isinstance(source, str):
         source = source.encode("utf-8", errors="surrogatepass")
     statements: list[Statement] = []
+    parameters = Parameters(file, table)
     for line in lexer.read_lines(source, file):
-        statement = _LineParser(line, file, table, statements[-1] if statements else None).statement()
+        if parameters.take(line):
+            continue
+        before = statements[-1] if statements else None
+        statement = _LineParser(parameters.put_in(line), file, table, before).statement()
         rules.check_statement(statement)
         rules.check_place(statement, statements)
         statements.append(statement)
@@ -61,8 +67,9 @@ def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDE
             break
     if not statements:
         raise ScriptError(file, 1, f"there is no command in the script; the first must be {rules.BEGINNINGS}")
+    parameters.check()
     plan.follow(statements)
-    return Script(file, tuple(statements), source.decode("utf-8", errors="replace"))
+    return Script(file, tuple(statements), source.decode("utf-8", errors="replace"), parameters.known)
 
 
 class _LineParser:

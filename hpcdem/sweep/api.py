@@ -1,0 +1,119 @@
+"""The same for Python programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hpcdem.core.errors import UsageError
+from hpcdem.lang import parameters
+from hpcdem.sweep import array, design, driver
+from hpcdem.sweep import plan as plans
+from hpcdem.sweep.design import Sampling
+
+if TYPE_CHECKING:
+    from hpcdem.sweep.plan import Member, Plan
+    from hpcdem.sweep.tables import Report
+
+
+class Sweep:
+    """One script with many values of its parameters.
+
+    ::
+
+        sweep = hpcdem.Sweep("push.py", {"friction": [0.2, 0.3]}, seed="1:10", ranks=2)
+        sweep.run()
+        report = sweep.report()
+        print(report.members["wedge.taper[deg] end"])
+
+    values: by parameter, a list, or words as on the command line ("0.2,0.3", "1:10", "0.1:0.5:5"); latin, sobol: so
+    many samples of the ranges LOW:HIGH among them, by the sampling's own seed `sampling_seed`; folder: of the sweep,
+    by default SCRIPT_sweep beside the script; links: files that the script reads. A folder that holds this sweep is
+    taken up, with members that are new. UsageError or ScriptError, before anything is written, for what cannot be.
+    """
+
+    def __init__(
+        self,
+        script: Path | str,
+        values: Mapping[str, str | Sequence[Any]] | None = None,
+        *,
+        seed: str | Sequence[int] | None = None,
+        latin: int | None = None,
+        sobol: int | None = None,
+        sampling_seed: int = 0,
+        ranks: int = 1,
+        threads: int = 1,
+        folder: Path | str | None = None,
+        links: Sequence[Path | str] = (),
+    ) -> None:
+        path = Path(script)
+        wanted = dict(values or {})
+        if seed is not None:
+            if "seed" in wanted:
+                raise UsageError("seed is given twice")
+            wanted["seed"] = seed
+        if latin is not None and sobol is not None:
+            raise UsageError("latin and sobol are two ways of sampling; give one")
+        number = latin if latin is not None else sobol
+        sampling = None if number is None else Sampling("latin" if sobol is None else "sobol", number, sampling_seed)
+        if number is not None and number < 1:
+            raise UsageError(f"{number} samples: at least one is expected")
+        try:
+            text = path.read_bytes()
+        except OSError as problem:
+            raise UsageError(f"{path}: cannot read the script: {problem.strerror}") from None
+        adjustable = parameters.read(text, str(path))
+        members = design.members(adjustable, wanted, sampling)
+        place = path.parent / f"{path.stem}_sweep" if folder is None else Path(folder)
+        self.plan, self.new = plans.make(
+            place, adjustable, members, {name: words if isinstance(words, str) else list(words)
+                                         for name, words in wanted.items()},
+            None if sampling is None else [sampling.method, sampling.number, sampling.seed], ranks, threads,
+            [Path(link) for link in links],
+        )  # fmt: skip
+
+    @classmethod
+    def open(cls, folder: Path | str) -> Sweep:
+        """The sweep in a folder. UsageError if there is none."""
+        self = cls.__new__(cls)
+        self.plan, self.new = plans.load(Path(folder)), 0
+        return self
+
+    plan: Plan
+    new: int
+
+    @property
+    def folder(self) -> Path:
+        """Where everything is."""
+        return self.plan.folder
+
+    @property
+    def members(self) -> list[Member]:
+        """The runs: `folder`, `values`, `state`."""
+        return self.plan.members
+
+    def run(self, jobs: int | None = None, tries: int = 2, log: Any = None) -> dict[str, str]:
+        """Carry out all that is not done, at most `jobs` at once [as many as cores allow]; returns the states."""
+        return driver.run(self.plan, log or _log(), jobs, tries)
+
+    def submit(self, options: Sequence[str] = (), at_once: int | None = None) -> str:
+        """As a job array of Slurm; returns its number, "" if there is nothing to do."""
+        path = array.write(self.plan, options, at_once)
+        return "" if path is None else array.submit(path)
+
+    def report(self, what: Sequence[str] = (), formats: Sequence[str] = ("png",), **options: Any) -> Report:
+        """Measure all members that are done (options: those of `hpcdem measure`, as `--strain`: strain=0.3), and write
+        tables and figures into `report` of the folder. Returns the tables."""
+        from hpcdem.halo.comm import SerialComm
+        from hpcdem.post.measure.scene import Request
+        from hpcdem.sweep import report
+
+        request = Request(folder=self.folder, what=tuple(what), formats=tuple(formats), **options)
+        return report.run(SerialComm(), _log(), self.plan, request)
+
+
+def _log() -> Any:
+    from hpcdem.runtime.progress import Log
+
+    return Log()

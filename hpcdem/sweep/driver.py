@@ -1,0 +1,131 @@
+"""Many members at once on this machine, never more processes than cores; whatever ends the driver, members are found
+again by their locks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from typing import Any
+
+from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_USAGE, UsageError
+from hpcdem.io.lock import FolderLock, Taken
+from hpcdem.runtime import launch
+from hpcdem.sweep.plan import DONE, LOG, RUNNING, STATE, Member, Plan, read_json
+
+LOOK = 0.1
+"""Seconds between two looks at the members."""
+
+
+def jobs_at_once(plan: Plan, jobs: int | None) -> int:
+    """So many members run at once: as many as there are cores for, or as is said. UsageError if that is too many."""
+    cores, each = launch.cores(), plan.ranks * plan.threads
+    if (jobs or 1) * each > cores:
+        raise UsageError(
+            f"{jobs or 1} at once with {plan.ranks} ranks of {plan.threads} threads are {(jobs or 1) * each} processes "
+            f"and threads; there are {cores} cores here"
+        )
+    return jobs or cores // each
+
+
+def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[str, str]:
+    """Carry out all members that are not done; returns the state of each. tries: how often a member is started now."""
+    at_once = jobs_at_once(plan, jobs)
+    try:
+        lock = FolderLock(plan.folder, {"host": socket.gethostname(), "pid": os.getpid()})
+    except Taken as taken:
+        who = f"process {taken.holder.get('pid', '?')} on {taken.holder.get('host', '?')}"
+        raise UsageError(f"{plan.folder}: {who} runs this sweep already") from None
+    try:
+        with _signals() as asked:
+            return _Driver(plan, log, at_once, tries, asked).run()
+    finally:
+        lock.release()
+
+
+@contextmanager
+def _signals():  # type: ignore[no-untyped-def]
+    """A function that tells whether the sweep was asked to stop, by Ctrl-C or SIGTERM."""
+    seen: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+    before = {number: signal.signal(number, lambda number, frame: seen.append(number)) for number in numbers}
+    try:
+        yield lambda: bool(seen)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Driver:
+    """One pass over the members."""
+
+    def __init__(self, plan: Plan, log: Any, at_once: int, tries: int, asked: Callable[[], bool]) -> None:
+        self.plan, self.log, self.at_once, self.tries, self.asked = plan, log, at_once, tries, asked
+        self.mine: dict[str, subprocess.Popen[bytes]] = {}
+        self.left = dict.fromkeys((member.name for member in plan.members), tries)
+        self.open = [member for member in plan.members if member.state != DONE]
+        self.done = len(plan.members) - len(self.open)
+
+    def run(self) -> dict[str, str]:
+        """Until all are done, have failed, or somebody asks to stop."""
+        found = [member.name for member in self.open if member.state == RUNNING]
+        already = f", {self.done} done before" if self.done else ""
+        self.log.info(f"{self.plan.folder}: {len(self.plan.members)} members{already}, {self.at_once} at once")
+        if found:
+            self.log.info(f"members {', '.join(found)} still run since an earlier call: waiting for them")
+        while self.open and not self.asked():
+            self._look()
+            time.sleep(LOOK)
+        if self.mine:
+            self.log.info(f"stopping: {len(self.mine)} members write a checkpoint")
+            for process in self.mine.values():
+                process.terminate()
+            for process in self.mine.values():
+                process.wait()
+        return {member.name: member.state for member in self.plan.members}
+
+    def _look(self) -> None:
+        """Note what has ended, and start what there is room for. A member that was started by an earlier call takes
+        its room too."""
+        busy = 0
+        for member in list(self.open):
+            process = self.mine.get(member.name)
+            if process is not None and process.poll() is None:
+                busy += 1
+                continue
+            state = member.state
+            if state == RUNNING:
+                busy += 1
+                continue
+            if process is not None or state == DONE:
+                self.mine.pop(member.name, None)
+                self._ended(member, state)
+        for member in [one for one in self.open if one.name not in self.mine][: max(0, self.at_once - busy)]:
+            if member.state == RUNNING:
+                continue
+            self.left[member.name] -= 1
+            words = [sys.executable, "-m", "hpcdem", "sweep", str(self.plan.folder), "--member", member.name]
+            self.mine[member.name] = subprocess.Popen(
+                words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
+            )
+
+    def _ended(self, member: Member, state: str) -> None:
+        """A member of ours, or of an earlier call, is no longer running."""
+        about = read_json(member.folder / STATE, {"code": None, "seconds": 0.0})
+        if state == DONE:
+            self.done += 1
+            self.open.remove(member)
+            self.log.info(f"{member.label()} done in {about['seconds']:.0f} s; {self.done} of {len(self.plan.members)}")
+            return
+        code = about["code"]
+        why = "was killed" if code is None else f"ended with {code}"
+        if code in (EXIT_USAGE, EXIT_CHECKPOINT) or not self.left[member.name]:
+            self.open.remove(member)
+            self.log.warn(f"{member.label()} {why}: see {member.folder / LOG}")
+        else:
+            self.log.info(f"{member.label()} {why}; it goes on from its last checkpoint")

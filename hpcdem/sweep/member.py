@@ -1,0 +1,71 @@
+"""One member of a sweep, from its folder to its end: what the driver starts, and each task of a Slurm array.
+
+The run inherits the lock of the folder. So the folder stays locked while ranks live, even if this process is killed,
+and whoever comes later knows that the member runs.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_OK, UsageError
+from hpcdem.io.lock import FolderLock, Taken
+from hpcdem.sweep.plan import DONE, FAILED, LOG, STATE, STOPPED, Member, Plan, read_json, write_json
+
+
+def launcher(ranks: int) -> list[str]:
+    """The words that start so many ranks: srun in a job of Slurm, else the mpiexec beside this Python, or in PATH."""
+    if "SLURM_JOB_ID" in os.environ:
+        return ["srun", "-n", str(ranks)]
+    if ranks == 1:
+        return []
+    beside = Path(sys.executable).parent / "mpiexec"
+    found = str(beside) if beside.exists() else shutil.which("mpiexec")
+    if found is None:
+        raise UsageError(f"--ranks {ranks}: no mpiexec here; install the extra [mpi] or an MPI of the system")
+    return [found, "-n", str(ranks)]
+
+
+def command(plan: Plan, again: bool) -> list[str]:
+    """What is started in the folder of a member. again: it was started before, and goes on where it can."""
+    words = [*launcher(plan.ranks), sys.executable, "-m", "hpcdem", "-j", str(plan.threads), "--no-figure"]
+    return [*words, *(["--resume"] if again and plan.kind != "python" else []), plan.script]
+
+
+def run(plan: Plan, member: Member) -> int:
+    """Carry it out; returns the exit code of the run. UsageError if it runs already. A signal to this process that
+    ends programs makes the run save and stop."""
+    try:
+        lock = FolderLock(member.folder, {"host": socket.gethostname(), "pid": os.getpid()})
+    except Taken:
+        raise UsageError(f"member {member.name} of {plan.folder} runs already") from None
+    before = read_json(member.folder / STATE, {"state": "", "tries": 0, "seconds": 0.0})
+    if before["state"] == DONE:
+        lock.release()
+        return EXIT_OK
+    again = bool(before["tries"])
+    tries, began = int(before["tries"]) + 1, time.monotonic()
+    state = {"state": FAILED, "code": None, "tries": tries, "seconds": before["seconds"]}
+    write_json(member.folder / STATE, state)  # what a killed run leaves: it counts as failed, and goes on when started
+    with open(member.folder / LOG, "a", encoding="utf-8") as log:
+        process = subprocess.Popen(
+            command(plan, again), cwd=member.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+            pass_fds=lock.descriptors, start_new_session=True,
+        )  # fmt: skip
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
+            # mpiexec of either MPI hands on SIGUSR1, which makes hpcdem save and stop.
+            signal.signal(number, lambda *_: process.send_signal(signal.SIGUSR1))
+        code = process.wait()
+    state["code"] = code
+    state["state"] = DONE if code == EXIT_OK else STOPPED if code == EXIT_CHECKPOINT else FAILED
+    state["seconds"] = round(state["seconds"] + time.monotonic() - began, 3)
+    write_json(member.folder / STATE, state)
+    lock.release()
+    return code
