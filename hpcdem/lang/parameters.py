@@ -152,7 +152,9 @@ def _of_python(tree: ast.Module, file: str) -> tuple[dict[str, Parameter], dict[
         if literal is None or value.end_col_offset is None or value.end_lineno != value.lineno:
             refused[name] = f"{file}:{target.lineno} does not set it to a number, a word, True or False"
         elif stored.count(name) > 1 or name in globals_:
-            refused[name] = f"{file} sets it more than once, first in line {target.lineno}; so a value of it may not act"
+            refused[name] = (
+                f"{file} sets it more than once, first in line {target.lineno}; so a value of it may not act"
+            )
         elif name not in loaded:
             refused[name] = f"{file}:{target.lineno} sets it, but nothing reads it"
         else:

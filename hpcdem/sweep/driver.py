@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -49,7 +49,7 @@ def run(plan: Plan, log: Any, jobs: int | None = None, tries: int = 2) -> dict[s
 
 
 @contextmanager
-def _signals():  # type: ignore[no-untyped-def]
+def _signals() -> Iterator[Callable[[], bool]]:
     """A function that tells whether the sweep was asked to stop, by Ctrl-C or SIGTERM."""
     seen: list[int] = []
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)

@@ -94,15 +94,17 @@ def make(
     if (folder / RECORD).exists():
         before = load(folder)
         if (before.script, before.digest) != (plan.script, digest):
-            raise UsageError(f"{folder} holds a sweep of another text of {before.script}; choose another folder with -o")
+            raise UsageError(
+                f"{folder} holds a sweep of another text of {before.script}; choose another folder with -o"
+            )
         if sampling is not None and (before.sampling, before.wanted) != (sampling, plan.wanted):
             raise UsageError(f"{folder} holds samples of another kind, number or range; choose another folder with -o")
         if before.sampling is not None and sampling is None:
             raise UsageError(f"{folder} holds samples, to which a grid cannot be added; choose another folder with -o")
         if before.values and set(before.values[0]) != set(values[0]):
             raise UsageError(
-                f"{folder} holds a sweep over {', '.join(before.values[0])}, not {', '.join(values[0])}; choose another "
-                "folder with -o"
+                f"{folder} holds a sweep over {', '.join(before.values[0])}, not {', '.join(values[0])}; choose "
+                "another folder with -o"
             )
         plan.values = list(before.values)
     elif folder.exists() and any(folder.iterdir()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -99,7 +100,9 @@ def measured(folder: Path, data: Path) -> tuple[dict[Column, Series], Series | N
         found |= _series(path.stem, rows(path), ())
     single: dict[str, float] = {}
     if (folder / "emission_b.csv").exists():
-        single = {f"emission.{n}": _number(v) for n, v in rows(folder / "emission_b.csv")[-1].items() if n in ("b", "a")}
+        single = {
+            f"emission.{n}": _number(v) for n, v in rows(folder / "emission_b.csv")[-1].items() if n in ("b", "a")
+        }
     return found, _profile(folder / "surface.csv"), single
 
 
@@ -113,8 +116,8 @@ def _series(name: str, table: list[dict[str, str]], keys: tuple[str, ...]) -> di
     for part, lines in parts.items():
         columns = {n: np.array([_number(line[n]) for line in lines]) for n in lines[0] if n not in keys}
         times = {n: c for n, c in columns.items() if n.replace(" ", "") in TIMES or re.match(r"(from|to)\b", n)}
-        axis = next((n for want in ("shortening", "time", "to", "step") for n, c in times.items()
-                     if n.split("[")[0].strip() == want and np.isfinite(c).all() and np.ptp(c) > 0.0), "step")  # fmt: skip
+        changing = {n.split("[")[0].strip(): n for n, c in times.items() if np.isfinite(c).all() and np.ptp(c) > 0.0}
+        axis = next((changing[n] for n in ("shortening", "time", "to", "step") if n in changing), "step")
         x = columns.get(axis, np.arange(len(lines), dtype=float))
         last = np.append(np.flatnonzero(np.diff(x) != 0.0), len(x) - 1)
         label = f"{name} {part}".strip()
@@ -144,7 +147,8 @@ FAULTS: dict[str, Callable[[dict[str, str]], bool]] = {
 
 
 def _faults(table: list[dict[str, str]], when: list[tuple[float, float]]) -> dict[Column, Series]:
-    """Numbers of bands over time, 0 where there is none, and their mean dip and length. The first frame has no strain."""
+    """Numbers of bands over time, 0 where there is none, and their mean dip and length. The first frame has no
+    strain."""
     when = when[1:]
     x, found = np.array([time for _, time in when]), {}
     axis = "time[s]"
@@ -324,8 +328,6 @@ KINDS: dict[str, Callable[[Path, Rows], Path]] = {"csv": _write_csv, "parquet": 
 
 def check(kinds: Sequence[str]) -> None:
     """UsageError for a kind of file that cannot be written here."""
-    import importlib.util
-
     for kind in kinds:
         if kind not in KINDS:
             raise UsageError(f"--tables {kind}: {' or '.join(KINDS)} is expected")

@@ -46,11 +46,11 @@ FRAMES = {
 }
 
 
-def run(comm: Any, log: Any, request: Request) -> list[Path]:
-    """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, else exactly
-    what is asked for. Raises HpcdemError on all ranks."""
+def run(comm: Any, log: Any, request: Request, without: Sequence[str] = ()) -> list[Path]:
+    """Collective: the files that were written (on rank 0). Without `what` all that the folder allows, `without` some,
+    else exactly what is asked for. Raises HpcdemError on all ranks."""
     began = time.monotonic()
-    what = [kind for kind in KINDS if kind in request.what or not request.what]
+    what = [kind for kind in KINDS if kind in request.what or (not request.what and kind not in without)]
     of_blocks = on_first(comm, lambda: _of_blocks(request))
     if of_blocks and not on_first(comm, lambda: bool(list_frames(request.folder))):
         what = [kind for kind in what if kind in request.what and kind not in BLOCK_KINDS]
