@@ -192,7 +192,7 @@ def _parsed(text: str, kind: str) -> g.Range | None:
     try:
         if "\n" in text:
             raise CommandError(f"where: expected one line, got {_shown(text)}")
-        statement = parser.parse(line, "where", 0, "", PCDC)
+        statement = parser.parse(line, "where", 0, "", PCDC, dim=None)
     except ScriptError as error:
         raise CommandError(f"where '{short(text)}': {error.message.removeprefix(': ')}") from None
     if statement.expressions:

@@ -1,8 +1,7 @@
-"""Square cells of the plane, cubes of space, and the numbers they go by.
+"""Square cells of the plane and the numbers they go by.
 
 The cell of a point has a column (from its x) and a row (from its y). Its *key* is one integer, column * 2^32 + row, so
-keys are in the order of (column, row): the order in which particles are stored. In space a row is one of a slab of
-cubes: (from y) * 2^15 + (from z).
+keys are in the order of (column, row): the order in which particles are stored.
 """
 
 from __future__ import annotations
@@ -14,8 +13,6 @@ FARTHEST = 1 << 28
 """Columns and rows are clamped to +- this, so that an escaped particle costs nothing."""
 COLUMN = 1 << 32
 """From one column to the next."""
-SLAB = 1 << 15
-"""Cubes of a slab along z; those farther off count as the last."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -31,18 +28,6 @@ def keys(points, side):
     out = np.empty(len(points), np.int64)
     for i in range(len(points)):
         out[i] = index(points[i, 0], side) * COLUMN + index(points[i, 1], side)
-    return out
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def keys_in_space(points, side):
-    """Keys (n,) i8 of points (n, 3) [m]."""
-    out = np.empty(len(points), np.int64)
-    half = SLAB // 2
-    for i in range(len(points)):
-        j = min(max(index(points[i, 1], side), -half), half - 1)
-        k = min(max(index(points[i, 2], side), -half), half - 1)
-        out[i] = index(points[i, 0], side) * COLUMN + j * SLAB + k
     return out
 
 

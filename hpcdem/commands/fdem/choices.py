@@ -67,8 +67,8 @@ _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer)
 
 class _Objects:
     """All objects of a kind that are there: numbers (n,), ends (n, 2), in space (n, 3), point numbers of faces and
-    joints, sides (n, 2) of joints. An element is there unless it was taken out, a node or face if one of its elements is, a joint if both
-    are. null_too: those that are not there as well."""
+    joints, sides (n, 2) of joints. An element is there unless it was taken out, a node or face if one of its elements
+    is, a joint if both are. null_too: those that are not there as well."""
 
     def __init__(self, project: Project, kind: str, null_too: bool = False) -> None:
         self.project, self.kind, self.null_too = project, kind, null_too

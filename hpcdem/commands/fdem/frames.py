@@ -116,7 +116,8 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
     return [
         name for name, quantity in QUANTITIES.items()
-        if quantity.on == kind and blocks.dim in quantity.dims and (quantity.framed or PROPERTIES[kind].get(name) in varied)
+        if quantity.on == kind and blocks.dim in quantity.dims
+        and (quantity.framed or PROPERTIES[kind].get(name) in varied)
         and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
         and (name != "mean_temperature" or "heat" in blocks.surface_loads)
     ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip

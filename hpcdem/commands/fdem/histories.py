@@ -18,6 +18,8 @@ from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
+IN_SPACE = ("time", "cycle", "ratio")
+"""What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""
 
@@ -68,9 +70,11 @@ def create(
             found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
         assert found is not None
         numbers = found.tolist()
+    if kind == MODEL and project.dim == 3 and value not in IN_SPACE:
+        raise CommandError(f"in three dimensions a history of the model can follow {', '.join(IN_SPACE)}, not {value}")
     if kind in (ELEMENT, NODE, JOINT) and value in diagnostics.QUANTITIES:
         diagnostics.quantity(project.ready(use=False), value)
-    project.histories[name] = History(kind, value, numbers, well or how, every)
+    project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
 
 
 def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:

@@ -28,9 +28,10 @@ class Project:
     """blocks: the simulation (its comm, log and stop are used); directory: where file names begin; outdir: folder of
     the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
 
-    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object; alive (ne,) bool: elements
-    that are not null; histories, charts and frames (steps between two by name) that are kept up; cracks_filed: broken
-    joints that are in their file, None: the file is not of this model yet; framed: step of the last frame by name;
+    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object;
+    alive (ne,) bool: elements that are not null; histories, charts and frames (steps between two by name) that are kept
+    up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
+    last frame by name;
     dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
     fractures made so far; solved: how the last `model solve` ended, reason, ratio and steps; line:
     of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of

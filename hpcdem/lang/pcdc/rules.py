@@ -76,11 +76,6 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError("range goes with profile: it says along which joints")
 
 
-def _dimensions(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if arguments.get("dim", 2) == 3:
-        raise ValueError("dim 3 is not there yet: this version computes in two dimensions")
-
-
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
@@ -155,7 +150,6 @@ _RULES = {
     "bolt create polyline": _bolt,
     "field create": _field,
     "flow-node initial": _fluid,
-    "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,
     "model rayleigh": _rayleigh,

@@ -15,8 +15,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
@@ -333,9 +333,16 @@ class ModelDefinition:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
         if name != MECH_ISO_ELASTIC.name:
             self.refuse_in_space(f"model {name} of elements")
+        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
+
+    def _refuse_surfaces(self, given: Mapping[str, Value]) -> None:
+        """CommandError for properties of contact in a model whose bodies do not touch."""
+        for name in ("friction", "penalty"):
+            if name in given:
+                self.refuse_in_space(f"{name} of surfaces, which is for contact")
 
     def yielding(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can yield."""
@@ -362,6 +369,7 @@ class ModelDefinition:
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
+        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
 
@@ -520,6 +528,7 @@ class ModelDefinition:
                 self._value(name, value.table)
             return self.tables[value.table].at(self._places(on, of)[:, value.axis])
         if isinstance(value, Drawn):
+            self.refuse_in_space("random fields")
             if value.field not in self.fields:
                 known = ", ".join(f"'{n}'" for n in self.fields) or "none"
                 raise CommandError(f"{name}: there is no field '{value.field}' (fields: {known})")
@@ -546,8 +555,8 @@ class ModelDefinition:
         yz: float = 0.0,
     ) -> None:
         """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
-        at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes with them, see
-        `initial_stresses`."""
+        at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
+        with them, see `initial_stresses`."""
         at = self.numbers_of_elements(elements)
         mesh = self._mesh()
         names = COMPONENTS[mesh.dim]

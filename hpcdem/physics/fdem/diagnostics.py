@@ -61,7 +61,9 @@ QUANTITIES: dict[str, Quantity] = {
         "element", "Pa", "largest principal stress (most tensile), in the plane the larger of the two in it", dims=BOTH
     ),
     "stress_min": Quantity(
-        "element", "Pa", "smallest principal stress (most compressive), in the plane the smaller of the two in it",
+        "element",
+        "Pa",
+        "smallest principal stress (most compressive), in the plane the smaller of the two in it",
         dims=BOTH,
     ),
     "kinetic_energy": Quantity("element", "J/m", "kinetic energy", dims=BOTH),

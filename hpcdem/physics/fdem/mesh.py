@@ -48,8 +48,8 @@ class Mesh:
     def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None) -> Mesh:
         """A mesh from anything array-like, in the form the fields are documented in.
 
-        Points of three columns are in space. Cells of three columns are triangles. Pairs get their lower point first, ascending and each once (of a crack
-        edge named twice the first set stays); element numbers of groups are sorted.
+        Points of three columns are in space. Cells of three columns are triangles. Pairs get their lower point first,
+        ascending and each once (of a crack edge named twice the first set stays); element numbers of groups are sorted.
         """
         points = np.array(points, np.float64, order="C")
         dim = 3 if points.ndim == 2 and points.shape[1] == 3 else 2

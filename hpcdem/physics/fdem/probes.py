@@ -132,7 +132,8 @@ class ForceProbe(Probe):
         found = seen.outside[self._nodes, axis]
         if self.name.startswith("unbalanced"):
             i, k = self._corners
-            found = np.concatenate([found + seen.felt[self._nodes, axis], seen.force[sim.owned][i, sim.local.stride * k + axis]])
+            alone = seen.force[sim.owned][i, sim.stride * k + axis]
+            found = np.concatenate([found + seen.felt[self._nodes, axis], alone])
         return found
 
     def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:

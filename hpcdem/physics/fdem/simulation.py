@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.cells import columns, keys, keys_in_space
+from hpcdem.core.cells import columns, keys
 from hpcdem.core.errors import CommandError, EquilibriumError, PhysicsError
 from hpcdem.core.memory import aligned
 from hpcdem.core.rebuild import LONGEST_WAIT
@@ -98,6 +98,8 @@ class Blocks(State):
         self._longest = 0.0
         self.untouched = True
         self.budget = None
+        if mesh.dim == 3:
+            self.prepare_kernels("space")
         self.areas, self.mean_edge = mesh.areas(), mesh.mean_edge()
         self.cut = cut_corner(mesh) if mesh.dim == 2 else np.empty(0, np.int64)
         n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
@@ -280,6 +282,11 @@ class Blocks(State):
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
         o = self.options
+        if self.dim == 3 and o.collision:
+            raise CommandError(
+                "in three dimensions surfaces do not touch in this version: model option collision off says that they "
+                "may pass through each other"
+            )
         flows = o.hydraulic and "fluid" in self.surface_loads
         heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
@@ -427,7 +434,6 @@ class Blocks(State):
         if not self.closed:
             return
         with self.timers("neighbour"):
-            mesh = self.the_mesh()
             middle, _ = self._middles()
             local = self.local
             longest2 = build.longest_link(
@@ -602,7 +608,7 @@ class Blocks(State):
 
     def _keys(self, middle: np.ndarray) -> np.ndarray:
         """Cells of elements by their middles."""
-        return (keys_in_space if self.dim == 3 else keys)(middle, self.rebuild_state.side)
+        return (space.keys if self.dim == 3 else keys)(middle, self.rebuild_state.side)
 
     def _choose_reach(self, radius: float, of_loads: float, frozen: bool) -> None:
         """Buffer and cell side for the next lists, from global values only; of_loads: see `SurfaceLoad.reach`."""

@@ -65,7 +65,8 @@ def filled(wishes: Wishes, group: str) -> tuple[np.ndarray, np.ndarray, dict[str
         )  # fmt: skip
         if done.returncode or not into.is_file():
             told = [line for line in done.stderr.splitlines() if line.strip()]
-            raise HpcdemError(f"Gmsh could not make the mesh: {told[-1] if told else f'it ended with {done.returncode}'}")
+            why = told[-1] if told else f"it ended with {done.returncode}"
+            raise HpcdemError(f"Gmsh could not make the mesh: {why}")
         with np.load(into) as found:
             points, cells, region = found["points"], found["cells"], found["region"]
     names = [group, *(name for name, _ in wishes.regions)]

@@ -28,9 +28,7 @@ def box(lines: tuple[np.ndarray, np.ndarray, np.ndarray], split: int = 6, group:
     z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     number = np.arange(len(points)).reshape(*(n + 1)[::-1])
-    corner = {
-        at: number[at[2] : n[2] + at[2], at[1] : n[1] + at[1], at[0] : n[0] + at[0]].ravel() for at in np.ndindex(2, 2, 2)
-    }
+    corner = {(i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)}
     if split == 12:
         middle = len(points) + np.arange(int(np.prod(n)))
         points = np.concatenate([points, sum(points[c] for c in corner.values()) / 8.0])

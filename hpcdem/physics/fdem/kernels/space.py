@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.core.cells import COLUMN, index
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.nodes import ACCELERATION, FREE, VELOCITY
 from hpcdem.physics.fdem.kernels.tets import ETA, INVERSE, LAMBDA, ROW, STRIDE, TWO_MU, WEIGHT
@@ -129,6 +130,22 @@ def volume(x):
     wx, wy, wz = x[8] - x[0], x[9] - x[1], x[10] - x[2]
     tx, ty, tz = x[12] - x[0], x[13] - x[1], x[14] - x[2]
     return ((uy * wz - uz * wy) * tx + (uz * wx - ux * wz) * ty + (ux * wy - uy * wx) * tz) / 6.0
+
+
+SLAB = 1 << 15
+"""Cubes of a slab along z; those farther off count as the last."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def keys(points, side):
+    """Keys (n,) i8 of cubes (core/cells.py) of points (n, 3) [m]: rows of a slab are (from y) * 2^15 + (from z)."""
+    out = np.empty(len(points), np.int64)
+    half = SLAB // 2
+    for i in range(len(points)):
+        j = min(max(index(points[i, 1], side), -half), half - 1)
+        k = min(max(index(points[i, 2], side), -half), half - 1)
+        out[i] = index(points[i, 0], side) * COLUMN + j * SLAB + k
+    return out
 
 
 # ---- nodes ---------------------------------------------------------------------------------------------------------
@@ -255,9 +272,7 @@ def move_threaded(
 @njit(cache=True, nogil=True, error_model="numpy")
 def _omega2(c):
     """Bound of omega^2 [1/s2] by the stiffness alone, true mass: m = rho V / 4."""
-    det = (
-        c[0] * (c[4] * c[8] - c[5] * c[7]) + c[1] * (c[5] * c[6] - c[3] * c[8]) + c[2] * (c[3] * c[7] - c[4] * c[6])
-    )
+    det = c[0] * (c[4] * c[8] - c[5] * c[7]) + c[1] * (c[5] * c[6] - c[3] * c[8]) + c[2] * (c[3] * c[7] - c[4] * c[6])
     rho = 24.0 * c[WEIGHT] * det
     squares = 0.0
     for k in range(3):

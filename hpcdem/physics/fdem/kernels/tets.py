@@ -68,14 +68,20 @@ def _product(a1, a2, a3, b1, b2, b3):
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _turned(s11, s22, s12, s33, s13, s23, r):
     """R S R^T: 11, 22, 12, 33, 13, 23."""
-    a11, a12, a13 = _product(r[0], r[1], r[2], s11, s12, s13), _product(r[0], r[1], r[2], s12, s22, s23), _product(
-        r[0], r[1], r[2], s13, s23, s33
+    a11, a12, a13 = (
+        _product(r[0], r[1], r[2], s11, s12, s13),
+        _product(r[0], r[1], r[2], s12, s22, s23),
+        _product(r[0], r[1], r[2], s13, s23, s33),
     )
-    a21, a22, a23 = _product(r[3], r[4], r[5], s11, s12, s13), _product(r[3], r[4], r[5], s12, s22, s23), _product(
-        r[3], r[4], r[5], s13, s23, s33
+    a21, a22, a23 = (
+        _product(r[3], r[4], r[5], s11, s12, s13),
+        _product(r[3], r[4], r[5], s12, s22, s23),
+        _product(r[3], r[4], r[5], s13, s23, s33),
     )
-    a31, a32, a33 = _product(r[6], r[7], r[8], s11, s12, s13), _product(r[6], r[7], r[8], s12, s22, s23), _product(
-        r[6], r[7], r[8], s13, s23, s33
+    a31, a32, a33 = (
+        _product(r[6], r[7], r[8], s11, s12, s13),
+        _product(r[6], r[7], r[8], s12, s22, s23),
+        _product(r[6], r[7], r[8], s13, s23, s33),
     )
     return (
         _product(a11, a12, a13, r[0], r[1], r[2]), _product(a21, a22, a23, r[3], r[4], r[5]),
@@ -137,9 +143,7 @@ def _stress(n, small, beta, lanes):
         r = _frame(f, small)
         e11, e22, e12, e33, e13, e23 = _in_frame(r, f)
         e11, e22, e33 = e11 - 1.0, e22 - 1.0, e33 - 1.0
-        d11, d22, d12, d33, d13, d23 = _in_frame(
-            r, gradient(lanes, V + e, c11, c12, c13, c21, c22, c23, c31, c32, c33)
-        )
+        d11, d22, d12, d33, d13, d23 = _in_frame(r, gradient(lanes, V + e, c11, c12, c13, c21, c22, c23, c31, c32, c33))
         m, eta = lanes[MU2 + e], lanes[VISC + e] + beta * lanes[MU2 + e]
         p = lanes[LAM + e] * (e11 + (e22 + e33)) + beta * lanes[LAM + e] * (d11 + (d22 + d33))
         s11 = lanes[S11 + e] + ((p + m * e11) + eta * d11)
@@ -156,27 +160,37 @@ def _stress(n, small, beta, lanes):
         k11, k12, k13 = (1.0 if small else k11), (0.0 if small else k12), (0.0 if small else k13)
         k21, k22, k23 = (0.0 if small else k21), (1.0 if small else k22), (0.0 if small else k23)
         k31, k32, k33 = (0.0 if small else k31), (0.0 if small else k32), (1.0 if small else k33)
-        det = _product(
-            c11, c12, c13, c22 * c33 - c23 * c32, c23 * c31 - c21 * c33, c21 * c32 - c22 * c31
-        )
+        det = _product(c11, c12, c13, c22 * c33 - c23 * c32, c23 * c31 - c21 * c33, c21 * c32 - c22 * c31)
         h = -1.0 / (6.0 * det)
-        g1, g2, g3 = _product(k11, k12, k13, c11, c12, c13), _product(k21, k22, k23, c11, c12, c13), _product(
-            k31, k32, k33, c11, c12, c13
+        g1, g2, g3 = (
+            _product(k11, k12, k13, c11, c12, c13),
+            _product(k21, k22, k23, c11, c12, c13),
+            _product(k31, k32, k33, c11, c12, c13),
         )
-        fx2, fy2, fz2 = _product(xx, xy, xz, g1, g2, g3), _product(xy, yy, yz, g1, g2, g3), _product(
-            xz, yz, zz, g1, g2, g3
+        fx2, fy2, fz2 = (
+            _product(xx, xy, xz, g1, g2, g3),
+            _product(xy, yy, yz, g1, g2, g3),
+            _product(xz, yz, zz, g1, g2, g3),
         )
-        g1, g2, g3 = _product(k11, k12, k13, c21, c22, c23), _product(k21, k22, k23, c21, c22, c23), _product(
-            k31, k32, k33, c21, c22, c23
+        g1, g2, g3 = (
+            _product(k11, k12, k13, c21, c22, c23),
+            _product(k21, k22, k23, c21, c22, c23),
+            _product(k31, k32, k33, c21, c22, c23),
         )
-        fx3, fy3, fz3 = _product(xx, xy, xz, g1, g2, g3), _product(xy, yy, yz, g1, g2, g3), _product(
-            xz, yz, zz, g1, g2, g3
+        fx3, fy3, fz3 = (
+            _product(xx, xy, xz, g1, g2, g3),
+            _product(xy, yy, yz, g1, g2, g3),
+            _product(xz, yz, zz, g1, g2, g3),
         )
-        g1, g2, g3 = _product(k11, k12, k13, c31, c32, c33), _product(k21, k22, k23, c31, c32, c33), _product(
-            k31, k32, k33, c31, c32, c33
+        g1, g2, g3 = (
+            _product(k11, k12, k13, c31, c32, c33),
+            _product(k21, k22, k23, c31, c32, c33),
+            _product(k31, k32, k33, c31, c32, c33),
         )
-        fx4, fy4, fz4 = _product(xx, xy, xz, g1, g2, g3), _product(xy, yy, yz, g1, g2, g3), _product(
-            xz, yz, zz, g1, g2, g3
+        fx4, fy4, fz4 = (
+            _product(xx, xy, xz, g1, g2, g3),
+            _product(xy, yy, yz, g1, g2, g3),
+            _product(xz, yz, zz, g1, g2, g3),
         )
         fx2, fy2, fz2, fx3, fy3, fz3 = h * fx2, h * fy2, h * fz2, h * fx3, h * fy3, h * fz3
         fx4, fy4, fz4 = h * fx4, h * fy4, h * fz4
@@ -248,8 +262,12 @@ def _put(n, first, rows, force, lanes):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _forces(t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta):
     lanes = np.zeros(LANES * np.int64(_PER_LANE))
-    x, v, c, s0, force = x.reshape(x.size), v.reshape(v.size), c.reshape(c.size), s0.reshape(s0.size), force.reshape(
-        force.size
+    x, v, c, s0, force = (
+        x.reshape(x.size),
+        v.reshape(v.size),
+        c.reshape(c.size),
+        s0.reshape(s0.size),
+        force.reshape(force.size),
     )
     blocks = -(-count // BLOCK)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
