@@ -198,6 +198,10 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
     """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
     from matplotlib.figure import Figure
 
+    if state.points.shape[1] == 3:
+        from hpcdem.post import solids
+
+        return solids.draw(state, looks)
     seen = view(state) if seen is None else seen
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width
