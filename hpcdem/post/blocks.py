@@ -201,7 +201,7 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
     if state.points.shape[1] == 3:
         from hpcdem.post import solids
 
-        return solids.draw(state, looks)
+        return solids.draw(state, looks.page, looks.font)
     seen = view(state) if seen is None else seen
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width

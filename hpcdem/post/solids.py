@@ -11,7 +11,6 @@ from hpcdem.post.plots import CM
 
 if TYPE_CHECKING:
     from hpcdem.io.vtkhdf_mesh import MeshState
-    from hpcdem.post.blocks import Looks
 
 EYE = np.array([1.0, -1.7, 0.9])
 """Direction from which a body is seen."""
@@ -37,8 +36,9 @@ def _frame() -> np.ndarray:
     return np.array([right, np.cross(out, right), out])
 
 
-def draw(state: MeshState, looks: Looks) -> Any:
-    """A matplotlib Figure of the surface, seen from the front, above and the right; far things are not smaller."""
+def draw(state: MeshState, width: float, font: float) -> Any:
+    """A matplotlib Figure, width [cm], letters of `font` points: the surface, seen from the front, above and the right;
+    far things are not smaller."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
@@ -66,7 +66,6 @@ def draw(state: MeshState, looks: Looks) -> Any:
 
     low, high = seen[:, :, :2].reshape(-1, 2).min(axis=0), seen[:, :, :2].reshape(-1, 2).max(axis=0)
     span = float((high - low).max())
-    width = looks.page
     room = 0.78 * width
     scale = room / max(high[0] - low[0], 0.6 * (high[1] - low[1]))
     tall = (high[1] - low[1]) * scale + 2.4
@@ -80,14 +79,14 @@ def draw(state: MeshState, looks: Looks) -> Any:
     axes.set_ylim(low[1] - 0.03 * span, high[1] + 0.03 * span)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    _axes_of_space(figure, turn, looks.font, width, tall)
+    _axes_of_space(figure, turn, font, width, tall)
     bar = figure.add_axes((0.86, 0.25, 0.022, 0.5))
     made = figure.colorbar(ScalarMappable(norm, COLOURS), cax=bar)
-    made.set_label(f"displacement [{name}]", fontsize=looks.font)
-    bar.tick_params(labelsize=looks.font)
+    made.set_label(f"displacement [{name}]", fontsize=font)
+    bar.tick_params(labelsize=font)
     size = " × ".join(f"{s:.3g}" for s in np.ptp(state.points, axis=0))
     said = f"step {state.step}, {state.time:.6g} s · {size} m · {len(state.cells)} tetrahedra"
-    figure.text(0.02, 1.0 - 0.65 / tall, said, fontsize=looks.font)
+    figure.text(0.02, 1.0 - 0.65 / tall, said, fontsize=font)
     return figure
 
 
@@ -100,7 +99,5 @@ def _axes_of_space(figure: Any, turn: np.ndarray, font: float, width: float, tal
     axes.set_axis_off()
     for k, name in enumerate("xyz"):
         x, y = turn[:2, k]
-        axes.annotate(
-            "", (x, y), (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "lw": 0.9, "shrinkA": 0, "shrinkB": 0}
-        )
+        axes.annotate("", (x, y), (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "lw": 0.9, "shrinkA": 0, "shrinkB": 0})
         axes.text(1.2 * x, 1.2 * y, name, fontsize=font, ha="center", va="center")

@@ -145,7 +145,13 @@ def _mesh_structured(call: Call) -> None:
     options = {"ratio": call["ratio"]} if "ratio" in call.arguments else {}
     if len(call["first"]) == 3:
         fdem.meshes.box(
-            call.project, call["first"], call["second"], call["cells"], call.get("split", 6), **call.group(), **options
+            call.project,
+            call["first"],
+            call["second"],
+            call["cells"],
+            call.get("split", 6),
+            **call.group(),
+            **options,
         )
         return
     fdem.meshes.rectangle(

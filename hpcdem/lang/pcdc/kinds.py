@@ -105,6 +105,18 @@ def whole(low: float = -math.inf, high: float = 2**53) -> Callable[[Any], int]:
     return check
 
 
+def _one_of(*numbers_: int) -> Callable[[Any], int]:
+    """A check for one of these numbers."""
+
+    def check(value: Any) -> int:
+        found = whole()(value)
+        if found not in numbers_:
+            raise Unfit
+        return found
+
+    return check
+
+
 def _string(value: Any) -> str:
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise Unfit
@@ -166,8 +178,9 @@ TABLED = Kind("<f>|table <s>|function <s>", "a number, table 'name' or function 
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
 POINTS = Kind("3", "3, the points of a joint in two dimensions,", whole(3, 3))
-FREEDOM = Kind("0|1|2|3", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 3))
+FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2))
 DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
+SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))
 LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
 STRING = Kind("<s>", "a text in quotes", _string)
 FILE = Kind("<s>", "the name of a file in quotes", _file)
@@ -177,11 +190,12 @@ OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
 """One more in three dimensions."""
-_IN_SPACE = {
+_FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
+_IN_SPACE = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
     for kind in (VECTOR, OPTIONAL_VECTOR)
 }
-_IN_ANY = {
+_IN_ANY = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
     for kind in (VECTOR, OPTIONAL_VECTOR)
 }

@@ -30,6 +30,7 @@ from hpcdem.lang.pcdc.kinds import (
     PART,
     POINTS,
     POSITIVE,
+    SPLIT,
     STRING,
     STRINGS,
     TABLED,
@@ -810,7 +811,7 @@ _MESH = (
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("cells", (COUNT, COUNT, THIRD_COUNT), "along x and y, in three dimensions z", required=True),
-             Option("split", (choice("5", "6", "12"),), "tetrahedra of each box: 5, mirrored from box to box, 6 about "
+             Option("split", (SPLIT,), "tetrahedra of each box: 5, mirrored from box to box, 6 about "
                     "a diagonal, or 12 about a point in the middle", default="6", dims=SPACE),
              Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
              Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "

@@ -67,7 +67,7 @@ def filled(wishes: Wishes, group: str) -> tuple[np.ndarray, np.ndarray, dict[str
             told = [line for line in done.stderr.splitlines() if line.strip()]
             why = told[-1] if told else f"it ended with {done.returncode}"
             raise HpcdemError(f"Gmsh could not make the mesh: {why}")
-        with np.load(into) as found:
+        with np.load(into, allow_pickle=False) as found:
             points, cells, region = found["points"], found["cells"], found["region"]
     names = [group, *(name for name, _ in wishes.regions)]
     groups: dict[str, list[np.ndarray]] = {}
