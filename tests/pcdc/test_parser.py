@@ -231,7 +231,6 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
 
 LATER = [
     ("geometry create sphere (0,0) 1 as-layer 's'", "two dimensions"),
-    ("output image 'a'", "hpcdem movie"),
 ]
 
 
