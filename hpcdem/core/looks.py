@@ -20,5 +20,5 @@ COLOURS = {
     "spectral": "Spectral_r",
     "rainbow": "turbo",
 }
-"""Colours of fields, and their names in matplotlib. blue-red and orange-violet, white in their middle, are for values of
-both signs. The colour-blind can read all but yellow-green, spectral and rainbow."""
+"""Colours of fields, and their names in matplotlib. blue-red and orange-violet, white in their middle, are for values
+of both signs. The colour-blind can read all but yellow-green, spectral and rainbow."""

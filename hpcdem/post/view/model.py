@@ -119,9 +119,11 @@ def read_view(path: str | os.PathLike) -> ModelView:
     """The view in a file. HpcdemError if it cannot be read, or is none."""
     try:
         text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as failure:
-        if isinstance(failure, OSError):
-            raise HpcdemError(explain(Path(path), failure, "read")) from None
+    except FileNotFoundError:
+        raise HpcdemError(f"cannot read {os.fspath(path)}: there is no such file") from None
+    except OSError as failure:
+        raise HpcdemError(explain(Path(path), failure, "read")) from None
+    except UnicodeDecodeError:
         raise HpcdemError(f"{os.fspath(path)} is no view: it is not text") from None
     try:
         given = json.loads(text)

@@ -81,11 +81,23 @@ class Objects:
             return self.fields[name]
         if name in self.vectors:
             return np.hypot(*self.vectors[name].T)
-        raise HpcdemError(f"{label} have no field {name} in this frame; they have {', '.join(self.known())}")
+        raise self.lack(name, label)
+
+    def lack(self, name: str, label: str) -> HpcdemError:
+        """What is said about a field that is not there."""
+        return HpcdemError(f"{label} have no field {name} in this frame; they have {', '.join(self.known())}")
+
+    def has(self, name: str) -> bool:
+        """Whether there is a field or vector of this name."""
+        return name in self.fields or name in self.vectors
+
+    def filled(self, name: str) -> bool:
+        """Whether it has a value somewhere."""
+        return name in self.vectors or there(self.fields[name])
 
     def known(self) -> list[str]:
         """Names of fields and vectors that have a value somewhere."""
-        return [*(n for n in self.fields if there(self.fields[n])), *self.vectors]
+        return [*(name for name in self.fields if self.filled(name)), *self.vectors]
 
 
 def there(values: np.ndarray) -> bool:

@@ -103,16 +103,20 @@ def default_view(moment: Moment) -> ModelView:
 def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
     """The view with objects coloured by a field; on: which, else the first that have it. looks: further values of that
     layer. HpcdemError that names the fields there are."""
-    for layer in view.layers:
-        if (on is None or on == layer.object) and layer.object in moment.objects:
-            objects = moment.of(layer.object)
-            if name in objects.fields or name in objects.vectors:
-                return view.with_layer(layer.label, field=name, visible=True, **looks)
-    if on is not None and on in moment.objects:
-        moment.of(on).values(name, on)
+    having = [
+        layer for layer in view.layers
+        if layer.object in moment.objects and moment.of(layer.object).has(name)
+    ]  # fmt: skip
+    # In a file a column of joints stands for elements too, empty; one that is empty everywhere has no value yet.
+    filled = [layer for layer in having if moment.of(layer.object).filled(name)] or having
+    for layer in filled:
+        if on in (None, layer.object):
+            return view.with_layer(layer.label, field=name, visible=True, **looks)
     if on is not None:
-        moment.of(on)
-        raise HpcdemError(f"the view shows no {on}")
+        objects = moment.of(on)
+        if not any(layer.object == on for layer in view.layers):
+            raise HpcdemError(f"the view shows no {on}")
+        raise objects.lack(name, on)
     known = "; ".join(f"{kind}: {', '.join(objects.known())}" for kind, objects in moment.objects.items())
     raise HpcdemError(f"this frame has no field {name}; it has {known or 'nothing'}")
 
