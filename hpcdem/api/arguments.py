@@ -82,10 +82,8 @@ def _model(command: Command, name: str) -> Model:
     typed = name.replace("_", "-")
     found = matching(typed, command.models)
     if len(found) != 1:
-        names = [model.keyword.name for model in command.models if not model.later]
+        names = [model.keyword.name for model in command.models]
         raise ValueError(f"there is no model '{name}'; there is {', '.join(names)}{hint(typed, names)}")
-    if found[0].later:
-        raise ValueError(f"model {found[0].keyword} is not there yet: {found[0].later}")
     return found[0]
 
 
@@ -96,8 +94,6 @@ def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str, dim: i
         if value is None:
             continue
         option = _option(options, name, of)
-        if option.later:
-            raise ValueError(f"{name} is not there yet: {option.later}")
         if not option.values:
             if not isinstance(value, (bool, np.bool_)):
                 raise ValueError(f"{name}: expected True or False, got {_shown(value)}")
@@ -119,7 +115,7 @@ def _option(options: tuple[Option, ...], name: str, of: str) -> Option:
     for option in options:
         if option.keyword.is_exactly(typed):
             return option
-    names = [trial.python(option.name) for option in options if not option.later]
+    names = [trial.python(option.name) for option in options]
     raise ValueError(f"{of} has no {name}; it has {', '.join(names)}{hint(name, names)}")
 
 
@@ -175,7 +171,7 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
 
 
 def _listed(options: Iterable[Option]) -> str:
-    return ", ".join(trial.python(option.name) for option in options if not option.later)
+    return ", ".join(trial.python(option.name) for option in options)
 
 
 def _shown(value: Any) -> str:

@@ -919,6 +919,39 @@ class Output(Words):
         """Frames ``<file>_<step>.vtkhdf`` in the folder of the results: now, or every so many steps; off: no more."""
         self._do("output vtk", {"file": file, "every": every, "off": off})
 
+    def image(
+        self,
+        file: str,
+        *,
+        view: str | None = None,
+        field: str | None = None,
+        object: str | None = None,
+        limits: tuple[float, float] | None = None,
+        log: bool = False,
+        colours: str | None = None,
+        opacity: float | None = None,
+        edges: bool = False,
+        size: float | None = None,
+        vectors: str | None = None,
+        arrows: float | None = None,
+        filter: str | None = None,
+        deformed: float | None = None,
+        camera: tuple[tuple[float, float], tuple[float, float]] | None = None,
+        title: str | None = None,
+        where: Where = None,
+    ) -> None:
+        """Draw the model as it is now, ``<file>_<step>.png``, with objects coloured by a field that frames have.
+
+        view: a file *.mv, else everything is shown; object: "elements", "joints", ..., of which the field and the other
+        looks are; limits: values of the first and the last colour; camera: lower left and upper right corner [m];
+        where: the objects that are shown. See docs/view.md."""
+        given = {
+            "file": file, "view": view, "field": field, "object": object, "limits": limits, "log": log,
+            "colours": colours, "opacity": opacity, "edges": edges, "size": size, "vectors": vectors, "arrows": arrows,
+            "filter": filter, "deformed": deformed, "camera": camera, "title": title,
+        }  # fmt: skip
+        self._do("output image", given, where, g.SHOWN.get(object or "", g.ELEMENT))
+
 
 @commands
 class BlockCommands:

@@ -66,9 +66,9 @@ class MeshState:
     points: np.ndarray
     cells: np.ndarray
     joints: np.ndarray
-    of_points: dict[str, np.ndarray]
-    of_elements: dict[str, np.ndarray]
-    of_joints: dict[str, np.ndarray]
+    of_points: Mapping[str, np.ndarray]
+    of_elements: Mapping[str, np.ndarray]
+    of_joints: Mapping[str, np.ndarray]
     group_names: Mapping[str, list[str]]
     supports: Supports = field(default_factory=dict)
 
@@ -112,8 +112,9 @@ def is_mesh_frame(path: str | os.PathLike) -> bool:
         return False
 
 
-def read_mesh_frame(path: str | os.PathLike) -> MeshState:
-    """A frame that `write_mesh_frame` wrote. Serial. HpcdemError if it is missing, foreign or damaged."""
+def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
+    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for. Serial. HpcdemError if
+    it is missing, foreign or damaged."""
     with h5.reading(path) as file:
         try:
             top, about = file["VTKHDF"], file["hpcdem"].attrs
@@ -122,24 +123,30 @@ def read_mesh_frame(path: str | os.PathLike) -> MeshState:
             n = int(elements.sum())
             sizes = np.where(types[:n] == _TRIANGLE, 3, 4)
             dim = 3 if (types[:n] == _TETRA).any() else 2
-            ids = top["Connectivity"][...]
-            points = top["Points"][...][:, :dim]
-            ends = ids[int(sizes.sum()) :].reshape(-1, 2)
+            points = top["Points"][:, :dim]
+            ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, 2)
             whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
             if not whole or (len(ends) and not 0 <= ends.min() <= ends.max() < len(points)):
                 raise ValueError("cells and points do not belong together")
-            cells = {name: values[...] for name, values in top["CellData"].items()}
-            of_points = {name: values[...] for name, values in top["PointData"].items()}
+            tables: list[Mapping[str, np.ndarray]] = []
+            for group, rows in (("PointData", slice(None)), ("CellData", slice(0, n)), ("CellData", slice(n, None))):
+                places = {
+                    k: (f"VTKHDF/{group}/{k}", (rows, slice(0, 2)) if v.ndim == 2 else rows)
+                    for k, v in top[group].items()
+                }
+                tables.append(
+                    h5.columns(path, places) if lazily else {k: file[at][of] for k, (at, of) in places.items()}
+                )
             names = {name: [one.decode() for one in values[...]] for name, values in file["hpcdem"].items()}
             supports = {
                 word: {kind: {name: values[...] for name, values in of.items()} for kind, of in file[word].items()}
                 for word in SUPPORTS
                 if word in file
             }
+            of_points, of_elements, of_joints = tables
             return MeshState(
-                int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends,
-                {k: v[:, :dim] if v.ndim == 2 else v for k, v in of_points.items()},
-                {k: v[elements] for k, v in cells.items()}, {k: v[joints] for k, v in cells.items()}, names, supports,
+                int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends, of_points,
+                of_elements, of_joints, names, supports,
             )  # fmt: skip
         except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None

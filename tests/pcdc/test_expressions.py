@@ -61,7 +61,7 @@ class Writer:
 
 
 def _without(options: tuple[Option, ...], dim: int, *names: str) -> list[Option]:
-    return [o for o in options if o.name not in names and not o.later and dim in o.dims]
+    return [o for o in options if o.name not in names and dim in o.dims]
 
 
 EXCLUDING = {
@@ -82,14 +82,14 @@ def rows(dim: int) -> list[tuple[str, Command, Model | None, Option | None, int]
     """Every command; every model of those that have some; every command with a range once per term of it."""
     found = []
     for command in PCDC.commands:
-        if command.later or dim not in command.dims:
+        if dim not in command.dims:
             continue
-        models = [m for m in command.models if not m.later and dim in m.dims] or [None]
+        models = [m for m in command.models if dim in m.dims] or [None]
         found += [(f"{command.name} {m.keyword.name if m else ''}".strip(), command, m, None, dim) for m in models]
         for term in PCDC.range_terms if command.ranged else ():
             fits = not term.only or command.ranged in (*term.only, "any")
             fits &= command.name != "chart add" or dim == 2  # range goes with what is there in the plane only
-            if fits and not term.later and dim in term.dims:
+            if fits and dim in term.dims:
                 found.append((f"{command.name} range {term.name}", command, models[0], term, dim))
     return [(f"{name} in {dim} dimensions" if dim == 3 else name, *row) for name, *row in found]
 
@@ -130,7 +130,10 @@ def test_the_table_is_walked_whole():
     """Every kind of value of every row has a sample."""
     assert len(ROWS) > 150
     patterns = {
-        kind.pattern for _, c, m, t, _ in ROWS for o in (*c.leading, *(m.options if m else c.options)) for kind in o.values
+        kind.pattern
+        for _, c, m, t, _ in ROWS
+        for o in (*c.leading, *(m.options if m else c.options))
+        for kind in o.values
     }
     assert set(SAMPLES) - {"[<i>]"} <= patterns
 

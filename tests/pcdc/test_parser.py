@@ -234,21 +234,9 @@ def test_refusals_name_file_line_text_and_what_was_expected(words, message):
     assert told.startswith(f"a.sc:7: pcdc {words}: ") and message in told and "\n" not in told
 
 
-LATER = [
-    ("output image 'a'", "hpcdem movie"),
-]
-
-
-@pytest.mark.parametrize(("words", "message"), LATER)
-def test_what_comes_later_is_refused_by_name(words, message):
-    with pytest.raises(ScriptError) as caught:
-        read(words)
-    assert "is not there yet: " in str(caught.value) and message in str(caught.value)
-
-
 def test_every_example_of_the_table_is_read():
     examples = [(command.name, text) for command in PCDC.commands for text in command.example]
-    assert len(examples) > 50 and {name for name, _ in examples} == {c.name for c in PCDC.commands if not c.later}
+    assert len(examples) > 50 and {name for name, _ in examples} == {c.name for c in PCDC.commands}
     for name, text in examples:
         dim = 3 if PCDC.command(name).dims == (3,) else 2
         assert parse(text.removeprefix("pcdc"), "a.sc", 1, text, PCDC, dim=dim).command.name == name

@@ -286,6 +286,13 @@ SAME: list[tuple[str, str]] = [
     ("pcdc output vtk 'f' every 10", "sim.output.vtk('f', every=10)"),
     ("pcdc output vtk 'f'", "sim.output.vtk('f')"),
     ("pcdc output vtk 'f' off", "sim.output.vtk('f', off=True)"),
+    ("pcdc output image 'f'", "sim.output.image('f')"),
+    ("pcdc output image 'f' view 'a.mv' field 'stress-yy' limits -1 2 log colours cividis opacity 0.5 edges size 2 "
+     "vectors 'velocity' arrows 3 filter 'x > 1' deformed 10 camera (0,0) (1,2) title 'a'",
+     "sim.output.image('f', view='a.mv', field='stress-yy', limits=(-1, 2), log=True, colours='cividis', opacity=0.5, "
+     "edges=True, size=2, vectors='velocity', arrows=3, filter='x > 1', deformed=10, camera=((0, 0), (1, 2)), "
+     "title='a')"),
+    ("pcdc output image 'f' object elements range id 0 3", "sim.output.image('f', object='elements', where='id 0 3')"),
 ]  # fmt: skip
 """A line of a script, and the line of a program that does the same."""
 
@@ -381,8 +388,6 @@ def test_every_command_has_a_method() -> None:
             names |= {statement.arguments["model"], *statement.arguments["properties"]}
         said.setdefault(statement.command.name, set()).update(names)
     for command in PCDC.commands:
-        if command.later:
-            continue
         assert command.name in said, command.name
         of_models = {
             "element property",
@@ -390,11 +395,11 @@ def test_every_command_has_a_method() -> None:
             "face-joint property",
         }  # any property goes the same way
         options = () if command.name in of_models else command.options
-        wanted = {option.name for option in options if not option.later}
+        wanted = {option.name for option in options}
         for model in command.models:
-            wanted |= set() if model.later else {model.keyword.name}
-            if not model.later and model.of is None:  # those of a law go the same way, whatever their names
-                wanted |= {option.name for option in model.options if not option.later}
+            wanted |= {model.keyword.name}
+            if model.of is None:  # those of a law go the same way, whatever their names
+                wanted |= {option.name for option in model.options}
         assert wanted - said[command.name] <= NOT_IN_PYTHON.get(command.name, set()), command.name
 
 
@@ -490,6 +495,9 @@ WRONG = {
     "two time steps": ("sim.time_step(value=1e-6, mass_scaling=1e-6)", "value and mass-scaling exclude each other"),
     "curve of nothing": ("sim.charts.add('c')", "charts.add: a curve has either y"),
     "figure of no kind": ("sim.charts.export('c', 'c.txt')", "a figure is a file"),
+    "range of no objects": ("sim.output.image('f', where='id 0')", "range goes with object, one of elements, joints"),
+    "looks of nothing": ("sim.output.image('f', log=True)", "log goes with field or object"),
+    "no such colours": ("sim.output.image('f', colours='jet')", "colours: expected one of viridis"),
     "frames every and off": ("sim.output.vtk('f', every=1, off=True)", "every and off exclude each other"),
     "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "nodes.group: a range in z needs a model in three dimensions"),
     "RANGE of others": ("sim.elements.group('a', where='boundary')", "where 'boundary': .*read 'boundary'"),

@@ -363,6 +363,18 @@ def _output(call: Call) -> None:
         fdem.frames.vtk(call.project, call["file"], call.get("every"))
 
 
+def _image(call: Call) -> None:
+    given = call.given("file", "object", "camera", "log", "edges")
+    if "field" in given:
+        given["field"] = python(given["field"])
+    if "object" in call.arguments:
+        given["kind"] = call["object"]
+    if "camera" in call.arguments:
+        given["corners"] = call["camera"]
+    given |= {word: True for word in ("log", "edges") if word in call.arguments}
+    fdem.pictures.image(call.project, call["file"], where=call.where, **given)
+
+
 BINDINGS: dict[str, Callable[[Call], None]] = {
     "model new": lambda c: fdem.settings.new(c.project, **c.given()),
     "model save": lambda c: fdem.checkpoints.save(c.project, c["file"]),
@@ -456,6 +468,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
         "temperature" in c.arguments,
     ),
     "output vtk": _output,
+    "output image": _image,
 }
 
 PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {

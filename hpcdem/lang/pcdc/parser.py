@@ -144,8 +144,6 @@ class _Line:
                 return self._allowed(rows[0])
 
     def _allowed(self, command: Command) -> Command:
-        if command.later:
-            raise ValueError(f"'{command.name}' is not there yet: {command.later}")
         self.refuse_elsewhere(command.name, command.dims)
         return command
 
@@ -169,8 +167,6 @@ class _Line:
             token = self.next("the name of a model: " + _joined(m.keyword.name for m in command.models))
             self.unknown(token, command.models)
         self.context = f"{self.context} {found.keyword}"
-        if found.later:
-            raise ValueError(f"'{found.keyword}' is not there yet: {found.later}")
         self.refuse_elsewhere(found.keyword, found.dims)
         return found
 
@@ -217,8 +213,6 @@ class _Line:
 
     def values(self, option: Option) -> Any:
         """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow."""
-        if option.later:
-            raise ValueError(f"'{option.keyword}' is not there yet: {option.later}")
         self.refuse_elsewhere(option.keyword, option.dims)
         read = []
         for kind in option.values:

@@ -8,6 +8,7 @@ from typing import Any
 
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.table import RECORDED, Command
+from hpcdem.physics.fdem.groups import SHOWN
 
 
 def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -138,6 +139,18 @@ def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
         raise ValueError("every and off exclude each other")
 
 
+LOOKS = ("limits", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
+
+
+def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    if terms is not None and arguments.get("object") not in SHOWN:
+        raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
+    if "field" not in arguments and "object" not in arguments:
+        for word in LOOKS:
+            if word in arguments:
+                raise ValueError(f"{word} goes with field or object, which say of what")
+
+
 def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     given = [name for name in ("weibull", "normal", "lognormal") if name in arguments]
     if len(given) != 1:
@@ -158,4 +171,5 @@ _RULES = {
     "chart add": _curve,
     "well stage": _stage,
     "output vtk": _output,
+    "output image": _image,
 }

@@ -3,7 +3,7 @@
 Parsing, abbreviations, candidates in messages, completion in the console and the page docs/pcdc_reference.md are all
 made from the rows below; a new keyword is one new row. Properties of elements, faces and joints are declared with the
 models of the simulation (physics/fdem/properties.py) and only get their spelling here. Words are in the manual's
-notation (`keywords`). A row with `later` is known, and refused with that sentence before anything runs.
+notation (`keywords`).
 
 `manual` marks what the manual itself prints; the other commands are hpcdem's, since the manual refers to an online
 help for them. Spellings of the manual that are slips stand first where scripts may use them, the right ones beside
@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from hpcdem.core.looks import COLOURS, OBJECTS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
     BOOL,
@@ -74,7 +75,6 @@ class Option:
     required: bool = False
     repeated: bool = False
     more: tuple[Option, ...] = ()
-    later: str = ""
     also: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     dims: tuple[int, ...] = BOTH
@@ -101,7 +101,6 @@ class Model:
     options: tuple[Option, ...] = ()
     one_of: tuple[tuple[str, ...], ...] = ()
     any_of: bool = False
-    later: str = ""
     also: tuple[str, ...] = ()
     of: properties.Model | None = None
     leading: tuple[Option, ...] = ()
@@ -129,7 +128,6 @@ class Command:
     needs_option: bool = False
     properties: bool = False
     manual: bool = False
-    later: str = ""
     dims: tuple[int, ...] = PLANE
 
     @cached_property
@@ -1096,7 +1094,29 @@ _RECORDS = (
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
             (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
              Option("off", (), "no more frames of this name")), dims=BOTH),
-    Command("output image", "", later="pictures are drawn from the frames, by hpcdem movie"),
+    Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
+            ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
+             "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",
+             "pcdc output image 'flow' view 'flow.mv' title 'step {step}'"),
+            (_leading("file", FILE, "first part of the name, in the folder of the results; .pdf, .svg or .png at its "
+                                    "end says what is drawn"),),
+            (Option("view", (FILE,), "what is shown, as a file *.mv says, of hpcdem view or hpcdem draw", "",
+                    "everything"),
+             Option("field", (STRING,), "what colours objects; hpcdem draw --list names the fields of a frame"),
+             Option("object", (choice(*OBJECTS),), "of which objects the field and the options below are", "",
+                    "the first that have the field"),
+             Option("limits", (FLOAT, FLOAT), "values of the first and the last colour", "",
+                    "least and greatest of what is shown"),
+             Option("log", (), "colours by the logarithm"),
+             Option("colours", (choice(*COLOURS),), "of the field", default="viridis"),
+             Option("opacity", (FLOAT,), "from 0 to 1", default="1"), Option("edges", (), "outlines of elements"),
+             Option("size", (POSITIVE,), "factor on widths of lines", default="1"),
+             Option("vectors", (STRING,), "arrows: displacement or velocity"),
+             Option("arrows", (POSITIVE,), "factor on their length", default="1"),
+             Option("filter", (STRING,), "only objects for which this holds, as 'stress_yy < -1e6 and x > 2'"),
+             Option("deformed", (FLOAT,), "factor on displacements", default="1"),
+             Option("camera", (VECTOR, VECTOR), "lower left and upper right corner of the picture", "m", "the model"),
+             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any"),
 )  # fmt: skip
 
 COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_OBJECTS, *_RECORDS)
