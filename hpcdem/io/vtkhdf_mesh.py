@@ -112,9 +112,9 @@ def is_mesh_frame(path: str | os.PathLike) -> bool:
         return False
 
 
-def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
-    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for. Serial. HpcdemError if
-    it is missing, foreign or damaged."""
+def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool = False) -> MeshState:
+    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for; solid: whether it may be
+    one in three dimensions. Serial. HpcdemError if it is missing, foreign or damaged."""
     with h5.reading(path) as file:
         try:
             top, about = file["VTKHDF"], file["hpcdem"].attrs
@@ -123,6 +123,8 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
             n = int(elements.sum())
             sizes = np.where(types[:n] == _TRIANGLE, 3, 4)
             dim = 3 if (types[:n] == _TETRA).any() else 2
+            if dim == 3 and not solid:
+                raise NotImplementedError
             points = top["Points"][:, :dim]
             ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, 2)
             whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
@@ -131,7 +133,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
             tables: list[Mapping[str, np.ndarray]] = []
             for group, rows in (("PointData", slice(None)), ("CellData", slice(0, n)), ("CellData", slice(n, None))):
                 places = {
-                    k: (f"VTKHDF/{group}/{k}", (rows, slice(0, 2)) if v.ndim == 2 else rows)
+                    k: (f"VTKHDF/{group}/{k}", (rows, slice(0, dim)) if v.ndim == 2 else rows)
                     for k, v in top[group].items()
                 }
                 tables.append(
@@ -148,6 +150,8 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
                 int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends, of_points,
                 of_elements, of_joints, names, supports,
             )  # fmt: skip
+        except NotImplementedError:
+            raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions: this is for two") from None
         except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
 

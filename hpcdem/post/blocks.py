@@ -191,7 +191,7 @@ def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: 
 
 def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
     """Draw the frame in a file."""
-    plot(read_mesh_frame(source), path, looks, seen)
+    plot(read_mesh_frame(source, solid=True), path, looks, seen)
 
 
 def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:

@@ -499,7 +499,7 @@ WRONG = {
     "looks of nothing": ("sim.output.image('f', log=True)", "log goes with field or object"),
     "no such colours": ("sim.output.image('f', colours='jet')", "colours: expected one of viridis"),
     "frames every and off": ("sim.output.vtk('f', every=1, off=True)", "every and off exclude each other"),
-    "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "nodes.group: a range in z needs a model in three dimensions"),
+    "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "a range in z needs a model in three dimensions"),
     "RANGE of others": ("sim.elements.group('a', where='boundary')", "where 'boundary': .*read 'boundary'"),
     "RANGE the wrong way": ("sim.nodes.group('a', where='x 1 0')", "where 'x 1 0': .*the first is above the second"),
     "empty RANGE": ("sim.nodes.group('a', where='')", "where ''"),

@@ -272,7 +272,7 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
-def nearest_point(points: np.ndarray, at: tuple[float, float], among: np.ndarray | None = None) -> int:
+def nearest_point(points: np.ndarray, at: tuple[float, ...], among: np.ndarray | None = None) -> int:
     """Number of the point nearest to `at`, the lowest of equals; `among` restricts it to these numbers."""
     among = np.arange(len(points)) if among is None else np.sort(among)
     way = points[among] - np.asarray(at, np.float64)

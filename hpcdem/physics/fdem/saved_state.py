@@ -183,8 +183,8 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
                 array = getattr(sim, name)
                 array[:] = tables[kind][name].astype(array.dtype)
         if "stress0" in tables:
-            names = [f"s{k}" for k in range(6) if f"s{k}" in tables["stress0"]]
-            sim.stress0 = np.column_stack([tables["stress0"][name] for name in names])
+            of = tables["stress0"]
+            sim.stress0 = np.column_stack([of[f"s{k}"] for k in range(6) if f"s{k}" in of])
             # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
             sim.stress0_row[:] = tables["stress0"].get("row", sim.element_row)
         if "born" in tables:

@@ -76,7 +76,9 @@ def _in_space(path: Path, data: Any, merge: float, scale: float) -> Mesh:
         raise HpcdemError(f"{path}: finite points with three coordinates were expected")
     names = {(int(v[1]), int(v[0])): str(k) for k, v in getattr(data, "field_data", {}).items() if len(v) == 2}
     physical = data.cell_data.get("gmsh:physical")
-    cells, groups, layers, seen = [np.empty((0, 4), np.int64)], {}, {}, 0
+    cells, seen = [np.empty((0, 4), np.int64)], 0
+    groups: dict[str, list] = {}
+    layers: dict[str, list] = {}
     for k, block in enumerate(data.cells):
         rows = np.asarray(block.data, np.int64)
         tags = np.zeros(len(rows), np.int64) if physical is None else np.asarray(physical[k], np.int64)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
@@ -17,7 +18,7 @@ SPLITS = (5, 6, 12)
 SIDES = (("left", 0, 0), ("right", 0, -1), ("front", 1, 0), ("back", 1, -1), ("bottom", 2, 0), ("top", 2, -1))
 
 
-def box(lines: tuple[np.ndarray, np.ndarray, np.ndarray], split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
+def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
     """Tetrahedra between the grid lines in x, y and z (ascending); group: (set, group) for all of them."""
     if split not in SPLITS:
         raise CommandError(f"a box is split into {', '.join(map(str, SPLITS))} tetrahedra, not into {split}")
@@ -28,7 +29,9 @@ def box(lines: tuple[np.ndarray, np.ndarray, np.ndarray], split: int = 6, group:
     z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     number = np.arange(len(points)).reshape(*(n + 1)[::-1])
-    corner = {(i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)}
+    corner: dict[tuple[int, ...], np.ndarray] = {
+        (i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)
+    }
     if split == 12:
         middle = len(points) + np.arange(int(np.prod(n)))
         points = np.concatenate([points, sum(points[c] for c in corner.values()) / 8.0])
@@ -44,9 +47,9 @@ def box(lines: tuple[np.ndarray, np.ndarray, np.ndarray], split: int = 6, group:
             parts.append(way)
         cells = _upright(points, parts)
     else:
-        k, j, i = (v.ravel() for v in np.indices(n[::-1]))
+        k, j, i = (v.ravel() for v in np.indices(tuple(n[::-1])))
         odd = ((i + j + k) % 2 == 1)[:, None]
-        even = [[(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)]]
+        even: list[list[tuple[int, ...]]] = [[(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)]]
         even += [[a, *(_step(a, axis) for axis in range(3))] for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1))]
         turned = [[(1 - a[0], a[1], a[2]) for a in part] for part in even]
         ways = [np.column_stack([corner[a] for a in part]) for part in even]
