@@ -35,7 +35,7 @@ _drawing = threading.Lock()
 
 
 def file(moment: Moment, view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
-    """A file of this kind of one frame. wanted: "label" of the layer of a table, "fps" of a film. Raises HpcdemError."""
+    """A file of this kind of one frame. wanted: "label" of the layer of a table. Raises HpcdemError."""
     if kind == "csv":
         return table(moment, view, wanted.get("label"))
     if kind == "dxf":

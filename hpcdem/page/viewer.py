@@ -35,6 +35,7 @@ KINDS = {
     "icon.svg": "image/svg+xml",
     "viewer.js": "text/javascript; charset=utf-8",
     "viewer_words.js": "text/javascript; charset=utf-8",
+    "words.js": "text/javascript; charset=utf-8",
     "server.js": "text/javascript; charset=utf-8",
 }
 LARGEST = 4096
@@ -155,8 +156,8 @@ class Viewer:
         for name in objects.known():
             value = objects.fields[name][which] if name in objects.fields else objects.vectors[name][which]
             names = objects.names.get(name)
-            if names and 0 <= int(value) < len(names):
-                told: Any = names[int(value)]
+            if names:
+                told: Any = names[int(value)] if 0 <= int(value) < len(names) else None
             elif np.ndim(value):
                 told = f"({value[0]:.6g}, {value[1]:.6g})"
             else:

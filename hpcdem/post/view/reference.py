@@ -15,7 +15,7 @@ def discs(x: np.ndarray, y: np.ndarray, radius: np.ndarray, width: int, height: 
 
 
 def triangles(corners: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The same of triangles (n, 3, 2) in pixels; pixels whose middles lie on an edge belong to one of both sides, -2."""
+    """The same of triangles (n, 3, 2) in pixels; -2 where the middle of a pixel lies on an edge."""
     row, column = np.mgrid[0:height, 0:width] + 0.5
     shown = np.full((height, width), -1)
     for k, three in enumerate(corners):

@@ -1,5 +1,5 @@
-"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, and beside the
-colours a buffer of what each pixel shows, in which a click is looked up. `reference.py` paints the same plainly."""
+"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, and beside
+the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py` paints the same plainly."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _side(ax, ay, bx, by, px, py):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _owns(ax, ay, bx, by):
-    """Whether a pixel on the edge from a to b belongs to the triangle on its positive side: to one of two neighbours."""
+    """Whether a pixel on the edge from a to b belongs to the triangle on its positive side, one of two neighbours."""
     return by - ay > 0.0 or (by == ay and bx - ax < 0.0)
 
 
