@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Options", "hpcdem", "main", "read_command_line", "start_zdem2jpg", "start_zdemss"]
 
 
-PROGRAMS = ("movie", "measure", "info")
+PROGRAMS = ("movie", "measure", "info", "draw")
 """`hpcdem NAME ...`: modules of this package."""
 STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 """`hpcdem ... -s DIR`, as ZDEM has it; the misspelt form is the manual's."""
@@ -58,6 +58,8 @@ def main() -> NoReturn:
         importlib.import_module("hpcdem.cli.grade_page").start(words[1:])
     if words[:1] == ["sweep"]:
         importlib.import_module("hpcdem.cli.sweep").start(words[1:])
+    if words[:1] == ["view"]:
+        importlib.import_module("hpcdem.cli.view").start(words[1:])
     if words[:1] == ["case"]:
         importlib.import_module("hpcdem.cli.case").start(words[1:])
     if words[:1] == ["console"]:
@@ -134,10 +136,5 @@ def start_zdemss() -> NoReturn:
 def start(name: str, words: list[str]) -> NoReturn:
     """A program that looks at finished runs: its module holds a command of the same name, and a function `work`."""
     module = importlib.import_module(f"hpcdem.cli.{name}")
-    shown = {
-        "strain_stress": "hpcdem",
-        "movie": "hpcdem movie",
-        "measure": "hpcdem measure",
-        "info": "hpcdem info",
-    }.get(name, name)
-    run_program(getattr(module, name), shown, words, module.work)
+    shown = {"strain_stress": "hpcdem"} | {program: f"hpcdem {program}" for program in PROGRAMS}
+    run_program(getattr(module, name), shown.get(name, name), words, module.work)

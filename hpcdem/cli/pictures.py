@@ -46,6 +46,26 @@ class Formats(click.ParamType):
         return tuple(dict.fromkeys(words))
 
 
+class Numbers(click.ParamType):
+    """So many numbers with commas between them."""
+
+    name = "numbers"
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, tuple):
+            return value
+        try:
+            found = tuple(float(word) for word in str(value).split(","))
+        except ValueError:
+            found = ()
+        if len(found) != self.count:
+            self.fail(f"{value!r}: expected {self.count} numbers with commas between them", param, ctx)
+        return found
+
+
 def as_usual(words: Sequence[str], names: set[str]) -> list[str]:
     """The words of a command line, with the manual's ways of writing options turned into the usual ones."""
     result: list[str] = []

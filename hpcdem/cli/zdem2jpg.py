@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.pictures import Formats, ManualCommand, looks, number, positive, processes, style_of
+from hpcdem.cli.pictures import Formats, ManualCommand, Numbers, looks, number, positive, processes, style_of
 from hpcdem.runtime import launch
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
+    from hpcdem.post.view.model import Layer
     from hpcdem.runtime.progress import Log
 
 
@@ -28,6 +30,11 @@ FORMATS = ("jpg", "png", "tiff", "pdf", "svg")
     "--format", "formats", type=Formats(FORMATS), default="jpg", metavar="LIST",
     help=f"Some of {', '.join(FORMATS)} with commas between them [jpg].",
 )  # fmt: skip
+@click.option("--field", metavar="NAME", help="Particles in the colours of a field: vx, rotation, stress, ... (see "
+              "`hpcdem draw --list`) [their own].")  # fmt: skip
+@click.option("--range", "limits", type=Numbers(2), metavar="A,B", help="--field: values of the first and the last "
+              "colour [those of all frames].")  # fmt: skip
+@click.option("--colours", metavar="NAME", help="--field: viridis, cividis, blue-red, ... [viridis].")
 @number("max_workers", None, "Processes that draw at a time [one per core].", positive)
 @click.version_option(launch.version(), "-v", "--version", prog_name="zdem2jpg", message="%(prog)s %(version)s")
 def zdem2jpg(**options: Any) -> None:
@@ -35,6 +42,25 @@ def zdem2jpg(**options: Any) -> None:
 
     Under mpiexec or srun the ranks share the frames.
     """
+
+
+def of_field(options: dict[str, Any], files: list[Path]) -> Layer | None:
+    """What colours the particles, with one range for all frames. Raises HpcdemError for a field that is not there."""
+    from hpcdem.core.errors import UsageError
+    from hpcdem.post.view.model import ModelView, view_of
+    from hpcdem.post.view.moment import read_moment
+    from hpcdem.post.view.scene import common_spans
+
+    looks = {name: options[name] for name in ("limits", "colours") if options[name] is not None}
+    if options["field"] is None:
+        if looks:
+            raise UsageError("--range and --colours go with --field")
+        return None
+    if not options["ballplot"]:
+        raise UsageError("--field colours particles, which --ballplot=false leaves out")
+    view: ModelView = view_of({"layers": [{"object": "particles", "field": options["field"], **looks}]}, "--field")
+    spans = common_spans((read_moment(file) for file in files), view)
+    return view.with_layer("particles", limits=spans["particles"]).layers[0] if spans else view.layers[0]
 
 
 def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
@@ -52,6 +78,7 @@ def work(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
             log.warn(others)
         if not files:
             raise HpcdemError(f"no frame all_*.vtkhdf or all_*.dat in {folder}")
+        style = replace(style, look=replace(style.look, of_field=of_field(options, files)))
         return [Job(file, file.with_suffix(f".{kind}"), style) for file in files for kind in options["formats"]]
 
     jobs = on_first(comm, plan)

@@ -6,10 +6,37 @@ gids), so that files do not depend on the rank count. Walls are few and known to
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """Columns by name, each read once, when it is first asked for."""
+
+    def __init__(self, readers: Mapping[str, Callable[[], np.ndarray]]) -> None:
+        self._readers, self._read = dict(readers), dict[str, np.ndarray]()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._read:
+            self._read[name] = self._readers[name]()
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._readers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._readers)
+
+    def __len__(self) -> int:
+        return len(self._readers)
+
+    @property
+    def size(self) -> int:
+        """Bytes that have been read."""
+        return sum(values.nbytes for values in self._read.values())
 
 
 @dataclass

@@ -23,6 +23,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.behind import Deliveries
 from hpcdem.io.disk import explain
+from hpcdem.io.frame import Columns
 from hpcdem.io.rootfile import Description, RootFile, root_file
 from hpcdem.io.transport import Places, rows_in_blocks, to_root, used
 
@@ -303,3 +304,19 @@ def reading(path: str | os.PathLike) -> Iterator[Any]:
         raise HpcdemError(explain(path, failure, "read")) from None
     with file:
         yield file
+
+
+def columns(path: str | os.PathLike, places: Mapping[str, tuple[str, Any]]) -> Columns:
+    """Columns of a file by name, read when they are asked for. places: dataset and rows of each."""
+
+    def reader(place: str, rows: Any) -> Callable[[], np.ndarray]:
+        def read() -> np.ndarray:
+            with reading(path) as file:
+                try:
+                    return file[place][rows]
+                except (KeyError, OSError, ValueError, RuntimeError) as problem:
+                    raise HpcdemError(f"cannot read {os.fspath(path)}: {place}: {problem}") from None
+
+        return read
+
+    return Columns({name: reader(*place) for name, place in places.items()})

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -153,10 +153,11 @@ def _cell_data(particles: Table, contacts: Table, bonds: Table, bonded: np.ndarr
     return data
 
 
-def read_vtkhdf(path: str | os.PathLike, tables: Collection[str] | None = None) -> Frame:
+def read_vtkhdf(path: str | os.PathLike, tables: Collection[str] | None = None, lazily: bool = False) -> Frame:
     """The frame in a file of `write_vtkhdf`, every number as it was. Serial.
 
-    tables: names of the tables to read (all by default); the others come back empty. Raises HpcdemError.
+    tables: names of the tables to read (all by default); the others come back empty. lazily: columns are read when they
+    are asked for. Raises HpcdemError.
     """
     with h5.reading(path) as file:
         if "hpcdem" not in file or "VTKHDF" not in file:
@@ -174,35 +175,44 @@ def read_vtkhdf(path: str | os.PathLike, tables: Collection[str] | None = None) 
         )
         wanted = {"particles", "contacts", "bonds", "wall_contacts"} if tables is None else set(tables)
         n, n_contacts, n_bonds = len(file["VTKHDF/Points"]), int(head.attrs["contacts"]), int(head.attrs["bonds"])
-        readers = {
-            "particles": lambda: _read_particles(file["VTKHDF"]),
-            "contacts": lambda: _read_links(file["VTKHDF/CellData"], n, n_contacts, head.attrs["contacts_columns"]),
-            "bonds": lambda: _read_links(file["VTKHDF/CellData"], n + n_contacts, n_bonds, head.attrs["bonds_columns"]),
-            "wall_contacts": lambda: {name: values[...] for name, values in head["wall_contacts"].items()},
+        links = file["VTKHDF/CellData"]
+        places = {
+            "particles": (n, _of_particles(file["VTKHDF/PointData"])),
+            "contacts": (n_contacts, _of_links(links, n, n_contacts, head.attrs["contacts_columns"])),
+            "bonds": (n_bonds, _of_links(links, n + n_contacts, n_bonds, head.attrs["bonds_columns"])),
+            "wall_contacts": (
+                max((len(values) for values in head["wall_contacts"].values()), default=0),
+                {name: (f"hpcdem/wall_contacts/{name}", ...) for name in head["wall_contacts"]},
+            ),
         }
-        for name, read in readers.items():
-            columns = read() if name in wanted else {}
-            size = len(next(iter(columns.values()))) if columns else 0
-            frame.tables[name] = Table(columns, 0, size)
+        for name, (size, columns) in places.items():
+            if name not in wanted:
+                frame.tables[name] = Table({}, 0, 0)
+            elif lazily:
+                frame.tables[name] = Table(cast("dict[str, np.ndarray]", h5.columns(path, columns)), 0, size)
+            else:
+                frame.tables[name] = Table({k: file[place][rows] for k, (place, rows) in columns.items()}, 0, size)
     return frame
 
 
-def _read_particles(group: Any) -> dict[str, np.ndarray]:
-    points = group["Points"][...]
-    columns = {"x": points[:, 0].copy(), "y": points[:, 1].copy()}
-    for name, values in group["PointData"].items():
+def _of_particles(group: Any) -> dict[str, tuple[str, Any]]:
+    """Dataset and rows of each column."""
+    columns: dict[str, tuple[str, Any]] = {axis: ("VTKHDF/Points", (slice(None), k)) for k, axis in enumerate("xy")}
+    for name in group:
+        place = f"VTKHDF/PointData/{name}"
         if name in _VECTORS:
-            vector = values[...]
-            columns |= {part: vector[:, k].copy() for k, part in enumerate(_VECTORS[name])}
+            columns |= {part: (place, (slice(None), k)) for k, part in enumerate(_VECTORS[name])}
         else:
-            columns[name] = values[...]
+            columns[name] = (place, ...)
     return columns
 
 
-def _read_links(group: Any, first: int, size: int, names: bytes) -> dict[str, np.ndarray]:
+def _of_links(group: Any, first: int, size: int, names: bytes) -> dict[str, tuple[str, Any]]:
+    """The same of contacts or bonds."""
     rows = slice(first, first + size)
     force = dict(zip(("fx", "fy"), (0, 1))) if "force" in group else {}
     return {
-        name: group["force"][rows, force[name]] if name in force else group[_LINK_NAMES.get(name, name)][rows]
+        name: ("VTKHDF/CellData/force", (rows, force[name])) if name in force
+        else (f"VTKHDF/CellData/{_LINK_NAMES.get(name, name)}", rows)
         for name in names.decode().split()
-    }
+    }  # fmt: skip

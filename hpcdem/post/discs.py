@@ -46,6 +46,8 @@ class Discs(Collection):
             a * self.places[:, 0] + (c - left), e * self.places[:, 1] + (f - bottom), a * self.radius, self.shades,
             self.kind, width, height, renderer.points_to_pixels(self.line),
         )  # fmt: skip
+        if self.get_alpha() is not None:
+            picture[:, :, 3] = np.rint(picture[:, :, 3] * float(self.get_alpha()))
         context = renderer.new_gc()
         context.set_clip_rectangle(box)
         renderer.draw_image(context, left, bottom, picture)
@@ -71,5 +73,6 @@ class Discs(Collection):
             curves.set_figure(ax.get_figure())
             curves.axes = ax
             curves.set_clip_path(ax.patch)
+            curves.set_alpha(self.get_alpha())
             result.append(curves)
         return result

@@ -5,13 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hpcdem.core.fields import sides_of_box
 from hpcdem.io import colours
+from hpcdem.io.axes import view
 from hpcdem.io.frame import Frame
+
+if TYPE_CHECKING:
+    from hpcdem.post.view.model import Layer as ViewLayer
+    from hpcdem.post.view.scene import Painted
 
 MOST_LABELS = 5000
 """More ids than this in one picture are a grey mush, and take minutes."""
@@ -24,10 +29,12 @@ LOOSE = 1 / 500
 
 @dataclass(frozen=True)
 class Look:
-    """palette (10, 3): colours by number; line: width of walls and of the surface in points."""
+    """palette (10, 3): colours by number; line: width of walls and of the surface in points; of_field: what colours
+    particles in the place of their numbers."""
 
     palette: np.ndarray = field(default_factory=lambda: colours.RGB)
     line: float = 1.0
+    of_field: ViewLayer | None = None
 
 
 USUAL = Look()
@@ -47,10 +54,23 @@ def _discs(frame: Frame, ax: Any, look: Look, line: float) -> None:
     from hpcdem.post.discs import Discs
 
     columns = frame.tables["particles"].columns
-    if len(frame.tables["particles"]):
-        places = np.stack([columns["x"], columns["y"]], axis=1)
-        kind = colours.numbers(columns["color"])
-        ax.add_collection(Discs(places, columns["radius"], look.palette, kind, line), autolim=False)
+    if not len(frame.tables["particles"]):
+        return
+    places = np.stack([columns["x"], columns["y"]], axis=1)
+    shades, kind = look.palette, colours.numbers(columns["color"])
+    if (found := coloured(frame, look)) is not None:
+        shades, kind = found.shades, found.kind
+    ax.add_collection(Discs(places, columns["radius"], shades, kind, line), autolim=False)
+
+
+def coloured(frame: Frame, look: Look) -> Painted | None:
+    """The colours of particles by a field, None without one."""
+    if look.of_field is None:
+        return None
+    from hpcdem.post.view.moment import of_particles
+    from hpcdem.post.view.scene import painted
+
+    return painted(of_particles(frame), look.of_field, view(frame))
 
 
 def walls(frame: Frame, ax: Any, look: Look = USUAL) -> None:

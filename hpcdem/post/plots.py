@@ -13,12 +13,12 @@ from typing import Any
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import Ticks, View, particle_extent, view
+from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
-from hpcdem.post.layers import USUAL, Look
+from hpcdem.post.layers import USUAL, Look, coloured
+from hpcdem.post.saved import FORMATS, SAVED, saving
 
-CM = 1.0 / 2.54
 PAGE_WIDTH = 17.0
 """Width of a figure [cm]: that of a printed page."""
 TALLEST = 22.0 / 17.0
@@ -26,7 +26,8 @@ TALLEST = 22.0 / 17.0
 FONT = 9.0
 _MARGINS = 0.9 * CM, 0.45 * CM, 1.15 * CM, 0.35 * CM  # left (without numbers), right, bottom, top of the axes
 _DIGIT = 0.2 * CM
-FORMATS = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".pdf", ".svg")
+BAR = 1.9 * CM
+"""Room for the bar of colours of a field."""
 SIDES = ("left", "right", "bottom", "top")
 MODEL = ("bfill", "wall")
 """The usual picture: filled particles and walls."""
@@ -71,18 +72,6 @@ class Style:
 
 
 USUAL_STYLE = Style()
-SAVED: Any = {"pdf.fonttype": 42, "ps.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "hpcdem"}
-"""Settings of matplotlib while a file is written: texts stay texts, and an SVG's ids are the same every time."""
-
-
-def saving(kind: str) -> dict[str, Any]:
-    """Options of `savefig` for jpg, png, tiff, pdf, svg or eps: the same figure gives the same file."""
-    if kind == "jpg":
-        return {"pil_kwargs": {"quality": 92, "subsampling": 0}}  # thin coloured layers need their full colour
-    if kind == "tiff":
-        return {"pil_kwargs": {"compression": "tiff_lzw"}}
-    metadata = {"png": {"Software": None}, "pdf": {"CreationDate": None}, "svg": {"Date": None}}
-    return {"metadata": metadata[kind]} if kind in metadata else {}
 
 
 def seen_of(frame: Frame, style: Style) -> View:
@@ -162,6 +151,8 @@ def frame_figure(
     growth = style.font / FONT
     left, right, bottom, top = (growth * margin for margin in _MARGINS)
     left += growth * _DIGIT * max(map(len, style.ticks(seen)[1].labels), default=0)
+    bar = coloured(frame, style.look)
+    right += growth * BAR if bar is not None and bar.scale is not None else 0.0
     room = style.page * CM - left - right, style.page * CM * TALLEST - bottom - top
     if min(room) < 0.5 * CM:
         raise UsageError(f"a page of {style.page:g} cm is too small for numbers of {style.font:g} points")
@@ -171,6 +162,11 @@ def frame_figure(
     figure = Figure(figsize=page)
     ax = figure.add_axes((left / page[0], bottom / page[1], width / page[0], height / page[1]))
     draw_frame(frame, ax, seen, what, style)
+    if bar is not None and bar.scale is not None:
+        from hpcdem.post.view.paper import colour_bar
+
+        place = ((left + width + 0.3 * CM) / page[0], bottom / page[1], 0.3 * CM / page[0], height / page[1])
+        colour_bar(figure, figure.add_axes(place), bar.scale, style.font)
     return figure
 
 
@@ -204,4 +200,6 @@ def plot_frame(
 def plot_file(source: Path, path: Path, style: Style, seen: View | None = None) -> None:
     """Draw the frame in a file with all that `style` says. Serial. Raises HpcdemError."""
     tables = ["particles", *(("contacts", "bonds") if {"bondplot", "bondc", "cforce"} & {*style.what} else ())]
+    if style.look.of_field is not None:  # stress comes from all of them
+        tables = ["particles", "contacts", "bonds", "wall_contacts"]
     plot_frame(read_frame(source, tables), path, style.dpi, style.what, style, seen)

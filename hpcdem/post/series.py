@@ -11,13 +11,17 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.axes import View
 from hpcdem.io.disk import explain
 from hpcdem.post import blocks
 from hpcdem.post.plots import Style, plot_file
+
+if TYPE_CHECKING:
+    from hpcdem.post.view.model import ModelView
+    from hpcdem.post.view.paper import Paper
 
 Report = Callable[[str], None]
 _LAUNCHER = ("PMI", "OMPI_", "SLURM_", "PALS_", "MPI_")
@@ -48,6 +52,32 @@ class Job:
             text = str(failure)
             named = self.source.name in text or self.picture.name in text
             raise HpcdemError(text if named else f"{self.source}: {text}") from None
+
+
+@dataclass(frozen=True)
+class ViewJob:
+    """A view of a frame in a file, and the picture to be made of it."""
+
+    source: Path
+    picture: Path
+    view: ModelView
+    paper: Paper
+    seen: View
+
+    @property
+    def name(self) -> str:
+        """What progress calls it."""
+        return self.source.stem
+
+    def __call__(self) -> None:
+        """Draw. Raises HpcdemError that names one of the files."""
+        from hpcdem.post.view.paper import draw
+
+        try:
+            draw(self.source, self.picture, self.view, self.paper, self.seen)
+        except HpcdemError as failure:
+            text = str(failure)
+            raise HpcdemError(text if self.source.name in text else f"{self.source}: {text}") from None
 
 
 class Task(Protocol):

@@ -15,7 +15,7 @@ import pytest
 
 from hpcdem.cli.common import read_command_line
 from hpcdem.cli.pictures import as_usual, style_of
-from hpcdem.cli.zdem2jpg import work, zdem2jpg
+from hpcdem.cli.zdem2jpg import of_field, work, zdem2jpg
 from hpcdem.core.errors import HpcdemError, ScriptError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io import colours
@@ -473,3 +473,40 @@ def test_folders_without_frames(tmp_path: Path) -> None:
         with pytest.raises(HpcdemError, match=message):
             draw(where)
     shutil.rmtree(tmp_path)
+
+
+# --- fields --------------------------------------------------------------------------------------------------------
+
+
+def test_particles_in_the_colours_of_a_field(folder: Path) -> None:
+    """--field, and --range and --colours with it, each change the picture; one range holds for all frames."""
+    usual = draw(folder)
+    by_field = draw(folder, "--field=radius")
+    assert by_field.shape[1] == usual.shape[1] and not np.array_equal(by_field, usual)
+    assert not np.array_equal(draw(folder, "--field=radius", "--range=0,1000"), by_field)
+    assert not np.array_equal(draw(folder, "--field=radius", "--colours=plasma"), by_field)
+    later = make_frame(300)
+    later.tables["particles"].columns["radius"] *= 1.5
+    write_vtkhdf(folder / "all_0000002000.vtkhdf", later, SerialComm())
+    assert not np.array_equal(draw(folder, "--field=radius"), by_field)
+    radii = make_frame(300).tables["particles"].columns["radius"]
+    read = options("--field=radius", folder=folder)
+    layer = of_field(read, sorted(folder.glob("*.vtkhdf")))
+    assert layer is not None and layer.limits == (radii.min(), 1.5 * radii.max())
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--field=nix"], "particles have no field nix"), (["--range=0,1"], "go with --field"),
+        (["--colours=plasma"], "go with --field"), (["--field=vx", "--ballplot=false"], "--ballplot=false leaves out"),
+        (["--field=vx", "--colours=jet"], "colours"), (["--field=vx", "--range=1,0"], "1 is not below 0"),
+    ],
+)  # fmt: skip
+def test_fields_that_cannot_be(folder: Path, words: list[str], message: str) -> None:
+    with pytest.raises(HpcdemError, match=message):
+        draw(folder, *words)
+
+
+def test_stress_of_frames_that_are_read_from_files(folder: Path) -> None:
+    assert not np.array_equal(draw(folder, "--field=stress"), draw(folder, "--field=stress_xy"))

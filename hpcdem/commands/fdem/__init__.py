@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         histories,
         liners,
         meshes,
+        pictures,
         queries,
         settings,
         steps,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Project", "assignments", "bolts", "charts", "checkpoints", "coupling", "cracks", "flow", "frames", "geometry",
-    "heat", "histories", "liners", "meshes", "queries", "settings", "steps", "summary", "supports",
+    "heat", "histories", "liners", "meshes", "pictures", "queries", "settings", "steps", "summary", "supports",
 ]  # fmt: skip
 
 

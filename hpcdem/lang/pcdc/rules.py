@@ -8,6 +8,7 @@ from typing import Any
 
 from hpcdem.lang.pcdc.kinds import Pending
 from hpcdem.lang.pcdc.table import RECORDED, Command
+from hpcdem.physics.fdem.groups import SHOWN
 
 
 def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
@@ -76,11 +77,6 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError("range goes with profile: it says along which joints")
 
 
-def _dimensions(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if arguments.get("dim", 2) == 3:
-        raise ValueError("dim 3 is not there yet: this version computes in two dimensions")
-
-
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
@@ -143,6 +139,19 @@ def _output(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | Non
         raise ValueError("every and off exclude each other")
 
 
+LOOKS = ("limits", "log", "colours", "opacity", "edges", "size", "vectors", "arrows", "filter")
+
+
+def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    shown = arguments.get("object")
+    if terms is not None and shown not in SHOWN and not isinstance(shown, Pending):
+        raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
+    if "field" not in arguments and "object" not in arguments:
+        for word in LOOKS:
+            if word in arguments:
+                raise ValueError(f"{word} goes with field or object, which say of what")
+
+
 def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     given = [name for name in ("weibull", "normal", "lognormal") if name in arguments]
     if len(given) != 1:
@@ -155,7 +164,6 @@ _RULES = {
     "bolt create polyline": _bolt,
     "field create": _field,
     "flow-node initial": _fluid,
-    "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,
     "model rayleigh": _rayleigh,
@@ -164,4 +172,5 @@ _RULES = {
     "chart add": _curve,
     "well stage": _stage,
     "output vtk": _output,
+    "output image": _image,
 }

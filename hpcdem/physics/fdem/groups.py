@@ -21,6 +21,8 @@ FLOW_NODE, CHANNEL = "flow-node", "flow-channel"
 FLOW = {FLOW_NODE: NODE, CHANNEL: JOINT}
 """They have the numbers, groups and places of nodes and joints."""
 KINDS = (ELEMENT, NODE, FACE, JOINT, *SUPPORTS)
+SHOWN = {"elements": ELEMENT, "joints": JOINT, "channels": CHANNEL}
+"""Objects of a picture that a range chooses among."""
 DEFAULT = "default"
 """The set of groups that name none."""
 

@@ -20,7 +20,7 @@ from hpcdem.io.axes import View
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FORMATS, earlier_stems, left_out
 from hpcdem.post.cpt import INVAR, INVAR2, VOLUME, ColourTable, read_cpt, stress_table
-from hpcdem.post.plots import SAVED, saving
+from hpcdem.post.saved import SAVED, saving
 from hpcdem.post.section import read_section
 from hpcdem.post.sections import panels, survey
 from hpcdem.post.sections.files import write_grids, write_tables

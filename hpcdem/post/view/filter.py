@@ -1,0 +1,147 @@
+"""Choosing objects by an expression such as `stress_xx < -1e6 and hypot(x, y) < 2`.
+
+The text is taken apart by Python's own parser and computed here, piece by piece, from a list of what is allowed:
+comparisons, and, or, not, + - * /, a few functions, numbers and names of fields. Nothing in it is executed.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError
+
+LONGEST = 400
+"""Characters of an expression."""
+DEEPEST = 40
+"""Parentheses, functions and operators within each other."""
+FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
+    "abs": (1, np.abs), "sqrt": (1, np.sqrt), "log10": (1, np.log10), "hypot": (2, np.hypot),
+    "min": (2, np.minimum), "max": (2, np.maximum), "isnan": (1, np.isnan),
+}  # fmt: skip
+"""How many values each takes, and what it is."""
+GROUP = "group"
+"""`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group."""
+_ARITHMETIC = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
+_COMPARISONS = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}  # fmt: skip
+Groups = Callable[[str, str], np.ndarray]
+
+
+def chosen(text: str, count: int, fields: Mapping[str, np.ndarray], groups: Groups) -> np.ndarray:
+    """(count,) bool: which objects the expression holds for. fields: values (count,) by name, read when they are asked
+    for; groups: the members (count,) of a group, by its name and that of its set ("" any). HpcdemError with the text
+    for what is not understood."""
+    found = _Evaluation(text, fields, groups).value(parsed(text), 0)
+    if not (isinstance(found, (np.ndarray, np.bool_, bool)) and np.asarray(found).dtype == bool):
+        raise refusal(text, "expected a comparison, such as x > 1")
+    return np.broadcast_to(found, (count,)).copy()
+
+
+def parsed(text: str) -> ast.expr:
+    """The expression as a tree. HpcdemError for what is none, or too long."""
+    if len(text) > LONGEST:
+        raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} are read")
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise refusal(text, "expected an expression such as stress_xx < -1e6 and x > 0") from None
+
+
+def refusal(text: str, why: str) -> HpcdemError:
+    """What is said about an expression."""
+    return HpcdemError(f"filter '{text[:60]}': {why}")
+
+
+class _Evaluation:
+    def __init__(self, text: str, fields: Mapping[str, np.ndarray], groups: Groups) -> None:
+        self.text, self.fields, self.groups = text, fields, groups
+
+    def value(self, node: ast.expr, depth: int) -> Any:
+        """A number, or an array of a value per object."""
+        if depth > DEEPEST:
+            raise refusal(self.text, f"more than {DEEPEST} things within each other")
+        deeper = depth + 1
+        with np.errstate(all="ignore"):
+            match node:
+                case ast.Constant(value=bool()):
+                    pass
+                case ast.Constant(value=int() | float() as number):
+                    return self._number(number)
+                case ast.Name(id=name):
+                    return self._field(name)
+                case ast.BoolOp(op=op, values=parts):
+                    combined = np.logical_and if isinstance(op, ast.And) else np.logical_or
+                    found = self._truth(parts[0], deeper)
+                    for part in parts[1:]:
+                        found = combined(found, self._truth(part, deeper))
+                    return found
+                case ast.UnaryOp(op=ast.Not(), operand=operand):
+                    return np.logical_not(self._truth(operand, deeper))
+                case ast.UnaryOp(op=ast.USub(), operand=operand):
+                    return -self._amount(operand, deeper)
+                case ast.BinOp(op=op, left=left, right=right) if type(op) in _ARITHMETIC:
+                    return _ARITHMETIC[type(op)](
+                        np.asarray(self._amount(left, deeper)), np.asarray(self._amount(right, deeper))
+                    )
+                case ast.Compare(left=left, ops=ops, comparators=others) if all(type(op) in _COMPARISONS for op in ops):
+                    return self._compared(left, ops, others, deeper)
+                case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                    return self._called(name, arguments, deeper)
+        raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is nothing that a filter can be made of")
+
+    def _number(self, number: float) -> float:
+        try:
+            value = float(number)
+        except OverflowError:
+            value = math.inf
+        if not math.isfinite(value):
+            raise refusal(self.text, "a number is too large")
+        return value
+
+    def _amount(self, node: ast.expr, depth: int) -> Any:
+        found = self.value(node, depth)
+        if np.asarray(found).dtype == bool:
+            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is true or false, a number was expected")
+        return found
+
+    def _truth(self, node: ast.expr, depth: int) -> Any:
+        found = self.value(node, depth)
+        if np.asarray(found).dtype != bool:
+            raise refusal(self.text, f"'{ast.unparse(node)[:30]}' is a number, a comparison was expected")
+        return found
+
+    def _compared(self, left: ast.expr, ops: list[ast.cmpop], others: list[ast.expr], depth: int) -> Any:
+        before, result = self._amount(left, depth), np.True_
+        for op, node in zip(ops, others, strict=True):
+            after = self._amount(node, depth)
+            result = np.logical_and(result, _COMPARISONS[type(op)](np.asarray(before), np.asarray(after)))
+            before = after
+        return result
+
+    def _called(self, name: str, arguments: list[ast.expr], depth: int) -> Any:
+        if name == GROUP:
+            words = [node.id for node in arguments if isinstance(node, ast.Name)]
+            if len(words) != len(arguments) or len(words) not in (1, 2):
+                raise refusal(self.text, "group(NAME) or group(NAME, SET) takes names")
+            return self.groups(words[0], words[1] if len(words) == 2 else "")
+        if name not in FUNCTIONS:
+            raise refusal(self.text, f"there is no function {name}; there is {', '.join([*FUNCTIONS, GROUP])}")
+        count, function = FUNCTIONS[name]
+        if len(arguments) != count:
+            raise refusal(self.text, f"{name} takes {count} value{'s' * (count > 1)}, not {len(arguments)}")
+        return function(*(self._amount(node, depth) for node in arguments))
+
+    def _field(self, name: str) -> np.ndarray:
+        try:
+            return self.fields[name]
+        except KeyError:
+            known = ", ".join(self.fields)
+            raise refusal(self.text, f"there is no field {name}; there is {known}") from None

@@ -1,0 +1,147 @@
+"""What a view is: the objects that are shown and how, the part of the plane, and what stands around it.
+
+Files `*.mv` hold it as JSON, with the names used here; what is left out has its default, other names are refused.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.io.agreed import atomic_path
+from hpcdem.io.disk import explain
+
+VERSION = 1
+_Colour = Annotated[str, Field(pattern=r"^(#[0-9a-fA-F]{6})?$")]
+_Span = tuple[FiniteFloat, FiniteFloat]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Layer(_Table):
+    """One kind of object in a view.
+
+    name: in the tree and the legend, else that of the object; field: what colours it, "" the object's own colours;
+    limits: values of the first and the last colour, else those of what is shown; colour: one for all; size: factor on
+    radii of particles and widths of lines; vectors: a field drawn as arrows, the longest `arrows` times a twentieth of
+    the picture; filter: an expression that chooses objects, see hpcdem.post.view.filter."""
+
+    object: Literal[OBJECTS]  # type: ignore[valid-type]
+    name: Annotated[str, Field(max_length=60)] = ""
+    visible: bool = True
+    field: Annotated[str, Field(max_length=60)] = ""
+    limits: _Span | None = None
+    log: bool = False
+    colours: Literal[tuple(COLOURS)] = "viridis"  # type: ignore[valid-type]
+    colour: _Colour = ""
+    opacity: Annotated[FiniteFloat, Field(ge=0.0, le=1.0)] = 1.0
+    edges: bool = False
+    size: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
+    vectors: Annotated[str, Field(max_length=60)] = ""
+    arrows: Annotated[FiniteFloat, Field(gt=0.0, le=100.0)] = 1.0
+    filter: str = ""
+
+    @property
+    def label(self) -> str:
+        """What the tree calls it."""
+        return self.name or self.object
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Layer:
+        if self.limits is not None and not self.limits[0] < self.limits[1]:
+            raise ValueError(f"limits: {self.limits[0]:g} is not below {self.limits[1]:g}")
+        if self.log and self.limits is not None and self.limits[0] <= 0.0:
+            raise ValueError(f"limits: with log both are above 0, not {self.limits[0]:g}")
+        return self
+
+
+class ModelView(_Table):
+    """layers: what is shown, the later ones over the earlier; camera: left, right, bottom, top of the part of the plane
+    [m], else the whole model; deformed: factor on displacements, 1 as it is, 0 as it was in the mesh; title: over the
+    picture, with {step} and {time}; step: of the frame, else the last one."""
+
+    layers: tuple[Layer, ...] = ()
+    camera: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+    deformed: FiniteFloat = 1.0
+    title: Annotated[str, Field(max_length=200)] = "step {step}, {time} s"
+    axes: bool = True
+    legend: bool = True
+    step: Annotated[int, Field(ge=0)] | None = None
+
+    @model_validator(mode="after")
+    def _a_part(self) -> ModelView:
+        if self.camera is not None and not (self.camera[0] < self.camera[1] and self.camera[2] < self.camera[3]):
+            raise ValueError("camera: expected left, right, bottom, top with left below right and bottom below top")
+        labels = [layer.label for layer in self.layers]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise ValueError(f"layers: two are called '{label}': give one of them a name")
+        return self
+
+    def layer(self, label: str) -> Layer | None:
+        """The layer of this name."""
+        return next((layer for layer in self.layers if layer.label == label), None)
+
+    def changed(self, **values: Any) -> ModelView:
+        """The same view with other values. HpcdemError for those that cannot be."""
+        return view_of({**self.model_dump(), **values}, "view")
+
+    def with_layer(self, label: str, **values: Any) -> ModelView:
+        """The same view with other values of one layer. HpcdemError for those that cannot be."""
+        layers = [
+            {**layer.model_dump(), **(values if layer.label == label else {})} for layer in self.layers
+        ]  # fmt: skip
+        return self.changed(layers=layers)
+
+
+def view_of(given: Mapping[str, Any], source: str) -> ModelView:
+    """The view that a table of names and values says. HpcdemError that begins with `source` and names the value."""
+    try:
+        return ModelView.model_validate(dict(given))
+    except ValidationError as problem:
+        first = problem.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        read = "" if isinstance(first["input"], (dict, list)) else f" (read {str(first['input'])[:40]!r})"
+        said = first["msg"].removeprefix("Value error, ")
+        raise HpcdemError(f"{source}: {f'{place}: ' if place else ''}{said}{read}") from None
+
+
+def read_view(path: str | os.PathLike) -> ModelView:
+    """The view in a file. HpcdemError if it cannot be read, or is none."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise HpcdemError(f"cannot read {os.fspath(path)}: there is no such file") from None
+    except OSError as failure:
+        raise HpcdemError(explain(Path(path), failure, "read")) from None
+    except UnicodeDecodeError:
+        raise HpcdemError(f"{os.fspath(path)} is no view: it is not text") from None
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError) as problem:
+        raise HpcdemError(f"{os.fspath(path)} is no view: {problem}") from None
+    if not isinstance(given, dict) or given.pop("view", None) != VERSION:
+        raise HpcdemError(f'{os.fspath(path)} is no view: expected "view": {VERSION} in a JSON object')
+    return view_of(given, os.fspath(path))
+
+
+def written(view: ModelView) -> str:
+    """The text of a file: what differs from the defaults."""
+    layers = [{"object": layer.object} | layer.model_dump(exclude_defaults=True) for layer in view.layers]
+    table = {"view": VERSION} | view.model_dump(exclude_defaults=True, exclude={"layers"}) | {"layers": layers}
+    return json.dumps(table, indent=2, ensure_ascii=False) + "\n"
+
+
+def save_view(path: str | os.PathLike, view: ModelView) -> None:
+    """Write the view into a file. HpcdemError if it cannot be written."""
+    with atomic_path(path) as temporary:
+        Path(temporary).write_text(written(view), encoding="utf-8")

@@ -1,0 +1,295 @@
+"""What a frame holds, as kinds of objects with fields. Columns are read when they are asked for, and only these."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.io.frame import Columns, Frame
+from hpcdem.io.frames import read_frame
+from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
+from hpcdem.post import fluid, liners
+
+DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
+INSIDE = ("contacts", "bonds", "joints", "channels")
+"""Objects that lie between others."""
+OF_CHANNELS = (
+    "aperture", "fluid_pressure", "saturation", "flow_rate", "fluid_velocity", "fluid_temperature",
+    "proppant_concentration", "pack_pressure",
+)  # fmt: skip
+"""Columns of joints that channels have."""
+UNITS = {
+    "Pa": ("stress", "pressure", "ebmod", "gbmod", "tstrength", "sstrength"),
+    "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
+          "distance"),
+    "m/s": ("velocity", "vx", "vy"), "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
+    "N": ("force", "fx", "fy", "fn", "fs"), "N m": ("torque", "moment"), "K": ("temperature",), "kg": ("mass",),
+    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m3": ("volume",), "m2/s": ("flow_rate",),
+}  # fmt: skip
+"""Units by the word, or the end of the word, that says what a field is."""
+
+PARTS = {"x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "min", "largest", "first", "last", "shear"}
+"""Ends of the names of fields that change no unit."""
+
+
+def unit_of(name: str) -> str:
+    """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
+    words = name.split("_")
+    while words and words[-1] in PARTS:
+        words.pop()
+    stem = "_".join(words)
+    ends = ((unit, word) for unit, known in UNITS.items() for word in known)
+    found = [(len(word), unit) for unit, word in ends if stem == word or stem.endswith(f"_{word}")]
+    return max(found)[1] if found else ""
+
+
+@dataclass
+class Objects:
+    """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
+    in the fourth column of triangles) or lines (ends (n, 2, 2)), read when it is asked for; fields: (n,) by name;
+    vectors: (n, 2) by name; names: of the values of an integer field; number: the field by which the program numbers
+    them."""
+
+    kind: str
+    count: int
+    read: Callable[[], tuple[np.ndarray, ...]]
+    fields: Mapping[str, np.ndarray]
+    vectors: Mapping[str, np.ndarray] = field(default_factory=dict)
+    names: Mapping[str, list[str]] = field(default_factory=dict)
+    number: str = "number"
+
+    def centres(self) -> np.ndarray:
+        """(n, 2) [m]."""
+        shape = self.read()
+        if self.kind == DISCS:
+            return shape[0]
+        if self.kind == LINES:
+            return shape[0].mean(axis=1)
+        points, cells = shape
+        last = np.where(cells[:, 3] >= 0, cells[:, 3], cells[:, 0])
+        total = points[cells[:, 0]] + points[cells[:, 1]] + points[cells[:, 2]]
+        quads = cells[:, 3] >= 0
+        return (total + np.where(quads[:, None], points[last], 0.0)) / np.where(quads, 4.0, 3.0)[:, None]
+
+    def values(self, name: str, label: str) -> np.ndarray:
+        """(n,) a field, or the length of a vector. HpcdemError that names what there is."""
+        if name in self.fields:
+            return self.fields[name]
+        if name in self.vectors:
+            return np.hypot(*self.vectors[name].T)
+        raise self.lack(name, label)
+
+    def lack(self, name: str, label: str) -> HpcdemError:
+        """What is said about a field that is not there."""
+        return HpcdemError(f"{label} have no field {name} in this frame; they have {', '.join(self.known())}")
+
+    def has(self, name: str) -> bool:
+        """Whether there is a field or vector of this name."""
+        return name in self.fields or name in self.vectors
+
+    def filled(self, name: str) -> bool:
+        """Whether it has a value somewhere."""
+        return name in self.vectors or there(self.fields[name])
+
+    def known(self) -> list[str]:
+        """Names of fields and vectors that have a value somewhere."""
+        return [*(name for name in self.fields if self.filled(name)), *self.vectors]
+
+
+def there(values: np.ndarray) -> bool:
+    """Whether a column says anything: what an object does not have is NaN, or -1 in whole numbers."""
+    if not len(values) or values.dtype.kind != "f":
+        return values.dtype.kind != "f" and bool(len(values)) and bool((values != -1).any())
+    return bool(np.isfinite(values[0])) or bool(np.isfinite(values).any())
+
+
+@dataclass
+class Moment:
+    """A frame. displacement: (k, 2) [m] of the points of the elements, None where the frame has none."""
+
+    step: int
+    time: float
+    objects: dict[str, Objects]
+    displacement: Callable[[], np.ndarray] | None = None
+
+    def of(self, name: str) -> Objects:
+        """The objects of a kind. HpcdemError that names what there is."""
+        if name not in self.objects:
+            raise HpcdemError(f"this frame has no {name}; it has {', '.join(self.objects) or 'nothing'}")
+        return self.objects[name]
+
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of what is there [m]."""
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        for name, objects in self.objects.items():
+            if not objects.count or name in INSIDE:
+                continue
+            shape = objects.read()
+            at = shape[0].reshape(-1, 2)
+            around = shape[1][:, None] if objects.kind == DISCS else 0.0
+            low = np.fmin(low, np.nanmin(np.where(np.isfinite(at), at, np.nan) - around, axis=0))
+            high = np.fmax(high, np.nanmax(np.where(np.isfinite(at), at, np.nan) + around, axis=0))
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            return 0.0, 1.0, 0.0, 1.0
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def read_moment(path: str | os.PathLike) -> Moment:
+    """The frame in a file of hpcdem, of particles or of blocks. HpcdemError if it is none, or damaged."""
+    path = Path(path)
+    if path.suffix != ".vtkhdf":
+        return of_particles(read_frame(path))
+    if is_mesh_frame(path):
+        return of_blocks(read_mesh_frame(path, lazily=True))
+    from hpcdem.io.vtkhdf import read_vtkhdf
+
+    return of_particles(read_vtkhdf(path, lazily=True))
+
+
+# ---- particles -------------------------------------------------------------------------------------------------------
+
+
+def of_particles(frame: Frame) -> Moment:
+    """A whole frame of particles."""
+    tables = {name: table.columns for name, table in frame.tables.items()}
+    p = tables["particles"]
+    memory: dict[str, Any] = {}
+
+    def once(name: str, make: Callable[[], Any]) -> Any:
+        if name not in memory:
+            memory[name] = make()
+        return memory[name]
+
+    def centres() -> np.ndarray:
+        return once("centres", lambda: np.stack([p["x"], p["y"]], axis=1))
+
+    def pair(table: Mapping[str, np.ndarray], a: str, b: str) -> Callable[[], np.ndarray]:
+        return lambda: np.stack([table[a], table[b]], axis=1)
+
+    def stress(name: str) -> np.ndarray:
+        return once("stress", lambda: _stresses(frame))[name]
+
+    count = len(p["gid"]) if "gid" in p else 0
+    more: dict[str, Callable[[], np.ndarray]] = {name: partial(p.__getitem__, name) for name in p}
+    if "angle" in p:
+        more["rotation"] = lambda: p["angle"]
+    if "mass" in p and "vx" in p:
+        more["kinetic_energy"] = lambda: 0.5 * p["mass"] * (p["vx"] ** 2 + p["vy"] ** 2)
+    if "fx" in tables["contacts"]:
+        more |= {name: partial(stress, name) for name in STRESSES}
+    vectors = {
+        name: pair(p, a, b) for name, (a, b) in {"velocity": ("vx", "vy"), "force": ("fx", "fy")}.items() if a in p
+    }
+    objects = {
+        "particles": Objects(
+            DISCS, count, lambda: (centres(), p["radius"]), Columns(more), Columns(vectors),
+            {"group": frame.group_names}, "gid",
+        )
+    }  # fmt: skip
+    if len(frame.walls.get("id", ())):
+        ends = np.stack([np.asarray(frame.walls[k], float).reshape(-1, 2) for k in ("p1", "p2")], axis=1)
+        flat = {name: np.asarray(values) for name, values in frame.walls.items() if np.asarray(values).ndim == 1}
+        both = {"velocity": "v", "force": "force"}
+        across = {name: np.asarray(frame.walls[k]) for name, k in both.items() if k in frame.walls}
+        objects["walls"] = Objects(LINES, len(ends), lambda: (ends,), flat, across, number="id")
+    for name in ("contacts", "bonds"):
+        table = tables[name]
+        if not len(frame.tables[name]):
+            continue
+
+        def ends_of(table: Mapping[str, np.ndarray] = table) -> np.ndarray:
+            rows = np.searchsorted(p["gid"], np.stack([table["id1"], table["id2"]], axis=1))
+            return centres()[np.minimum(rows, count - 1)]
+
+        def lines(name: str = name, make: Callable[[], np.ndarray] = ends_of) -> tuple[np.ndarray]:
+            return (once(name, make),)
+
+        pulls = {"force": pair(table, "fx", "fy")} if "fx" in table else {}
+        objects[name] = Objects(LINES, len(frame.tables[name]), lines, table, Columns(pulls), number="")
+    return Moment(frame.step, frame.time, objects)
+
+
+STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress", "stress_deviator")
+"""Of particles, from the forces on them, compression positive: components, mean (s1 + s2) / 2, (s1 - s2) / 2."""
+
+
+def _stresses(frame: Frame) -> dict[str, np.ndarray]:
+    """The stress of each particle [Pa], see hpcdem.post.stress."""
+    from hpcdem.post.stress import moments, principal, volume_rule
+
+    of_volume = moments(frame)[0] / volume_rule(frame)[0][:, None]
+    xx, yy, xy = of_volume[:, 0], of_volume[:, 3], 0.5 * (of_volume[:, 1] + of_volume[:, 2])
+    mean, deviator, _ = principal(xx, xy, yy)
+    return dict(zip(STRESSES, (xx, yy, xy, mean, deviator), strict=True))
+
+
+# ---- blocks ----------------------------------------------------------------------------------------------------------
+
+
+def of_blocks(state: MeshState) -> Moment:
+    """A frame of blocks."""
+    cells, count = state.cells, len(state.joints)
+
+    def mean(name: str) -> np.ndarray:
+        """(ne, ...) of what the corners of each element have."""
+        values = state.of_points[name]
+        total = values[cells[:, 0]] + values[cells[:, 1]] + values[cells[:, 2]]
+        quads = np.flatnonzero(cells[:, 3] >= 0)
+        total[quads] = 0.75 * (total[quads] + values[cells[quads, 3]])
+        return total / 3.0
+
+    of_corners = [name for name in state.of_points if name not in ("number", "node")]
+    flat = [name for name in of_corners if name not in VECTORS]
+    fields = {name: partial(state.of_elements.__getitem__, name) for name in state.of_elements if name != "cell"}
+    fields |= {name: partial(mean, name) for name in flat}
+    vectors = {name: partial(mean, name) for name in of_corners if name in VECTORS}
+    objects = {
+        "elements": Objects(
+            POLYGONS, len(cells), lambda: (state.points, cells), Columns(fields), Columns(vectors), state.group_names
+        )
+    }
+
+    def joint(name: str, rows: Any) -> np.ndarray:
+        return state.of_joints[name][rows]
+
+    def of_joints(rows: Any, names: list[str]) -> Columns:
+        return Columns({name: partial(joint, name, rows) for name in names})
+
+    wet = [name for name in OF_CHANNELS if name in state.of_joints]
+    rest = [name for name in state.of_joints if name not in (*wet, "cell") and not name.startswith("group_")]
+    if count:
+        objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(slice(None), rest))
+    if "aperture" in wet and fluid.there(state):
+        rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
+        both = [*wet, *(name for name in ("number", "length") if name in rest)]
+        objects["channels"] = Objects(
+            LINES, len(rows), lambda: (state.points[state.joints[rows]],), of_joints(rows, both)
+        )
+    for name, tables in state.supports.items():
+        objects[name] = _supports(name, tables)
+    displacement = (lambda: state.of_points["displacement"]) if "displacement" in state.of_points else None
+    return Moment(state.step, state.time, objects, displacement)
+
+
+VECTORS = ("displacement", "velocity")
+"""Of corners."""
+
+
+def _supports(name: str, tables: Mapping[str, Mapping[str, np.ndarray]]) -> Objects:
+    """The elements of bolts, or of liners without those that were deleted."""
+    nodes, elements = tables["nodes"], tables["elements"]
+    at = np.column_stack([nodes["position_x"], nodes["position_y"]])
+    first = elements["first_node"]
+    rows = np.arange(len(first))
+    if name == "liners":
+        rows = np.flatnonzero(elements["liner_state"].astype(np.int64) & liners.DELETED == 0)
+    last = elements.get("last_node", first + 1)
+    ends = np.stack([at[first[rows]], at[last[rows]]], axis=1)
+    return Objects(LINES, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()})

@@ -1,0 +1,386 @@
+"""A view of a frame put together: what is where, in which colour, and what the legend says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.io import colours
+from hpcdem.io.axes import View
+from hpcdem.post import blocks
+from hpcdem.post.view.filter import chosen, refusal
+from hpcdem.post.view.model import Layer, ModelView
+from hpcdem.post.view.moment import DISCS, LINES, Moment, Objects, unit_of
+
+STEPS = 256
+"""Colours of a field."""
+NOTHING = "#b8b8b8"
+"""Of objects without a value."""
+INK = {"contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": "#7a5195", "channels": "#2f7fb5"}
+"""Of lines without a field."""
+WIDTH = {"walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2}
+"""Of lines [points], at size 1."""
+MOST_ARROWS = 3000
+"""Of a picture: with more objects some are left out, every k-th is shown."""
+ARROW = 0.05
+"""Length of the longest, over the width of the picture."""
+CATEGORIES = (
+    "#4477aa",
+    "#ee6677",
+    "#228833",
+    "#ccbb44",
+    "#66ccee",
+    "#aa3377",
+    "#bbbbbb",
+    "#222255",
+    "#994f00",
+    "#44aa99",
+)
+"""Of groups: ten that the colour-blind tell apart (Tol 2021, with three more)."""
+CLASSES = 12
+"""Integer fields with names have a legend of at most so many."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The bar of colours of a field: values of its ends, and whether they are logarithms."""
+
+    title: str
+    low: float
+    high: float
+    log: bool
+    colours: str
+
+
+@dataclass
+class Painted:
+    """A layer ready to be drawn.
+
+    rows (m,): which of its objects these are; shape as in `Objects`, of these; shades (c, 3): colours as fractions,
+    kind (m,): the colour of each; width: of lines [points]; values (m,): of the field, None without; arrows: where
+    (k, 2), and how far (k, 2) [m]; legend: (word, colour) of classes; scale: of the field."""
+
+    layer: Layer
+    kind_of_shape: str
+    rows: np.ndarray
+    shape: tuple[np.ndarray, ...]
+    shades: np.ndarray
+    kind: np.ndarray
+    width: float
+    values: np.ndarray | None = None
+    arrows: tuple[np.ndarray, np.ndarray] | None = None
+    legend: list[tuple[str, str]] = field(default_factory=list)
+    scale: Scale | None = None
+
+
+@dataclass
+class Scene:
+    """All of a picture. seen: the part of the plane."""
+
+    moment: Moment
+    view: ModelView
+    seen: View
+    layers: list[Painted]
+
+    def title(self) -> str:
+        """Over the picture."""
+        return self.view.title.replace("{step}", str(self.moment.step)).replace("{time}", f"{self.moment.time:.6g}")
+
+
+def default_view(moment: Moment) -> ModelView:
+    """Everything that the frame has, as it is usually shown; contacts and bonds are there, and hidden."""
+    hidden = ("contacts", "bonds")
+    return ModelView(
+        layers=tuple(Layer(object=name, visible=name not in hidden) for name in OBJECTS if name in moment.objects)
+    )
+
+
+def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
+    """The view with objects coloured by a field; on: which, else the first that have it. looks: further values of that
+    layer. HpcdemError that names the fields there are."""
+    having = [
+        layer for layer in view.layers
+        if layer.object in moment.objects and moment.of(layer.object).has(name)
+    ]  # fmt: skip
+    # In a file a column of joints stands for elements too, empty; one that is empty everywhere has no value yet.
+    filled = [layer for layer in having if moment.of(layer.object).filled(name)] or having
+    for layer in filled:
+        if on in (None, layer.object):
+            return view.with_layer(layer.label, field=name, visible=True, **looks)
+    if on is not None:
+        objects = moment.of(on)
+        if not any(layer.object == on for layer in view.layers):
+            raise HpcdemError(f"the view shows no {on}")
+        raise objects.lack(name, on)
+    known = "; ".join(f"{kind}: {', '.join(objects.known())}" for kind, objects in moment.objects.items())
+    raise HpcdemError(f"this frame has no field {name}; it has {known or 'nothing'}")
+
+
+def adjusted(
+    view: ModelView, moment: Moment, name: str | None, on: str | None, looks: Mapping[str, Any], **more: Any
+) -> ModelView:
+    """The view with objects coloured by a field (`with_field`), or without a field with other looks of one kind of
+    object; more: values of the view. HpcdemError for what the frame or the view does not have."""
+    if name is not None:
+        view = with_field(view, moment, name, on, **looks)
+    elif on is not None:
+        moment.of(on)
+        labels = [layer.label for layer in view.layers if layer.object == on]
+        if not labels:
+            raise HpcdemError(f"the view shows no {on}")
+        for label in labels:
+            view = view.with_layer(label, visible=True, **looks)
+    elif looks:
+        word = "range" if "limits" in looks else next(iter(looks))
+        raise UsageError(f"{word} goes with field or object, which say of what")
+    return view.changed(**more) if more else view
+
+
+def seen_of(moment: Moment, view: ModelView) -> View:
+    """The part of the plane: that of the view, else all that is there, with some air."""
+    if view.camera is not None:
+        return View(*view.camera)
+    left, right, bottom, top = moment.extent()
+    air = 0.03 * max(right - left, top - bottom, 1e-12)
+    return View(left - air, right + air, bottom - air, top + air)
+
+
+def scene(
+    moment: Moment, view: ModelView, seen: View | None = None, only: Mapping[str, np.ndarray] | None = None
+) -> Scene:
+    """Put a view of a frame together. only: numbers of the objects that may be shown, by kind. HpcdemError for what the
+    frame does not have."""
+    seen = seen_of(moment, view) if seen is None else seen
+    shifted = shift_of(moment, view.deformed)
+    layers = [
+        painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object))
+        for layer in view.layers if layer.visible
+    ]  # fmt: skip
+    return Scene(moment, view, seen, layers)
+
+
+def shift_of(moment: Moment, factor: float) -> np.ndarray | None:
+    """(k, 2) [m] by which the points of elements are moved for the picture."""
+    if factor == 1.0:
+        return None
+    if moment.displacement is None:
+        raise HpcdemError("deformed: this frame has no displacements")
+    return (factor - 1.0) * moment.displacement()
+
+
+def chosen_rows(moment: Moment, layer: Layer, only: np.ndarray | None = None) -> np.ndarray:
+    """The rows of the objects that a layer shows: by its filter, and by their numbers."""
+    objects = moment.of(layer.object)
+    mask = np.ones(objects.count, bool)
+    if layer.filter.strip():
+        mask &= chosen(layer.filter, objects.count, _Words(objects), lambda g, s: _members(objects, layer, g, s))
+    if only is not None:
+        if objects.number not in objects.fields:
+            raise HpcdemError(f"range: {layer.object} have no numbers by which they could be chosen")
+        mask &= np.isin(objects.fields[objects.number], only)
+    return np.flatnonzero(mask)
+
+
+class _Words(Mapping[str, np.ndarray]):
+    """What a filter can name: fields, lengths of vectors, and the place of an object."""
+
+    def __init__(self, objects: Objects) -> None:
+        self.objects = objects
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        objects = self.objects
+        if name in objects.fields:
+            return np.asarray(objects.fields[name])
+        if name in ("x", "y"):
+            return objects.centres()[:, "xy".index(name)]
+        stem, _, part = name.rpartition("_")
+        if part in ("x", "y") and stem in objects.vectors:
+            return objects.vectors[stem][:, "xy".index(part)]
+        if name in objects.vectors:
+            return np.hypot(*objects.vectors[name].T)
+        raise KeyError(name)
+
+    def __iter__(self) -> Any:
+        return iter(dict.fromkeys(["x", "y", *self.objects.known()]))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+def _members(objects: Objects, layer: Layer, group: str, set_name: str) -> np.ndarray:
+    sets = {k.removeprefix("group_"): k for k in objects.names}
+    if set_name and set_name not in sets:
+        raise refusal(layer.filter, f"there is no set {set_name}; there is {', '.join(sets) or 'none'}")
+    found = np.zeros(objects.count, bool)
+    named = False
+    for short, column in sets.items():
+        if set_name in ("", short) and group in objects.names[column]:
+            named = True
+            found |= np.asarray(objects.fields[column]) == objects.names[column].index(group)
+    if not named:
+        known = sorted({name for names in objects.names.values() for name in names})
+        raise refusal(layer.filter, f"there is no group {group}; there is {', '.join(known) or 'none'}")
+    return found
+
+
+def painted(
+    moment: Moment, layer: Layer, seen: View, shifted: np.ndarray | None = None, only: np.ndarray | None = None
+) -> Painted:
+    """One layer of a picture."""
+    objects = moment.of(layer.object)
+    rows = chosen_rows(moment, layer, only)
+    result = Painted(
+        layer,
+        objects.kind,
+        rows,
+        (),
+        np.zeros((0, 3)),
+        np.zeros(0, np.int64),
+        WIDTH.get(layer.object, 1.0) * layer.size,
+    )
+    if layer.field:
+        _by_field(result, objects)
+    elif layer.colour:
+        _one_colour(result, layer.colour)
+    else:
+        _as_usual(result, objects)
+    rows = result.rows
+    if layer.vectors:
+        result.arrows = _arrows(objects, layer, rows, seen)
+    whole = objects.read()
+    if objects.kind == DISCS:
+        result.shape = whole[0][rows], layer.size * whole[1][rows]
+    elif objects.kind == LINES:
+        result.shape = (whole[0][rows],)
+    else:
+        points = whole[0] if shifted is None else whole[0] + shifted
+        result.shape = points, whole[1] if len(rows) == len(whole[1]) else whole[1][rows]
+    return result
+
+
+def spans(moment: Moment, view: ModelView) -> dict[str, tuple[float, float]]:
+    """Least and greatest value of the field of each layer that has one and no limits: many frames share these."""
+    found = {}
+    for layer in view.layers:
+        if layer.visible and layer.field and layer.limits is None and layer.object in moment.objects:
+            objects = moment.of(layer.object)
+            if not objects.names.get(layer.field):
+                values = objects.values(layer.field, layer.object)[chosen_rows(moment, layer)]
+                found[layer.label] = _span(values.astype(float), layer)
+    return found
+
+
+def common_spans(moments: Iterable[Moment], view: ModelView) -> dict[str, tuple[float, float]]:
+    """The same of many frames; what is one value everywhere is left out."""
+    found: dict[str, tuple[float, float]] = {}
+    for moment in moments:
+        for label, (low, high) in spans(moment, view).items():
+            before = found.get(label, (low, high))
+            found[label] = min(low, before[0]), max(high, before[1])
+    return {label: span for label, span in found.items() if span[0] < span[1]}
+
+
+def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
+    """Least and greatest value, of those above 0 where colours go by logarithms; (inf, -inf) without any."""
+    fit = values[np.isfinite(values) & ((values > 0.0) | (not layer.log))]
+    return (float(fit.min()), float(fit.max())) if len(fit) else (np.inf, -np.inf)
+
+
+def _by_field(result: Painted, objects: Objects) -> None:
+    layer = result.layer
+    values = np.asarray(objects.values(layer.field, layer.object))[result.rows]
+    names = objects.names.get(layer.field)
+    if names and layer.limits is None:
+        _by_name(result, values, names)
+        return
+    values = values.astype(float)
+    low, high = layer.limits or _span(values, layer)
+    if layer.log and not low < np.inf and len(values):
+        raise HpcdemError(f"log: no value of {layer.field} is above 0")
+    if not low <= high:
+        low, high = 0.0, 1.0
+    result.scale = Scale(_title(layer), low, high, layer.log, layer.colours)
+    result.values = values
+    with np.errstate(invalid="ignore", divide="ignore"):
+        place, ends = (np.log10(values), np.log10((low, high))) if layer.log else (values, np.array((low, high)))
+        part = (place - ends[0]) / max(float(ends[1] - ends[0]), 1e-300)
+        step = np.clip(np.nan_to_num(part, nan=0.0, posinf=1.0, neginf=0.0) * STEPS, 0, STEPS - 1).astype(np.int64)
+    result.kind = np.where(np.isfinite(place) | (np.isposinf(values)), step, STEPS)
+    if layer.log:
+        result.kind = np.where(values > 0.0, result.kind, STEPS)
+    result.shades = np.concatenate([shades_of(layer.colours), rgb([NOTHING])])
+
+
+def _title(layer: Layer) -> str:
+    unit = unit_of(layer.field)
+    words = layer.field.replace("_", " ")
+    return f"{words} ({unit})" if unit else words
+
+
+def _by_name(result: Painted, values: np.ndarray, names: Sequence[str]) -> None:
+    """Colours of groups."""
+    there = [int(v) for v in np.unique(values) if 0 <= v < len(names)]
+    result.shades = rgb([*CATEGORIES, NOTHING])
+    result.kind = np.where((values >= 0) & (values < len(names)), values % len(CATEGORIES), len(CATEGORIES))
+    result.values = values.astype(float)
+    result.legend = [(names[v], CATEGORIES[v % len(CATEGORIES)]) for v in there[:CLASSES]]
+    if len(there) > CLASSES:
+        result.legend.append((f"and {len(there) - CLASSES} more", NOTHING))
+
+
+def _one_colour(result: Painted, colour: str) -> None:
+    result.shades, result.kind = rgb([colour]), np.zeros(len(result.rows), np.int64)
+
+
+def _as_usual(result: Painted, objects: Objects) -> None:
+    """Particles and walls in the manual's colours, elements by their group, joints by the way they broke."""
+    name, rows = result.layer.object, result.rows
+    if name in ("particles", "walls") and "color" in objects.fields:
+        result.shades, result.kind = colours.RGB, colours.numbers(objects.fields["color"])[rows]
+    elif name == "elements":
+        sets = {column: np.asarray(objects.fields[column]) for column in objects.names}
+        best = max(sets, key=lambda column: len(np.unique(sets[column])), default=None)
+        result.shades = rgb(blocks.GROUPS)
+        group = np.zeros(objects.count, np.int64) if best is None else np.unique(sets[best], return_inverse=True)[1]
+        result.kind = group[rows] % len(blocks.GROUPS)
+    elif name == "joints":
+        kinds = blocks._kinds(np.asarray(objects.fields["state"])[rows], np.asarray(objects.fields["mode"])[rows])
+        shown = [part for part, *_ in kinds]
+        result.rows = rows[np.concatenate([*shown, np.zeros(0, np.int64)])]
+        result.kind = np.repeat(np.arange(len(kinds)), [len(part) for part in shown])
+        result.shades = rgb([shade for _, shade, _, _ in kinds])
+        result.legend = [(word, shade) for _, shade, _, word in reversed(kinds)]
+    else:
+        _one_colour(result, INK.get(name, "#202020"))
+
+
+def _arrows(objects: Objects, layer: Layer, rows: np.ndarray, seen: View) -> tuple[np.ndarray, np.ndarray]:
+    if layer.vectors not in objects.vectors:
+        known = ", ".join(objects.vectors) or "none"
+        raise HpcdemError(f"{layer.object} have no vectors {layer.vectors} in this frame; there is {known}")
+    at = objects.centres()[rows]
+    inside = (at[:, 0] >= seen.left) & (at[:, 0] <= seen.right) & (at[:, 1] >= seen.bottom) & (at[:, 1] <= seen.top)
+    some = np.flatnonzero(inside)
+    some = some[:: max(1, -(-len(some) // MOST_ARROWS))]
+    far = np.asarray(objects.vectors[layer.vectors], float)[rows][some]
+    length = np.hypot(*far.T)
+    longest = float(np.max(length, initial=0.0, where=np.isfinite(length)))
+    shown = np.isfinite(length) & (length > 1e-3 * longest)
+    return at[some][shown], far[shown] * (layer.arrows * ARROW * seen.width / max(longest, 1e-300))
+
+
+def rgb(words: Sequence[str]) -> np.ndarray:
+    """(n, 3) fractions of red, green and blue of "#rrggbb"."""
+    return np.array([[int(word[k : k + 2], 16) / 255.0 for k in (1, 3, 5)] for word in words]).reshape(-1, 3)
+
+
+def shades_of(name: str) -> np.ndarray:
+    """(STEPS, 3) colours of a field."""
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps[COLOURS[name]](np.linspace(0.0, 1.0, STEPS)))[:, :3]

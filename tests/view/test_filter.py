@@ -1,0 +1,64 @@
+"""Filters: what they choose, and that nothing in them is executed."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.post.view.filter import chosen
+
+X = np.array([-2.0, -1.0, 0.0, 1.0, np.nan])
+Y = np.array([1.0, 5.0, 3.0, 4.0, 2.0])
+FIELDS = {"x": X, "y": Y, "state": np.array([0, 1, 2, 3, 3])}
+
+
+def groups(name: str, of: str) -> np.ndarray:
+    if name != "roof" or of not in ("", "rock"):
+        raise HpcdemError(f"no group {name} {of}")
+    return np.array([True, True, False, False, False])
+
+
+@pytest.mark.parametrize(
+    ("text", "rows"),
+    [
+        ("x < 0", [0, 1]), ("x >= 0 and y > 3", [3]), ("x < 0 or y == 3", [0, 1, 2]), ("not x < 0", [2, 3, 4]),
+        ("-1 <= x <= 0", [1, 2]), ("x * x - 1 > 0.5", [0]), ("x / 2 + y != 4.5", [0, 2, 4]),
+        ("abs(x) > 1.5", [0]), ("sqrt(y) >= 2", [1, 3]), ("hypot(x, y) < 3.1", [0, 2]), ("isnan(x)", [4]),
+        ("min(x, y) == x", [0, 1, 2, 3]), ("max(x, 3) < y", [1, 3]), ("log10(y) <= 0", [0]), ("state == 3", [3, 4]),
+        ("group(roof)", [0, 1]), ("group(roof, rock) and x > -2", [1]), ("1 < 2", [0, 1, 2, 3, 4]), ("2 < 1", []),
+    ],
+)  # fmt: skip
+def test_what_is_chosen(text, rows):
+    assert np.flatnonzero(chosen(text, 5, FIELDS, groups)).tolist() == rows
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os').system('touch /tmp/x')", "().__class__", "x.__class__", "open('/etc/passwd')", "'a' < 'b'",
+        "9**9**9 > x", "x << 3 > 1", "[x for x in (1,)]", "(lambda: x)() > 0", "x[0] > 1", "f'{x}' > 1",
+        "x if x else y",
+        "exec('1') > 0", "globals() > x", "(y := 3) > x", "x > 1; y", "import os", "1e400 < x", f"{'9' * 399} < x",
+        "(" * 150 + "x" + ")" * 150, "x > 1" + " or x > 1" * 100, "-" * 200 + "x > 0", "not " * 60 + "x > 0",
+        "abs(" * 60 + "x" + ")" * 60 + " > 1", "", "x", "x + 1", "(x > 1) + 1 > 0", "x and y", "True", "x > True",
+        "nix > 1", "abs(x, y) > 1", "sin(x) > 0", "abs(x=1) > 0", "group('roof')", "group(floor)", "group()",
+        "x is y", "x in y", "~x > 0", "x // 2 > 1", "x > 1j", "x > ...", "x > None", "*x > 1", "x\x00 > 1",
+    ],
+)  # fmt: skip
+def test_what_is_no_filter_is_refused_at_once(text):
+    began = time.perf_counter()
+    with pytest.raises(HpcdemError):
+        chosen(text, 5, FIELDS, groups)
+    assert time.perf_counter() - began < 1.0
+
+
+def test_what_is_said():
+    with pytest.raises(HpcdemError, match=r"filter 'nix > 1': there is no field nix; there is x, y, state"):
+        chosen("nix > 1", 5, FIELDS, groups)
+    with pytest.raises(HpcdemError, match=r"'x.real' is nothing that a filter can be made of"):
+        chosen("x.real > 1", 5, FIELDS, groups)
+    with pytest.raises(HpcdemError, match="expected a comparison"):
+        chosen("x + 1", 5, FIELDS, groups)
