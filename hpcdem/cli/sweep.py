@@ -55,7 +55,7 @@ class Setting(click.ParamType):
     epilog="VALUES: 0.2,0.3 (these), 1:10 (whole numbers), 0.1:0.5:5 (five at equal distance); with --latin or --sobol "
     "0.1:0.5 and 1e5:1e8:log are ranges that are sampled. A parameter is a line such as friction = 0.3 at the top "
     "level of the script (in ZDEM used as {friction}). The same words again go on with what is not done. More in "
-    "docs/sweeps.md; `hpcdem sweep report --help`.",
+    "docs/sweep.md; `hpcdem sweep report --help`.",
 )  # fmt: skip
 @click.argument("script", type=PATH, metavar="SCRIPT|SETTINGS.toml|DIR")
 @click.option("--set", "values", type=Setting(), multiple=True, metavar="NAME=VALUES", help="Values of a parameter of "

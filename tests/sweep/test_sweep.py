@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import os
 import shutil
@@ -268,11 +269,11 @@ def test_members_of_several_ranks_have_the_same_bits(fallen, tmp_path):
 
 def test_jobs_limit_how_many_run(tmp_path):
     """Programs that note when they began and ended: with one at once they do not overlap."""
-    text = "import time\nn = 0\nbegan = time.time()\ntime.sleep(0.3 + 0 * n)\nopen('when', 'w').write(f'{began} {time.time()}')\n"
-    (tmp_path / "wait.py").write_text(text)
+    note = "open('when', 'w').write(f'{began} {time.time()}')\n"
+    (tmp_path / "wait.py").write_text(f"import time\nn = 0\nbegan = time.time()\ntime.sleep(0.3 + 0 * n)\n{note}")
     call("wait.py", "--set", "n=1:3", "--jobs", "1", cwd=tmp_path)
     spans = sorted(tuple(map(float, path.read_text().split())) for path in tmp_path.glob("wait_sweep/*/when"))
-    assert len(spans) == 3 and all(a[1] <= b[0] for a, b in zip(spans, spans[1:]))
+    assert len(spans) == 3 and all(a[1] <= b[0] for a, b in itertools.pairwise(spans))
 
 
 # --- refused before anything runs ----------------------------------------------------------------------------------
