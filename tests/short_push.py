@@ -39,6 +39,13 @@ def write_push(folder: Path, steps: int) -> Path:
     return script
 
 
+def parametrised_push(steps: int) -> str:
+    """The same for sweeps, with the parameters `friction` and `seed`, four frames and eight checkpoints."""
+    text = SHORT_PUSH.format(steps=steps).replace("fric 0.3", "fric {friction}")
+    text = text.replace("START\n", "friction = 0.3\nSTART\nSET seed 1\n")
+    return text.replace(f"SET print {steps} vtk {steps} save {steps}", f"SET print {steps // 4} save {steps // 8}")
+
+
 def contents(path: Path) -> dict[str, np.ndarray]:
     """All datasets and attributes of an HDF5 file by their path."""
     found: dict[str, np.ndarray] = {}

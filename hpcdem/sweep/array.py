@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 import subprocess
@@ -78,7 +79,9 @@ def submit(path: Path) -> str:
     program = shutil.which("sbatch")
     if program is None:
         raise UsageError(f"--slurm: there is no sbatch here; {path} is written, submit it where there is")
-    done = subprocess.run([program, "--parsable", str(path)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [program, "--parsable", str(path)], env=dict(os.environ), capture_output=True, text=True, check=False
+    )  # the environment as it was: Open MPI, once loaded here, has put words into it that confuse its ranks there
     if done.returncode:
         raise HpcdemError(f"sbatch {path}: {done.stderr.strip()}")
     return done.stdout.strip().split(";")[0]

@@ -110,9 +110,11 @@ class _Driver:
                 continue
             self.left[member.name] -= 1
             words = [sys.executable, "-m", "hpcdem", "sweep", str(self.plan.folder), "--member", member.name]
+            # dict(os.environ): without what an MPI that was loaded here has put into it.
             self.mine[member.name] = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
-            )
+                words, env=dict(os.environ), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                start_new_session=True,
+            )  # fmt: skip
 
     def _ended(self, member: Member, state: str) -> None:
         """A member of ours, or of an earlier call, is no longer running."""

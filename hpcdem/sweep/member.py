@@ -20,10 +20,11 @@ from hpcdem.io.lock import FolderLock, Taken
 from hpcdem.sweep.plan import DONE, FAILED, LOG, STATE, STOPPED, Member, Plan, read_json, write_json
 
 
-def launcher(ranks: int) -> list[str]:
-    """The words that start so many ranks: srun in a job of Slurm, else the mpiexec beside this Python, or in PATH."""
+def launcher(ranks: int, threads: int) -> list[str]:
+    """The words that start so many ranks: srun in a job of Slurm (on cores of their own, so that several members run
+    side by side), else the mpiexec beside this Python, or in PATH."""
     if "SLURM_JOB_ID" in os.environ:
-        return ["srun", "-n", str(ranks)]
+        return ["srun", "--exact", "-n", str(ranks), "-c", str(threads)]
     if ranks == 1:
         return []
     beside = Path(sys.executable).parent / "mpiexec"
@@ -35,17 +36,30 @@ def launcher(ranks: int) -> list[str]:
 
 def command(plan: Plan, again: bool) -> list[str]:
     """What is started in the folder of a member. again: it was started before, and goes on where it can."""
-    words = [*launcher(plan.ranks), sys.executable, "-m", "hpcdem", "-j", str(plan.threads), "--no-figure"]
-    return [*words, *(["--resume"] if again and plan.kind != "python" else []), plan.script]
+    words = [sys.executable, "-m", "hpcdem", "-j", str(plan.threads), "--no-figure"]
+    return [
+        *launcher(plan.ranks, plan.threads),
+        *words,
+        *(["--resume"] if again and plan.kind != "python" else []),
+        plan.script,
+    ]
+
+
+def _locked(plan: Plan, member: Member) -> FolderLock:
+    """The lock of its folder. UsageError if it runs already. Whoever only looks holds the lock for a moment: so once
+    more after that."""
+    for _ in range(3):
+        try:
+            return FolderLock(member.folder, {"host": socket.gethostname(), "pid": os.getpid()})
+        except Taken:
+            time.sleep(0.1)
+    raise UsageError(f"member {member.name} of {plan.folder} runs already")
 
 
 def run(plan: Plan, member: Member) -> int:
     """Carry it out; returns the exit code of the run. UsageError if it runs already. A signal to this process that
     ends programs makes the run save and stop."""
-    try:
-        lock = FolderLock(member.folder, {"host": socket.gethostname(), "pid": os.getpid()})
-    except Taken:
-        raise UsageError(f"member {member.name} of {plan.folder} runs already") from None
+    lock = _locked(plan, member)
     before = read_json(member.folder / STATE, {"state": "", "tries": 0, "seconds": 0.0})
     if before["state"] == DONE:
         lock.release()

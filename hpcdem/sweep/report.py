@@ -9,7 +9,9 @@ from typing import Any
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import on_first
+from hpcdem.io.frames import list_frames, list_mesh_frames
 from hpcdem.io.run_record import RECORD
+from hpcdem.post.measure import emission
 from hpcdem.post.measure import figures as pages
 from hpcdem.post.measure import report as measures
 from hpcdem.post.measure.scene import Request
@@ -46,7 +48,10 @@ def run(comm: Any, log: Any, plan: Plan, request: Request, kinds: Sequence[str] 
         target = member.folder / "measure"
         one = replace(request, folder=data, output=target, formats=())
         on_first(comm, lambda: _cleared(target))  # noqa: B023
-        measures.run(comm, _Quiet(log, member.name), one, without=tables.APART)
+        if request.what or on_first(comm, lambda: _frames_in(data)):  # noqa: B023
+            measures.run(comm, _Quiet(log, member.name), one, without=tables.APART)
+        else:
+            on_first(comm, lambda: log.warn(f"{member.name}: there are no frames to measure, only histories"))  # noqa: B023
         found.append(on_first(comm, lambda: tables.measured(target, data)))  # noqa: B023
     return on_first(comm, lambda: _written(log, plan, request, kinds, members, found))
 
@@ -66,6 +71,11 @@ def _cleared(folder: Path) -> None:
     """Tables of an earlier report are no part of this one."""
     for path in folder.glob("*.csv"):
         path.unlink()
+
+
+def _frames_in(data: Path) -> bool:
+    """Whether there is more to measure than histories."""
+    return bool(list_frames(data) or list_mesh_frames(data) or (data / emission.TABLE).is_file())
 
 
 def data_folder(member: Member) -> Path:

@@ -202,15 +202,15 @@ class Cluster:
         assert done.returncode == 0, done.stderr
         return int(done.stdout.split(";")[0])
 
-    def job(self, number: int) -> Job:
-        """How the job stands now."""
+    def job(self, number: int | str) -> Job:
+        """How the job stands now; of an array, N_K is one task."""
         text = self._ask("scontrol", "show", "job", str(number))
         found = {key: re.search(rf"\b{key}=(\w+)", text) for key in ("JobState", "ExitCode", "Restarts")}
         assert all(found.values()), f"job {number} is unknown: {text}"
         state, code, restarts = (match.group(1) for match in found.values() if match)
         return Job(state, int(code), int(restarts))
 
-    def wait(self, number: int, timeout: float = 300.0) -> Job:
+    def wait(self, number: int | str, timeout: float = 300.0) -> Job:
         """Until the job is over; it is cancelled, and the test fails, when that takes too long."""
         deadline = time.monotonic() + timeout
         while (job := self.job(number)).state not in OVER:
@@ -220,11 +220,11 @@ class Cluster:
             time.sleep(0.2)
         return job
 
-    def signal(self, number: int, name: str) -> None:
+    def signal(self, number: int | str, name: str) -> None:
         """Send a signal to all tasks of a job's steps (not to its batch script), as the queue itself would."""
         self._ask("scancel", f"--signal={name}", str(number))
 
-    def start_again(self, number: int) -> None:
+    def start_again(self, number: int | str) -> None:
         """Slurm lets a requeued job rest for two minutes; the tests wait only until the node has forgotten it."""
         deadline = time.monotonic() + 60
         while self.job(number).state != "PENDING" and time.monotonic() < deadline:

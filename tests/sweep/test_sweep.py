@@ -22,6 +22,7 @@ from hpcdem.io.lock import holder_of
 from hpcdem.sweep import driver
 from hpcdem.sweep.plan import DONE, RUNNING, read_json
 from tests.conftest import end, popen, run
+from tests.short_push import parametrised_push
 
 FALL = """\
 gravity = 9.8
@@ -150,14 +151,6 @@ def test_a_pcdc_script_from_a_file_of_settings(tmp_path):
 # --- killed, stopped, taken up again ------------------------------------------------------------------------------
 
 
-def push(steps: int) -> str:
-    from tests.short_push import SHORT_PUSH
-
-    text = SHORT_PUSH.format(steps=steps).replace("fric 0.3", "fric {friction}")
-    text = text.replace("START\n", "friction = 0.3\nSTART\nSET seed 1\n")
-    return text.replace(f"SET print {steps} vtk {steps} save {steps}", f"SET print {steps // 4} save {steps // 8}")
-
-
 def ranks_of(folder: Path) -> list[int]:
     """Processes that run the script of a member."""
     found = []
@@ -174,7 +167,7 @@ def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
     """One sweep runs through. Of the other a member is killed as it runs, then the driver, then all is taken up."""
     for name in ("quiet", "killed"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "push.py").write_text(push(steps))
+        (tmp_path / name / "push.py").write_text(parametrised_push(steps))
     words = ["push.py", "--seed", seeds, "--set", "friction=0.1,0.4"]
     call(*words, cwd=tmp_path / "quiet")
     folder = tmp_path / "killed" / "push_sweep"
@@ -218,7 +211,7 @@ def test_twenty_members_survive_kills(tmp_path):
 
 
 def test_a_driver_that_is_asked_to_stop_lets_members_save_and_goes_on(tmp_path):
-    (tmp_path / "push.py").write_text(push(40000))
+    (tmp_path / "push.py").write_text(parametrised_push(40000))
     words = ["push.py", "--set", "friction=0.1,0.4", "--jobs", "1"]
     first = popen([sys.executable, "-m", "hpcdem", "sweep", *words], cwd=tmp_path)
     wait_for(lambda: any((tmp_path / "push_sweep/0000/data").glob("*.sav")))
