@@ -78,6 +78,7 @@ def _name(report: Report, group: tuple[Value, ...], count: int) -> str:
 def bands(report: Report, columns: Sequence[Column]) -> Any:
     """A panel per measure: median, the middle half and nine tenths of the members, each member as a thin line."""
     figure, axes = page([HIGH] * len(columns))
+    alike: dict[str, list[Any]] = {}
     for panel, (ax, column) in enumerate(zip(axes, columns)):
         drawn = _groups(report, report.bands[column])
         size, unit = _unit(column[1], max(float(np.nanmax(np.abs(one.y), initial=0.0)) for _, one in drawn))
@@ -92,6 +93,11 @@ def bands(report: Report, columns: Sequence[Column]) -> Any:
         _frame(ax)
         if panel == 0:
             key(ax, 2 if len(drawn) > 2 else 1)
+        alike.setdefault(axis, []).append(ax)
+    for panels in alike.values():
+        limits = [ax.get_xlim() for ax in panels]
+        for ax in panels:
+            ax.set_xlim(min(low for low, _ in limits), max(high for _, high in limits))
     return figure
 
 

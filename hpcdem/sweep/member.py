@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_OK, UsageError
+from hpcdem.core.errors import EXIT_CHECKPOINT, EXIT_ERROR, EXIT_OK, UsageError
 from hpcdem.io.lock import FolderLock, Taken
 from hpcdem.sweep.plan import DONE, FAILED, LOG, STATE, STOPPED, Member, Plan, read_json, write_json
 
@@ -68,7 +68,8 @@ def run(plan: Plan, member: Member) -> int:
     tries, began = int(before["tries"]) + 1, time.monotonic()
     state = {"state": FAILED, "code": None, "tries": tries, "seconds": before["seconds"]}
     write_json(member.folder / STATE, state)  # what a killed run leaves: it counts as failed, and goes on when started
-    with open(member.folder / LOG, "a", encoding="utf-8") as log:
+    with open(member.folder / LOG, "ab") as log:
+        begin = log.tell()
         process = subprocess.Popen(
             command(plan, again), cwd=member.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
             pass_fds=lock.descriptors, start_new_session=True,
@@ -76,10 +77,13 @@ def run(plan: Plan, member: Member) -> int:
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
             # mpiexec of either MPI hands on SIGUSR1, which makes hpcdem save and stop.
             signal.signal(number, lambda *_: process.send_signal(signal.SIGUSR1))
-        code = process.wait()
+        code: int | None = process.wait()
+        said = os.fstat(log.fileno()).st_size > begin
+    if code == EXIT_OK and not said:
+        code = None  # a run names itself; srun has been seen to end with 0 without having started anything
     state["code"] = code
     state["state"] = DONE if code == EXIT_OK else STOPPED if code == EXIT_CHECKPOINT else FAILED
     state["seconds"] = round(state["seconds"] + time.monotonic() - began, 3)
     write_json(member.folder / STATE, state)
     lock.release()
-    return code
+    return EXIT_ERROR if code is None else code

@@ -48,7 +48,8 @@ def run(comm: Any, log: Any, plan: Plan, request: Request, kinds: Sequence[str] 
         target = member.folder / "measure"
         one = replace(request, folder=data, output=target, formats=())
         on_first(comm, lambda: _cleared(target))  # noqa: B023
-        if request.what or on_first(comm, lambda: _frames_in(data)):  # noqa: B023
+        frames = on_first(comm, lambda: _frames_in(data))  # noqa: B023
+        if request.what or frames:
             measures.run(comm, _Quiet(log, member.name), one, without=tables.APART)
         else:
             on_first(comm, lambda: log.warn(f"{member.name}: there are no frames to measure, only histories"))  # noqa: B023

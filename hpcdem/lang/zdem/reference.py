@@ -24,6 +24,9 @@ This page is made from the table in `hpcdem/lang/zdem/table.py`; do not edit it
   Keywords may be shortened to two letters or more, as long as no other of the command begins so. A longer word that is
   none, but has the first three letters of just one keyword (`gravtiy`), is taken for that, with a warning.
 - The first command is START, RESTORE or LOAD. What follows STOP is not read.
+- `friction = 0.3` on a line of its own makes a parameter, which is used as `{friction}` where a number stands on later
+  lines ([Sweeps](sweep.md)); ZDEM itself does not know them. Names that stand for a command are none. A parameter that
+  nothing uses is an error.
 - The whole script is read before anything runs. The first wrong line is reported with its number, and nothing is done.
 - Units are SI. File names are relative to the folder of the script.
 """
