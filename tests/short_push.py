@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import h5py
@@ -44,6 +45,19 @@ def parametrised_push(steps: int) -> str:
     text = SHORT_PUSH.format(steps=steps).replace("fric 0.3", "fric {friction}")
     text = text.replace("START\n", "friction = 0.3\nSTART\nSET seed 1\n")
     return text.replace(f"SET print {steps} vtk {steps} save {steps}", f"SET print {steps // 4} save {steps // 8}")
+
+
+def ranks_of(folder: Path) -> list[int]:
+    """Processes that run push.py in a folder; no launchers."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (place / "cmdline").read_bytes().split(b"\0")
+            if os.path.samefile(place / "cwd", folder) and b"push.py" in words and b"srun" not in words:
+                found.append(int(place.name))
+        except OSError:
+            continue
+    return found
 
 
 def contents(path: Path) -> dict[str, np.ndarray]:

@@ -137,9 +137,14 @@ def load(folder: Path) -> Plan:
     if given is None:
         raise UsageError(f"{folder}: no sweep, there is no {RECORD}")
     try:
-        return Plan(folder=folder, **given)
+        plan = Plan(folder=folder, **given)
+        whole = all(isinstance(number, int) and number > 0 for number in (plan.ranks, plan.threads))
+        whole = whole and Path(plan.script).name == plan.script and not plan.script.startswith("-")  # it is started
     except TypeError:
-        raise HpcdemError(f"{folder / RECORD} is of another version of hpcdem, or damaged") from None
+        whole = False
+    if not whole:
+        raise HpcdemError(f"{folder / RECORD} is of another version of hpcdem, or damaged")
+    return plan
 
 
 def read_json(path: Path, absent: Any) -> Any:

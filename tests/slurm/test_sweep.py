@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,7 +13,7 @@ import pytest
 
 import hpcdem
 from hpcdem.sweep.plan import DONE, FAILED, STOPPED
-from tests.short_push import parametrised_push
+from tests.short_push import parametrised_push, ranks_of
 from tests.slurm.cluster import Cluster
 
 pytestmark = pytest.mark.slurm
@@ -28,6 +30,7 @@ def sweep(slurm: Cluster, folder: Path, *words: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_an_array_that_is_killed_and_put_back_has_the_report_of_a_sweep_on_this_machine(
     slurm: Cluster, wait_until: Callable[..., None], tmp_path: Path
 ) -> None:
@@ -47,7 +50,8 @@ def test_an_array_that_is_killed_and_put_back_has_the_report_of_a_sweep_on_this_
         return any((members[k].folder / "data").glob("*.sav"))
 
     wait_until(lambda: saved(0) and saved(1), 240, "two tasks to write checkpoints")
-    slurm.signal(f"{number}_0", "KILL")  # its ranks: the member has failed
+    for rank in ranks_of(members[0].folder):
+        os.kill(rank, signal.SIGKILL)
     slurm.signal(f"{number}_1", "USR1")  # as when time is nearly up: it saves and goes back into the queue
     wait_until(lambda: members[0].state == FAILED, 60, "the member to end")
     wait_until(lambda: members[1].state == STOPPED, 60, "the member to stop")

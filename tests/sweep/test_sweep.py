@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 import hpcdem
-from hpcdem.core.errors import UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.lock import holder_of
 from hpcdem.sweep import driver
 from hpcdem.sweep.plan import DONE, RUNNING, read_json
 from tests.conftest import end, popen, run
-from tests.short_push import parametrised_push
+from tests.short_push import parametrised_push, ranks_of
 
 FALL = """\
 gravity = 9.8
@@ -149,18 +149,6 @@ def test_a_pcdc_script_from_a_file_of_settings(tmp_path):
 
 
 # --- killed, stopped, taken up again ------------------------------------------------------------------------------
-
-
-def ranks_of(folder: Path) -> list[int]:
-    """Processes that run the script of a member."""
-    found = []
-    for place in Path("/proc").glob("[0-9]*"):
-        try:
-            if os.path.samefile(place / "cwd", folder) and b"push.py" in (place / "cmdline").read_bytes():
-                found.append(int(place.name))
-        except OSError:
-            continue
-    return found
 
 
 def undisturbed_and_killed(tmp_path: Path, seeds: str, steps: int) -> None:
@@ -328,6 +316,19 @@ def test_a_folder_that_holds_another_sweep_is_refused(tmp_path):
     (tmp_path / "full" / "thesis.txt").touch()
     with pytest.raises(UsageError, match="not empty"):
         hpcdem.Sweep(script, seed="1:2", folder=tmp_path / "full")
+
+
+@pytest.mark.parametrize(
+    "change", ['"script": "../fall.py"', '"script": "-c"', '"ranks": "1"', '"ranks": 0', '"more": 1']
+)
+def test_a_damaged_record_is_refused(tmp_path, change):
+    (tmp_path / "fall.py").write_text(FALL)
+    record = hpcdem.Sweep(tmp_path / "fall.py", seed="1:2").folder / "sweep.json"
+    name = change.split(":")[0]
+    lines = [line for line in record.read_text().splitlines() if not line.strip().startswith(name)]
+    record.write_text("\n".join(["{", f" {change},", *lines[1:]]))
+    with pytest.raises(HpcdemError, match="damaged"):
+        hpcdem.Sweep.open(record.parent)
 
 
 def test_files_that_the_script_reads_are_found_in_each_member(tmp_path):
