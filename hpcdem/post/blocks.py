@@ -17,13 +17,12 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import View
+from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post import bolts, fluid, liners
 
 CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
 PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
-CM = 1.0 / 2.54
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
 """States of joints, as frames have them; free: cracks that were there from the beginning."""

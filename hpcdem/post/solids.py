@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hpcdem.io.axes import CM
 from hpcdem.physics.fdem import tetrahedra
-from hpcdem.post.plots import CM
 
 if TYPE_CHECKING:
     from hpcdem.io.vtkhdf_mesh import MeshState

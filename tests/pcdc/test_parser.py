@@ -203,6 +203,7 @@ REFUSED = [
     ("node group 'a' range colour 3", "read 'colour' after 'node group range', expected one of group, set, id, x, y"),
     ("node group 'a' range x 1", "the line ends where a number for 'x' is expected"),
     ("node group 'a' range id 1.5", "read '1.5', expected a whole number, not negative for 'id'"),
+    ("mesh create from-layer 'a' size 1 region 'b' hole 'c' size 2", "'size' is given twice"),
     ("node group 'a' range z 1 2", "'z' is for three dimensions; model new dim 3 makes a model of three"),
     ("geometry create sphere (0,0) 1 as-layer 's'", "'geometry create sphere' is for three dimensions"),
     ("model gravity (0,0,-9.81)", "read '(0,0,-9.81)', expected a vector (x,y) for 'gravity'"),
@@ -274,3 +275,10 @@ def test_lines_are_read_for_the_model_above_them():
         source.read("pcdc model new dim 3\npcdc model gravity (0,-1)\n")
     with pytest.raises(ScriptError, match=r"script:3: .*expected a vector \(x,y\)"):
         source.read("pcdc model new dim 3\npcdc model new\npcdc model gravity (0,0,-1)\n")
+
+
+def test_keywords_of_a_keyword_come_once_the_second_is_the_command_s() -> None:
+    text = "pcdc mesh create from-layer 'a' size 2 region 'b' group 'c' group 'd' set 'e' refine-layer 'f' size 1\n"
+    arguments = source.read(text).statements[0].arguments
+    assert arguments["region"] == [{"value": "b", "group": "c"}] and arguments["group"] == {"value": "d", "set": "e"}
+    assert arguments["size"] == 2.0 and arguments["refine-layer"] == [{"value": "f", "size": 1.0}]

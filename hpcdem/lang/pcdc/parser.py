@@ -51,6 +51,8 @@ class _Line:
         self.expressions = kinds.Expressions()
         self.context = "pcdc"
         self.wanted: Sequence[Any] = ()
+        self.rows: Sequence[Option] = ()
+        """Keywords of the command."""
 
     # ---- words
 
@@ -174,7 +176,7 @@ class _Line:
         self, command: Command, options: Sequence[Option], arguments: dict[str, Any]
     ) -> tuple[tuple[str, Any], ...] | None:
         """Keywords in any order, then RANGE."""
-        rows = [*options, RANGE] if command.ranged else options
+        rows = self.rows = [*options, RANGE] if command.ranged else options
         while (token := self.peek()) is not None:
             option = self.take(rows)
             if option is RANGE:
@@ -212,7 +214,8 @@ class _Line:
     # ---- values
 
     def values(self, option: Option) -> Any:
-        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow."""
+        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow, each
+        once: the second is one of the command."""
         self.refuse_elsewhere(option.keyword, option.dims)
         read = []
         for kind in option.values:
@@ -228,6 +231,9 @@ class _Line:
         outer, self.context = self.context, f"{self.context} {option.keyword}"
         while (inner := self.take(option.more)) is not None:
             if inner.name in given:
+                if any(row.keyword == inner.keyword for row in self.rows):
+                    self.at -= 1
+                    break
                 raise ValueError(f"'{inner.keyword}' is given twice after '{option.keyword}'")
             given[inner.name] = self.values(inner)
         self.require(option.more, given)

@@ -143,7 +143,8 @@ LOOKS = ("limits", "log", "colours", "opacity", "edges", "size", "vectors", "arr
 
 
 def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if terms is not None and arguments.get("object") not in SHOWN:
+    shown = arguments.get("object")
+    if terms is not None and shown not in SHOWN and not isinstance(shown, Pending):
         raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
     if "field" not in arguments and "object" not in arguments:
         for word in LOOKS:

@@ -21,7 +21,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.pre.mesh import optional
 from hpcdem.pre.mesh.sizes import GROWTH, not_too_many
-from hpcdem.pre.mesh.solids import Box, Cylinder, Solid, Sphere, restored, state
+from hpcdem.pre.mesh.solids import Box, Solid, Sphere, restored, state
 
 HXT = 10
 """Number of the algorithm."""
@@ -90,33 +90,17 @@ def _solid(occ: Any, one: Solid, middle: np.ndarray, unit: float) -> tuple[int, 
 
 
 def _refined(gmsh: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -> None:
-    fields = []
-    for of, size, distance in said["refine"]:
-        for one in restored(of):
-            name = {Box: "Box", Sphere: "Ball", Cylinder: "Cylinder"}[type(one)]
-            tag = gmsh.model.mesh.field.add(name)
-            values: dict[str, float] = {"VIn": size / unit, "VOut": said["size"] / unit}
-            if isinstance(one, Box):
-                for key, bound in zip(("Min", "Max"), (one.bounds() - middle) / unit):
-                    values |= {f"{axis}{key}": bound[k] for k, axis in enumerate("XYZ")}
-                values["Thickness"] = distance / unit
-            elif isinstance(one, Sphere):
-                at = (np.array(one.centre) - middle) / unit
-                values |= {f"{axis}Center": at[k] for k, axis in enumerate("XYZ")}
-                values |= {"Radius": one.radius / unit, "Thickness": distance / unit}
-            else:
-                ends = (np.array([one.first, one.second]) - middle) / unit
-                at, half = ends.mean(axis=0), 0.5 * (ends[1] - ends[0])
-                values |= {f"{axis}Center": at[k] for k, axis in enumerate("XYZ")}
-                values |= {f"{axis}Axis": half[k] for k, axis in enumerate("XYZ")}
-                values["Radius"] = (one.radius + 0.5 * distance) / unit
-            for key, value in values.items():
-                gmsh.model.mesh.field.setNumber(tag, key, value)
-            fields.append(tag)
-    if fields:
-        least = gmsh.model.mesh.field.add("Min")
-        gmsh.model.mesh.field.setNumbers(least, "FieldsList", fields)
-        gmsh.model.mesh.field.setAsBackgroundMesh(least)
+    """Edges have their size inside of the solids, and grow in proportion to the distance from them."""
+    rest = said["size"]
+    near = [(one, size, distance) for of, size, distance in said["refine"] for one in restored(of)]
+
+    def edges(_dim: int, _tag: int, x: float, y: float, z: float, _size: float) -> float:
+        at = np.array([[x, y, z]]) * unit + middle
+        ways = [(size, one.distance(at)[0] / distance) for one, size, distance in near]
+        return min(size + (rest - size) * min(max(way, 0.0), 1.0) for size, way in ways) / unit
+
+    if near:
+        gmsh.model.mesh.setSizeCallback(edges)
 
 
 def _main(into: str) -> None:
