@@ -40,6 +40,9 @@ CHOICE = 9 + LAW
 FORCES = 21
 """Words of a row of forces: corners of the face, then of the target, x, y, z each."""
 
+AGAINST = -0.1
+"""Cosine of the angle between two normals below which faces look against each other."""
+
 # Scratch: four polygons of at most twelve corners (u, v), distances of their corners from a cut, lambda_k and
 # s_k lambda_k at the corners of the face (4, 3), inward normals of the sides of the target (4, 3), of length 6 V / H_k.
 _MOST = 24
@@ -235,7 +238,8 @@ def _nearest(px, py, pz, a, b, c, near):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _choose(begin, end, choices, px, py, pz, nx, ny, nz, t, x, corner, near):
     """Which of the faces choices[begin:end] the pair touches: the one nearest to the centre of the force (px, py, pz)
-    among those that look against the contactor's normal if there are any. corner (3, 3), near (3,): scratch."""
+    among those that look against the contactor's normal if there are any. (Sides of a block that stands on a face look
+    neither way: by 6 degrees at least.) corner (3, 3), near (3,): scratch."""
     best, nearest, against = begin, math.inf, False
     for q in range(begin, end):
         for i in range(3):
@@ -246,7 +250,9 @@ def _choose(begin, end, choices, px, py, pz, nx, ny, nz, t, x, corner, near):
         distance = _nearest(px, py, pz, corner[0], corner[1], corner[2], near)
         ax, ay, az = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1], corner[1, 2] - corner[0, 2]
         bx, by, bz = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1], corner[2, 2] - corner[0, 2]
-        opposed = nx * (ay * bz - az * by) + (ny * (az * bx - ax * bz) + nz * (ax * by - ay * bx)) < 0.0
+        mx, my, mz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        sizes = math.sqrt((nx * nx + (ny * ny + nz * nz)) * (mx * mx + (my * my + mz * mz)))
+        opposed = nx * mx + (ny * my + nz * mz) < AGAINST * sizes
         if (opposed and not against) or (opposed == against and distance < nearest):
             best, nearest, against = q, distance, opposed
     return best
