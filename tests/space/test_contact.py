@@ -88,7 +88,8 @@ def test_a_block_stays_below_the_angle_of_friction() -> None:
 def pressed(potential: str = "distance", top: float = 10.0, **face: float) -> float:
     """How far a body of one box sinks into another one under a stress on its top, after bodies of any penalty: the ways
     of its lowest points [m]."""
-    mesh = joined((box((2, 2, 2), (1.0, 1.0, 1.0), 5), (0.0, 0.0, 0.0)), (box((2, 2, 2), (1.0, 1.0, 1.0), 5), (1e-3, 7e-4, 1.0)))
+    cube = box((2, 2, 2), (1.0, 1.0, 1.0), 5)
+    mesh = joined((cube, (0.0, 0.0, 0.0)), (cube, (1e-3, 7e-4, 1.0)))
     sim = Blocks(SerialComm())
     sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)

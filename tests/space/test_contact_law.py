@@ -106,7 +106,7 @@ def test_friction_is_that_of_the_plain_reference(length: float) -> None:
     law, history = (1.0, 0.7, 0.4), None
     known = np.zeros((60, 2, 4, 3))
     slips = sticks = 0
-    for step in range(2):
+    for _ in range(2):
         force, history = run(one, other, speeds, length, law, history, dt=0.05)
         for i in range(60):
             exact = np.zeros((8, 3))

@@ -97,12 +97,13 @@ TRACTIONS = {
 
 @dataclass(frozen=True)
 class Options:
-    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space. mechanical, hydraulic: blocks move, fluid flows;
-    one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles of
-    flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
-    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
-    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most
+    one of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space.
+    mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant: grains move in it;
+    flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many as are needed)
+    of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often as those
+    of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]: Rayleigh
+    damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -479,8 +480,8 @@ def contacts(sim: Blocks) -> dict[str, np.ndarray]:
 
 
 def _contacts_in_space(sim: Blocks, seen: Evaluation) -> dict[str, np.ndarray]:
-    pairs, own = sim.local.pairs, sim.owned
-    at = np.flatnonzero(seen.touching)
+    pairs: Any = sim.local.pairs
+    own, at = sim.owned, np.flatnonzero(seen.touching)
     row = pairs.face_row[pairs.first[at]]
     at = at[(row >= own.start) & (row < own.stop)]
     first, second = pairs.first[at], pairs.second[at]

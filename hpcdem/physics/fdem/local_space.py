@@ -88,8 +88,8 @@ class LocalSpace(Local):
         pass
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: what the contact of
-        its free faces can have, k = P A (1 / h + 1 / h_other) / 3 per face, h_other: the smallest of all."""
+        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: what the contact
+        of its free faces can have, k = P A (1 / h + 1 / h_other) / 3 per face, h_other: the smallest of all."""
         sim, own = self.sim, self.sim.owned
         springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
         if not sim.options.collision:

@@ -1,6 +1,6 @@
 """The contact list of a rank in space: faces and tetrahedra that may touch, what they remember, and where their forces
-go. What pairs.py is in the plane: a pair is a free face, the contactor, and an element with a corner on the surface, the
-target.
+go. What pairs.py is in the plane: a pair is a free face, the contactor, and an element with a corner on the surface,
+the target.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ if TYPE_CHECKING:
 
 
 class Surface(NamedTuple):
-    """The surface of a whole model, known to all ranks. mesh, closed, count: of which it is; clusters (ne, 4): numbers
-    of the corners, those that hang together have one; faces (k,): free faces, ascending; first (ne,): of each element
-    with a corner on the surface its lowest free face, else the lowest of those that hang on its corners, -1: of others;
-    begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of its body in the mesh."""
+    """The surface of a whole model, known to all ranks. mesh, closed, closed_faces: of which it is; clusters (ne, 4):
+    numbers of the corners, those that hang together have one; faces (k,): free faces, ascending; first (ne,): of each
+    element with a corner on the surface its lowest free face, else the lowest of those that hang on its corners, -1: of
+    others; begin, around: faces by cluster; length (ne,) [m]: median altitude of the elements of its body in the mesh.
+    """
 
     mesh: object
     closed: np.ndarray
-    count: int
+    closed_faces: int
     clusters: np.ndarray
     faces: np.ndarray
     first: np.ndarray
@@ -44,7 +45,7 @@ class Surface(NamedTuple):
         """The present one; it is found again only if faces have opened, or the mesh is another."""
         mesh, closed, known = sim.the_mesh(), sim.closed_faces(), sim.surface
         count = int(closed.sum())
-        if known is not None and known.mesh is mesh and known.closed is closed and known.count == count:
+        if known is not None and known.mesh is mesh and known.closed is closed and known.closed_faces == count:
             return known
         clusters, lead = mesh.corner_clusters(sim.partner, ~closed)
         faces = np.flatnonzero(sim.face_exists() & ~closed)

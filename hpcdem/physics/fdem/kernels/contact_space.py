@@ -1,4 +1,4 @@
-"""Contact of tetrahedra by potentials (Munjiza 2004), with friction: the loop over the pairs that detect_space.py found.
+"""Contact of tetrahedra by potentials (Munjiza 2004), with friction: the loop over pairs of detect_space.py.
 
 A pair is a free face, the contactor, and a tetrahedron, the target. Inside the target phi = min s_k lambda_k, lambda_k
 its barycentric coordinates: s_k = 4 (Munjiza), or H_k / h with the altitudes H_k and a length h of its body, so that

@@ -1,5 +1,5 @@
-"""Which faces may touch which tetrahedra until something has moved half the buffer: pairs whose boxes overlap, each half
-the buffer wider on every side. What detect.py is in the plane; which pairs are left out is said there."""
+"""Which faces may touch which tetrahedra until something has moved half the buffer: pairs whose boxes overlap, each
+half the buffer wider on every side. What detect.py is in the plane; which pairs are left out is said there."""
 
 from __future__ import annotations
 
