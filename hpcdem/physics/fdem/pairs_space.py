@@ -161,13 +161,10 @@ class ContactSpace:
         own = sim.owned
         if not len(self.face) or not len(self.row):
             return np.empty(0, np.int64), np.empty(0, np.int64)
-        face_box, corners = np.empty((len(self.face), 6)), self.place[:, None] + STRIDE * np.arange(4)
-        detect.boxes(self.corner, sim.x, skin, face_box)
-        detect.boxes(corners, sim.x, skin, self.box)
         owned = [(row >= own.start) & (row < own.stop) for row in (self.face_row, self.row)]
         return detect.find(
-            face_box, self.face, owned[0], self.box, self.element, owned[1], Surface.of(sim).clusters, sim.partner,
-            sim.closed_faces(),
+            self.corner, self.face, owned[0], self.place[:, None] + STRIDE * np.arange(4), self.element, owned[1],
+            sim.x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
         )  # fmt: skip
 
     def _make_list(self, sim: State, tables: LocalSpace) -> None:

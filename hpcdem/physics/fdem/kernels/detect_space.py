@@ -1,7 +1,10 @@
 """Which faces may touch which tetrahedra until something has moved half the buffer: pairs whose boxes overlap, each
-half the buffer wider on every side. What detect.py is in the plane; which pairs are left out is said there."""
+half the buffer wider on every side, unless along the normal of a side of the tetrahedron, or of the face, they are
+farther apart than the buffer. What detect.py is in the plane; which pairs are left out is said there."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
@@ -73,11 +76,44 @@ def _apart(face, target, clusters, partner, closed):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _separated(corner, target, x, buffer, points):
+    """Whether one of five normals separates a face and a target by more than the buffer; places of their corners in x,
+    points (7, 3): scratch."""
+    for c in range(7):
+        at = corner[c] if c < 3 else target[c - 3]
+        for k in range(3):
+            points[c, k] = x[at + k]
+    for n in range(5):
+        # The three corners of a side, then of the face.
+        a, b, c = 3 + n % 4, 3 + (n + 1) % 4, 3 + (n + 2) % 4
+        if n == 4:
+            a, b, c = 0, 1, 2
+        ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+        wx, wy, wz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        low = far_low = math.inf
+        high = far_high = -math.inf
+        for i in range(7):
+            d = nx * (points[i, 0] - points[a, 0]) + ny * (points[i, 1] - points[a, 1])
+            d += nz * (points[i, 2] - points[a, 2])
+            if i < 3:
+                low, high = min(low, d), max(high, d)
+            else:
+                far_low, far_high = min(far_low, d), max(far_high, d)
+        room = buffer * math.sqrt(nx * nx + (ny * ny + nz * nz))
+        if low - far_high > room or far_low - high > room:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _pairs(
-    cells, begin, body, side, face_box, box, face, face_owned, element, owned, clusters, partner, closed, first, second
+    cells, begin, body, side, face_box, box, corner, target, x, buffer, face, face_owned, element, owned, clusters,
+    partner, closed, first, second,
 ):  # fmt: skip
     """Pairs of faces and targets into first, second (either of length 0: count only)."""
-    n = 0
+    n, points = 0, np.empty((7, 3))
+    x = x.reshape(x.size)
     for f in range(len(face)):
         low_i, high_i = _cell(face_box[f, 0], side), _cell(face_box[f, 3], side)
         low_j, high_j = _cell(face_box[f, 1], side), _cell(face_box[f, 4], side)
@@ -112,6 +148,8 @@ def _pairs(
                             continue
                         if not _apart(face[f], element[t], clusters, partner, closed):
                             continue
+                        if _separated(corner[f], target[t], x, buffer, points):
+                            continue
                         if len(first) > 0:
                             first[n], second[n] = f, t
                         n += 1
@@ -119,18 +157,22 @@ def _pairs(
 
 
 def find(
-    face_box: np.ndarray, face: np.ndarray, face_owned: np.ndarray, box: np.ndarray, element: np.ndarray,
-    owned: np.ndarray, clusters: np.ndarray, partner: np.ndarray, closed: np.ndarray,
+    corner: np.ndarray, face: np.ndarray, face_owned: np.ndarray, target: np.ndarray, element: np.ndarray,
+    owned: np.ndarray, x: np.ndarray, buffer: float, clusters: np.ndarray, partner: np.ndarray, closed: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Pairs (i, j) of contactor i and target j, in ascending order of (number of the face, element).
 
-    face_box (c, 6), face (c,): number of each contactor, box (n, 6), element (n,) of each target; face_owned, owned
-    (bool): pairs of which neither is owned are left out; clusters (ne, 4): of the corners of all elements, those that
-    hang together have one number; partner, closed (4 ne,): the mesh, and which faces hold together.
+    corner (c, 3): where the corners of each contactor are in x, face (c,): its number; target (n, 4), element (n,): the
+    same of targets; face_owned, owned (bool): pairs of which neither is owned are left out; buffer [m]; clusters
+    (ne, 4): of the corners of all elements, those that hang together have one number; partner, closed (4 ne,): the
+    mesh, and which faces hold together.
     """
     nothing = np.empty(0, np.int64)
     if not len(face) or not len(element):
         return nothing, nothing
+    face_box, box = np.empty((len(face), 6)), np.empty((len(element), 6))
+    boxes(corner, x, buffer, face_box)
+    boxes(target, x, buffer, box)
     size = (box[:, 3:] - box[:, :3]).max(axis=1)
     side = max(1.5 * float(np.median(size)), float(size.max()) / 16.0)  # a few large boxes must not fill many cells
     entries = _spread(box, side, nothing, nothing)
@@ -139,8 +181,8 @@ def find(
     order = np.argsort(key, kind="stable")
     cells, begin = np.unique(key[order], return_index=True)
     args = (
-        cells, np.append(begin, entries), body[order], side, face_box, box, face, face_owned, element, owned, clusters,
-        partner, closed,
+        cells, np.append(begin, entries), body[order], side, face_box, box, corner, target, x, buffer, face, face_owned,
+        element, owned, clusters, partner, closed,
     )  # fmt: skip
     count = _pairs(*args, nothing, nothing)
     first, second = np.empty(count, np.int64), np.empty(count, np.int64)
