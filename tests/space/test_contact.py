@@ -11,8 +11,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, connectivity, convergence, diagnostics, overlaps
 from hpcdem.physics.fdem.mesh import Mesh
-from hpcdem.physics.fdem.pairs_space import Surface, face_areas
+from hpcdem.physics.fdem.pairs_space import AllPairs, Surface, face_areas
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.pre.mesh import fill, solids
 from tests.space.support import ROCK, box, faces_on
 
 SOFT = {**ROCK, "young": 1e8, "damp_factor": 0.3}
@@ -196,7 +198,8 @@ def sim_kinds(sim: Blocks):
 
 
 def brute_force(sim: Blocks, skin: float) -> set[tuple[int, int]]:
-    """Pairs (face, element) with boxes that overlap, of elements without a common point."""
+    """Pairs (face, element) with boxes that overlap, of elements without a common point, that no normal of a side of
+    the element or of the face sets apart."""
     mesh = sim.the_mesh()
     edges = mesh.edges()
     free = edges.faces[~edges.inner, 0]
@@ -207,19 +210,35 @@ def brute_force(sim: Blocks, skin: float) -> set[tuple[int, int]]:
     for f, c in zip(free.tolist(), x.reshape(-1, 3)[mesh.face_corners(free)]):
         apart = ~np.isin(mesh.cells, mesh.cells[f // 4]).any(axis=1)
         for e in np.flatnonzero(on_surface[mesh.cells].any(axis=1) & apart).tolist():
-            if (c.min(axis=0) - skin <= x[e].max(axis=0)).all() and (c.max(axis=0) + skin >= x[e].min(axis=0)).all():
+            if (c.min(axis=0) - skin > x[e].max(axis=0)).any() or (c.max(axis=0) + skin < x[e].min(axis=0)).any():
+                continue
+            sides = np.array([c, *x[e][FACES]])
+            normals = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+            normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+            mine, other = normals @ c.T, normals @ x[e].T
+            between = np.maximum(mine.min(axis=1) - other.max(axis=1), other.min(axis=1) - mine.max(axis=1))
+            if between.max() <= skin:
                 found.add((f, e))
     return found
 
 
 def test_all_pairs_are_found() -> None:
-    """As by comparing everything with everything; in ascending order, each once."""
+    """As by comparing everything with everything; in ascending order, each once. They are all that touch once the block
+    has sunk in by half the buffer."""
     sim, _ = on_a_plate(box((2, 2, 2), (0.3, 0.3, 0.2), 12, shaken=0.2), (0.31, 0.17, 0.201))
     sim.close_model()
     pairs = sim.local.pairs
     found = list(zip(pairs.face[pairs.first].tolist(), pairs.element[pairs.second].tolist()))
     assert found == sorted(set(found)) and len(found) > 100
-    assert set(found) == brute_force(sim, sim.rebuild_state.skin)
+    skin = sim.rebuild_state.skin
+    assert set(found) == brute_force(sim, skin)
+    number = sim.number >= 8 * 3 * 2 * 6
+    sim.x.reshape(-1, 4, 4)[number, :, 2] -= 0.499 * skin
+    everything = AllPairs(sim)
+    deep = np.flatnonzero(everything.depths(sim)[:, 0] > 0.0)
+    faces, elements = everything.face[everything.first[deep]], everything.element[everything.second[deep]]
+    touching = set(zip(faces.tolist(), elements.tolist()))
+    assert len(touching) > 20 and touching <= set(found)
 
 
 def meeting(sim: Blocks) -> set[tuple[int, int]]:
@@ -310,3 +329,55 @@ def test_contact_limits_the_time_step() -> None:
         assert diagnostics.total(sim, "kinetic_energy") < 1.01 * kinetic
     assert steps[1] / steps[2] == pytest.approx(10.0, rel=0.01)
     assert steps[0] > 3.0 * steps[1]
+
+
+@pytest.mark.slow
+def test_a_ball_bounces_off_a_plate() -> None:
+    """Hertz: a ball of radius 50 mm, E = 10 GPa, nu = 0.25, rho = 2700, at 1 m/s on a plate that does not give way:
+    8899 N, 0.19858 mm, 0.58446 ms; and what was stored is given back. A quarter of it, with facets for its round."""
+    radius, fine = 0.05, 7e-4
+    cube, ball = solids.made("box", (0, 0, 0), (0.1, 0.1, 0.1)), solids.made("sphere", (0, 0, radius), radius)
+    near = solids.made("box", (-0.0043, -0.0041, -0.0011), (0.0043, 0.0042, 0.0013))
+    points, cells, groups = fill.filled(
+        fill.Wishes([ball], 0.012, [], [("quarter", [cube])], [([near], fine, 0.03)]), "rest"
+    )
+    used, cells = np.unique(cells[groups["quarter"]], return_inverse=True)
+    points = points[used] - [0.0, 0.0, points[used][:, 2].min() - 1e-7]
+    plate = box((3, 3, 1), (0.015, 0.015, 0.005))
+    n = len(plate.points)
+    mesh = Mesh.of(
+        np.concatenate([plate.points - [0.003, 0.003, 0.005], points]),
+        np.concatenate([plate.cells, cells.reshape(-1, 4) + n]),
+    )
+    sim = Blocks(SerialComm())
+    sim.take_mesh(mesh)
+    changes.element_model(
+        sim, None, "mech_iso_elastic", {"density": 2700.0, "young": 1e10, "poisson_ratio": 0.25, "penalty": 1e11}
+    )
+    sim.velocity_condition(np.arange(n), vx=0.0, vy=0.0, vz=0.0)
+    moving = np.arange(n, len(mesh.points))
+    sim.velocity_condition(moving[np.abs(points[:, 0]) < 1e-9], vx=0.0)
+    sim.velocity_condition(moving[np.abs(points[:, 1]) < 1e-9], vy=0.0)
+    changes.set_velocity(sim, moving, 0.0, 0.0, -1.0)
+    mass = np.bincount(mesh.cells.reshape(-1), np.repeat(2700.0 * sim.areas / 4.0, 4))[n:]
+    rows, end = [], 0.0
+    while not end:
+        for _ in range(20):
+            sim.step()
+        contacts = diagnostics.contacts(sim)
+        up = contacts["force_z"] * np.where(contacts["element_1"] < len(plate.cells), -1.0, 1.0)
+        z, speed = (
+            float((diagnostics.values(sim, name, moving) * mass).sum() / mass.sum())
+            for name in ("displacement_z", "velocity_z")
+        )
+        rows.append((4.0 * up.sum(), -z))
+        if speed > 0.0 and not len(up):
+            end = sim.clock.time
+        assert sim.clock.time < 1e-3
+    force, depth = np.array(rows).max(axis=0)
+    assert force == pytest.approx(8899.0, rel=0.1)
+    assert depth == pytest.approx(0.19858e-3, rel=0.1)
+    assert end == pytest.approx(0.58446e-3, rel=0.1)
+    assert 0.97 < speed <= 1.0
+    energy = diagnostics.total(sim, "kinetic_energy") + diagnostics.total(sim, "strain_energy")
+    assert energy == pytest.approx(0.5 * mass.sum(), rel=1e-3)

@@ -75,7 +75,7 @@ WORKLOADS = {
         Workload("wet-20k", "wet", 100),
         Workload("sandy-20k", "sandy", 100),
         Workload("pairs-20k", "pairs", 141),
-        Workload("pairs-space-20k", "pairs-space", 50),
+        Workload("pairs-space-20k", "pairs-space", 28),
         Workload("shattered-20k", "shattered", 100),
     )
 }
