@@ -12,13 +12,17 @@ from hpcdem.physics.fdem import creep as of_elements
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
 
 
-def new(project: Project) -> None:
-    """A new model: no geometry, no mesh, step 0, default options."""
-    project.clear()
+def new(project: Project, dim: int = 2) -> None:
+    """A new model in so many dimensions: no geometry, no mesh, step 0, default options."""
+    if dim not in (2, 3):
+        raise CommandError(f"a model has 2 or 3 dimensions, not {dim}")
+    project.clear(dim)
 
 
-def gravity(project: Project, g: tuple[float, float]) -> None:
-    """Gravity (2,) [m/s2] from now on."""
+def gravity(project: Project, g: tuple[float, ...]) -> None:
+    """Gravity (2,), in space (3,), [m/s2] from now on."""
+    if len(g) != project.dim:
+        raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(g)}")
     project.blocks.gravity(*g)
 
 

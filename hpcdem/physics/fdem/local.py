@@ -12,6 +12,7 @@ import numpy as np
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity, user_laws
+from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import (
     creep,
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.definition import NodeCondition
     from hpcdem.physics.fdem.state import State
 
-_TRACTION = "xx", "yy", "xy", "normal", "incoming_x", "incoming_y"
-"""Columns of the table of tractions."""
 ALPHA = 0.8
 """Local damping of the static mode."""
 
@@ -157,10 +156,14 @@ class LawHere:
 
 
 class Local:
-    """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
+    """Tables of one rank between two rebuilds, in the plane (in space: local_space.py). The model is in storage order,
+    ghosts in place. Collective.
 
-    passes: how often the forces of a step were computed.
+    passes: how often the forces of a step were computed. dim: of space; force_width: words of a row of forces; stride:
+    from one corner of a row to the next.
     """
+
+    dim, force_width, stride = 2, elements.FORCE, 2
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -484,17 +487,21 @@ class Local:
         self.node_mass = np.empty(n)
         lost = self._place_nodes(self.true_mass)
         self._agree_on_lost(lost, "the node of corner")
-        rows = self.node_corner // 8
+        rows = self.node_corner // self.force_width
         self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
         lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
         self.node_functions = Placed(sim.conditions, sim.point_row[lead].astype(np.int64), mesh.points[lead])
         self.node_condition = self.node_functions.of
         self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
-        self.outside, self.felt = np.zeros((n, 2)), np.zeros((n, 4))
+        self.outside, self.felt = np.zeros((n, self.dim)), np.zeros((n, 2 * self.dim))
         total = len(sim.number)
-        self.force = np.zeros((total if self.some_special or self.shared else 1, elements.FORCE))
-        self.applied = np.zeros((total if self.some_applied else 1, elements.FORCE))
-        self.triangle_special = self.special[self.triangle_rows[: self.count] - own.start].any(axis=1)
+        self.force = np.zeros((total if self.some_special or self.shared else 1, self.force_width))
+        self.applied = np.zeros((total if self.some_applied else 1, self.force_width))
+        self._mark_special()
+
+    def _mark_special(self) -> None:
+        """Elements with corners that nodes.py moves."""
+        self.triangle_special = self.special[self.triangle_rows[: self.count] - self.sim.n_left].any(axis=1)
         self.block_special = self._per_block(self.triangle_special)
 
     def _per_block(self, flags: np.ndarray) -> np.ndarray:
@@ -508,7 +515,8 @@ class Local:
         return int(
             build.place_nodes(
                 self.node_lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1],
-                mass, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_mass,
+                self.force_width, self.stride, mass, self.node_begin, self.node_corner, self.node_place,
+                self.node_again, self.node_mass,
             )
         )  # fmt: skip
 
@@ -567,12 +575,22 @@ class Local:
         sim, o = self.sim, self.sim.options
         if not o.dynamic:
             return math.inf
-        least = limits.time_step(
-            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start,
-            *self.springs(),
-            o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
-        )  # fmt: skip
+        least = self._stable_time_step(target, self.true_mass.copy() if mass is None else mass)
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
+
+    def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
+        """Of this rank's elements, see `limits.time_step`."""
+        o = self.sim.options
+        return limits.time_step(
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
+            *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
+        )  # fmt: skip
+
+    def _make_static_masses(self) -> None:
+        limits.static_masses(
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
+            self.springs()[0], ALPHA, self.mass,
+        )  # fmt: skip
 
     def added_mass(self) -> float:
         """Mass that mass scaling has added, over the true mass. Collective."""
@@ -583,13 +601,9 @@ class Local:
     def _set_masses(self) -> None:
         """Masses of the corners that the motion sees, and the time step. Collective."""
         sim, o = self.sim, self.sim.options
-        triangles = self.triangle_rows[: self.count]
         self.mass = self.true_mass.copy()
-        own = sim.owned
         if not o.dynamic or not o.mechanical:
-            limits.static_masses(
-                self.stiff, self.stiff_q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
-            )  # fmt: skip
+            self._make_static_masses()
             sim.clock.dt = 1.0
         else:
             wanted = sim.rebuild_state.dt == 0.0
@@ -608,7 +622,12 @@ class Local:
         dt = sim.clock.dt
         self.node_kick = dt / self.node_mass
         self._conditions = None if sim.conditions_vary() else sim.conditions_at(sim.clock.time, sim.clock.time, dt)
-        alone = ~self.special[triangles - own.start][:, :3]
+        self._set_kicks(dt)
+
+    def _set_kicks(self, dt: float) -> None:
+        """What moves corners that are alone."""
+        triangles = self.triangle_rows[: self.count]
+        alone = ~self.special[triangles - self.sim.n_left][:, :3]
         with np.errstate(divide="ignore"):
             self.c[: self.count, elements.KICK : elements.KICK + 3] = np.where(
                 alone, dt / self.mass[triangles, :3], 0.0
@@ -887,7 +906,7 @@ class Local:
 
     def loads_now(self, placed: Placed, time: float) -> np.ndarray:
         """The table of tractions (rows, 6), with a row of its own for each face whose traction is a function."""
-        return placed.filled(self.sim.loads_at(time), lambda one, field: (_TRACTION.index(field), time, 1.0))
+        return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[2].index(field), time, 1.0))
 
     def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
         """The table of node conditions, with a row of its own for each node whose condition is a function."""

@@ -151,6 +151,11 @@ class State(ModelDefinition, Model):
         return self.x.shape[1] == 12
 
     @property
+    def stride(self) -> int:
+        """Words from one corner of a row of positions or velocities to the next."""
+        return 4 if self.dim == 3 else 2
+
+    @property
     def element_parts(self) -> int:
         """Triangles for which a row of what elements remember has columns: quads have four."""
         return 4 if self.wide else 1

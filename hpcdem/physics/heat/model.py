@@ -19,6 +19,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import build, connectivity, said, user_laws
+from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.properties import ELEMENT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
@@ -431,8 +432,8 @@ class Heat(SurfaceLoad):
         width, total = self.t.shape[1], int(one.sum())
         begin, corner, place, again = np.zeros(n + 1, np.int64), *(np.empty(total, np.int64) for _ in range(3))
         lost = build.place_nodes(
-            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], blocks.local.true_mass, begin,
-            corner, place, again, np.empty(n),
+            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], FORCE, 2, blocks.local.true_mass,
+            begin, corner, place, again, np.empty(n),
         )  # fmt: skip
         lost = int(blocks.comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:

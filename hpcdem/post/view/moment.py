@@ -31,15 +31,18 @@ UNITS = {
           "distance"),
     "m/s": ("velocity", "vx", "vy"), "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
     "N": ("force", "fx", "fy", "fn", "fs"), "N m": ("torque", "moment"), "K": ("temperature",), "kg": ("mass",),
-    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m2/s": ("flow_rate",),
+    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m3": ("volume",), "m2/s": ("flow_rate",),
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
+
+PARTS = {"x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "min", "largest", "first", "last", "shear"}
+"""Ends of the names of fields that change no unit."""
 
 
 def unit_of(name: str) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
     words = name.split("_")
-    while words and words[-1] in ("x", "y", "xx", "yy", "xy", "zz", "max", "min", "largest", "first", "last", "shear"):
+    while words and words[-1] in PARTS:
         words.pop()
     stem = "_".join(words)
     ends = ((unit, word) for unit, known in UNITS.items() for word in known)

@@ -1,0 +1,211 @@
+"""The tables of the kernels for the tetrahedra that a rank holds: `Local` of a model in space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.histories import WORDS, Histories
+from hpcdem.physics.fdem.kernels import elements, space, tets
+from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.kernels.joints import HISTORY
+from hpcdem.physics.fdem.local import ALPHA, Evaluation, Local, element_table
+from hpcdem.physics.fdem.user_functions import Placed
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.definition import NodeCondition
+    from hpcdem.physics.fdem.state import State
+
+
+class NoPairs:
+    """Bodies in space do not touch in this version."""
+
+    rows = np.empty(0, np.int64)
+
+    def __len__(self) -> int:
+        return 0
+
+
+class LocalSpace(Local):
+    """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
+
+    dim, force_width, stride = 3, tets.ROW, tets.STRIDE
+    plastic = creeps = yields = False
+
+    def __init__(self, sim: State) -> None:
+        self.sim = sim
+        self.count = sim.n_own
+        rows = np.arange(sim.n_left, sim.n_left + sim.n_own)
+        self.rows = np.concatenate([rows, np.repeat(rows[-1:], 3)]).astype(np.int32)
+        self.tally = np.zeros((sim.threads, elements.TALLY), np.int64)
+        self.passes = 0
+        self.laws: list = []
+        self._make_constants()
+        self._make_joints()
+        self.pairs: Any = NoPairs()
+        self._make_loads()
+        self._make_nodes()
+        self._set_masses()
+        self._bind()
+
+    def _make_constants(self) -> None:
+        sim, mesh = self.sim, self.sim.the_mesh()
+        models = element_table(sim.element_rows)
+        self.true_mass = np.zeros((len(sim.number), 4))
+        space.masses(sim.number, mesh.points, mesh.cells, sim.element_row, models, self.true_mass)
+        self.c = np.zeros((self.count + 3, tets.TET))
+        space.constants(
+            sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic, self.rows[: self.count],
+            self.true_mass, self.c,
+        )  # fmt: skip
+        self.c[self.count :] = self.c[self.count - 1] if self.count else 1.0
+        self.s0 = np.zeros((self.count + 3, tets.STRESSES))
+        if sim.stress0 is not None:
+            self.s0[: self.count, :6] = sim.initial_stresses(sim.number[sim.owned])
+        self.heated = False
+
+    def _make_joints(self) -> None:
+        self.slots = 0
+        self.first_slot = 4 * np.arange(self.sim.n_own)
+        self.slot_face = np.empty(0, np.int64)
+        self.slot_state, self.slot_history = np.empty(0, np.uint8), np.empty((0, HISTORY))
+
+    def _make_loads(self) -> None:
+        sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
+        faces = 4 * sim.number[own][:, None] + np.arange(4)
+        i, k = np.nonzero(sim.load_row[faces] > 0)
+        corner = mesh.face_corners(faces[i, k]) % 4
+        self.special = np.ones((sim.n_own, 4), bool)
+        self.load_corner = tets.ROW * (i + own.start)[:, None] + tets.STRIDE * corner
+        places = mesh.points[mesh.face_points(faces[i, k])].mean(axis=1)
+        self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
+        self.load_of = self.load_functions.of
+        self.some_applied = sim.comm.any(len(i) > 0)
+
+    def _mark_special(self) -> None:
+        pass
+
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """None: joints and contact are not there."""
+        return np.zeros((self.sim.n_own, 4)), np.zeros((self.sim.n_own, 4))
+
+    def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
+        o = self.sim.options
+        rows = self.rows[: self.count]
+        return space.time_step(self.c, rows, o.mass_damping, o.stiffness_damping, o.safety, target, mass)
+
+    def _make_static_masses(self) -> None:
+        space.static_masses(self.c, self.rows[: self.count], ALPHA, self.mass)
+
+    def _set_kicks(self, dt: float) -> None:
+        pass
+
+    def _bind(self) -> None:
+        one = self.sim.threads == 1
+        self._forces: Any = tets.forces if one else tets.forces_threaded
+        self._move: Any = space.move if one else space.move_threaded
+        self.of_joints = np.zeros((1, tets.ROW))
+
+    def forces(self) -> None:
+        """Forces at the present positions, and the velocities that follow from them. Collective."""
+        timers = self.sim.timers
+        self.passes += 1
+        with timers("force"):
+            self._fill(self.force)
+        with timers("node"):
+            self.move_nodes()
+
+    def _fill(self, force: np.ndarray) -> None:
+        sim, o = self.sim, self.sim.options
+        self._forces(
+            sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, sim.stress0 is not None,
+            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
+        )  # fmt: skip
+
+    def move_nodes(self) -> None:
+        """New velocities of the nodes from the forces on their corners. Collective."""
+        sim, clock = self.sim, self.sim.clock
+        if self.some_applied:
+            self.applied[:] = 0.0
+            loads = self.loads_now(self.load_functions, clock.time)
+            space.tractions(self.load_corner, self.load_of, loads, sim.x, self.applied)
+        if self.shared:
+            sim.halo.fill(self.force)
+            if self.some_applied:
+                sim.halo.fill(self.applied)
+        table = self._conditions
+        if table is None:
+            half = 0.5 * clock.dt if sim.options.dynamic else 0.0
+            table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
+        self._move(
+            sim.threads, self.node_begin, self.node_corner, self.node_kick, self.node_condition, self.node_share, table,
+            self.some_applied, self.force, self.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside,
+            self.felt,
+        )  # fmt: skip
+
+    def loads_now(self, placed: Placed, time: float) -> np.ndarray:
+        """The table of tractions (rows, 7)."""
+        return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[3].index(field), time, 1.0))
+
+    def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
+        """The table of node conditions (rows, 13)."""
+
+        def how(one: NodeCondition, field: str) -> tuple[int, float, float]:
+            kind, _, axis = field.partition("_")
+            k = "xyz".index(axis)
+            if kind == "force":
+                return space.FORCE + k, time, 1.0
+            velocity = getattr(one, f"does_{axis}") == moving.VELOCITY
+            return (space.AT + k, middle, 1.0) if velocity else (space.AT + k, time, dt)
+
+        return placed.filled(self.sim.conditions_at(time, middle, dt), how)
+
+    def evaluation(self, contact: bool = True) -> Evaluation:
+        """Forces at the present positions; everything is put back as it was. Collective."""
+        sim = self.sim
+        kept = [(table, table.copy()) for table in (sim.v, self.outside, self.felt)]
+        stored, self.force = self.force, np.zeros((len(sim.number), tets.ROW))
+        self._fill(self.force)
+        self.move_nodes()
+        nothing = np.zeros((0, 0))
+        found = Evaluation(
+            self.force, np.zeros_like(self.force), nothing, np.empty(0, bool), nothing, self.outside.copy(),
+            self.felt.copy(), sim.v.copy(),
+        )  # fmt: skip
+        self.force = stored
+        for table, values in kept:
+            table[...] = values
+        return found
+
+    def stresses(
+        self, at: np.ndarray | None = None, energies: bool = True, flow: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Stress (n_own, 6) [Pa] and, unless they are not wanted, elastic energies (n_own,) [J] of the owned elements,
+        or of some of them (at: the how-manieth)."""
+        sim = self.sim
+        at = np.arange(sim.n_own) if at is None else at
+        n = len(at)
+        stress, energy = np.zeros((n, 6)), np.zeros(n if energies else 0)
+        small = not sim.options.large_strain
+        x = sim.x[at + sim.n_left]
+        tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], self.s0[at], small, 0, stress, energy)
+        return stress, energy
+
+    def stored_in_joints(self) -> np.ndarray:
+        """Nothing (n_own,) [J]."""
+        return np.zeros(self.sim.n_own)
+
+    def histories(self, transfer: bool) -> Histories:
+        """None: neither joints nor contacts are there."""
+        return Histories.empty(self.sim.n_own)
+
+    def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
+        """The same."""
+        return np.empty(0, np.int64), np.zeros((0, WORDS))
+
+    def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
+        """There are no lists; masses change with the mode. Collective."""
+        if self.sim.masses_change():
+            self._set_masses()
