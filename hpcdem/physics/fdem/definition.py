@@ -163,7 +163,7 @@ class ModelDefinition:
         self.fields: dict[str, RandomField] = {}
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
-        self.softening: list[Table] = []
+        self.followed: list[Table] = []
         """Tables over plastic strain or temperature, as they were when elements got them: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
@@ -507,14 +507,14 @@ class ModelDefinition:
                 if not model.property(name).softens:
                     raise CommandError(f"{name} of {model.name} cannot follow a table over plastic strain")
                 number = self._kept(model, name, value.table)
-                if self.softening[number - 1].times[0] < 0.0:
+                if self.followed[number - 1].times[0] < 0.0:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
-                out[name], out[softening_table(name)] = self.softening[number - 1](0.0), float(number)
+                out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
             elif isinstance(value, Over) and value.axis == TEMPERATURE:
                 if not model.has(temperature_table(name)):
                     raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
                 number = self._kept(model, name, value.table)
-                values = self.softening[number - 1].values
+                values = self.followed[number - 1].values
                 if name in ("gf1", "gf2") and values.min() == 0.0:
                     raise CommandError(f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)")
                 out[name], out[temperature_table(name)] = float(values.max()), float(number)
@@ -527,10 +527,10 @@ class ModelDefinition:
         found = self.tables[table]
         for one in found.values.tolist():
             model.property(name).check(one)
-        known = [one.pairs() for one in self.softening]
+        known = [one.pairs() for one in self.followed]
         if found.pairs() not in known:
             known.append(found.pairs())
-            self.softening.append(found)
+            self.followed.append(found)
         return 1 + known.index(found.pairs())
 
     def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
@@ -539,7 +539,7 @@ class ModelDefinition:
             place = {p.name: k for k, p in enumerate(model.properties)}
             pair = [place[name] for one in ("dilation", "friction") for name in (one, softening_table(one))]
             for row in np.unique(values[:, pair], axis=0):
-                tables = [self.softening[int(number) - 1] if number else None for number in row[[1, 3]]]
+                tables = [self.followed[int(number) - 1] if number else None for number in row[[1, 3]]]
                 if any(tables):
                     at = np.unique(np.concatenate([one.times for one in tables if one]))
                     dilation, friction = (one.at(at) if one else value for one, value in zip(tables, row[[0, 2]]))
@@ -1008,7 +1008,7 @@ class ModelDefinition:
             "tables": {name: table.pairs() for name, table in self.tables.items()},
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
-            "softening": [table.pairs() for table in self.softening],
+            "softening": [table.pairs() for table in self.followed],
             "element_rows": self.element_rows.state(),
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
@@ -1026,7 +1026,7 @@ class ModelDefinition:
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]
-        self.softening = [Table.of(pairs) for pairs in state.get("softening", [])]
+        self.followed = [Table.of(pairs) for pairs in state.get("softening", [])]
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
