@@ -847,6 +847,8 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
              "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model mech-iso-elastic property density 2600 poisson-ratio 0.25 young table 'E_of_T' over "
+             "temperature",
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),

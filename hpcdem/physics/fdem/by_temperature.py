@@ -1,5 +1,5 @@
-"""Moduli and strengths that follow tables over temperature: of elements by the mean of their corners, of joints by that of
-their two ends (which both sides have alike).
+"""Moduli and strengths that follow tables over temperature: of elements by the mean of their corners, of joints by that
+of their two ends (which both sides have alike).
 
 A row of properties holds the largest value of such a table, and by it go masses, time steps and contact: they hold for
 all temperatures. Kernels read what is made of it here, each time temperatures have changed. Young's modulus is carried
@@ -47,4 +47,6 @@ def part_of_young(sim: State, row: np.ndarray | None = None, t: np.ndarray | Non
     row = sim.element_row[sim.number[sim.owned]] if row is None else row
     if not rows.column(temperature_table("young"))[row].any():
         return None
-    return values(sim, rows, "young", row, means(sim) if t is None else t) / np.maximum(rows.column("young")[row], 1e-300)
+    return values(sim, rows, "young", row, means(sim) if t is None else t) / np.maximum(
+        rows.column("young")[row], 1e-300
+    )

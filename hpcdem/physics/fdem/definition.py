@@ -28,7 +28,6 @@ from hpcdem.physics.fdem.properties import (
     MECH_BURGERS,
     MECH_ISO_ELASTIC,
     MECH_MOHR_COULOMB,
-    SOFTENS,
     Model,
     Rows,
     softening_rows,
@@ -164,7 +163,7 @@ class ModelDefinition:
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
         self.followed: list[Table] = []
-        """Tables over plastic strain or temperature, as they were when elements got them: rows hold their numbers, from 1 on."""
+        """Tables over plastic strain or temperature, as they were when they were given: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
@@ -516,7 +515,9 @@ class ModelDefinition:
                 number = self._kept(model, name, value.table)
                 values = self.followed[number - 1].values
                 if name in ("gf1", "gf2") and values.min() == 0.0:
-                    raise CommandError(f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)")
+                    raise CommandError(
+                        f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)"
+                    )
                 out[name], out[temperature_table(name)] = float(values.max()), float(number)
         return out
 

@@ -262,8 +262,8 @@ _SOLID = (
 _WARM_SOLID = tuple(replace(one, warms=one.name == "young") for one in _SOLID)
 _ELASTIC = (
     _friction("friction angle of its surfaces where they have no contact model"),
-    Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its joints, "
-             "or 10 E", 0.0),
+    Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
+             "joints, or 10 E", 0.0),
 )  # fmt: skip
 
 MECH_ISO_ELASTIC = Model(
@@ -276,7 +276,9 @@ MECH_ISO_ELASTIC = Model(
 
 _WARM_STRENGTH = (
     Property("cohesion", "Pa", "cohesion", softens=True, warms=True),
-    Property("tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True, warms=True),
+    Property(
+        "tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True, warms=True
+    ),
 )
 MECH_MOHR_COULOMB = Model(
     "mech_mohr_coulomb",

@@ -587,8 +587,8 @@ class Blocks(State):
             for what, at in (("element", elements), ("joint", joints)):
                 if at.any():
                     raise CommandError(
-                        f"a property of {what} {np.flatnonzero(at)[0]} follows a table over temperature, but there is no "
-                        "heat: element c-model thermal-iso-heat for all"
+                        f"a property of {what} {np.flatnonzero(at)[0]} follows a table over temperature, but there is "
+                        "no heat: element c-model thermal-iso-heat for all"
                     )
         soft = elements & (self.element_rows.column(temperature_table("young"))[self.element_row] > 0.0)
         beside = np.flatnonzero(self.quiet_faces() & np.repeat(soft, 4))
