@@ -183,7 +183,7 @@ def test_energy_of_joints_that_get_weaker_adds_up() -> None:
             heat.prescribe(None, 220.0)
         sim.step()
     found = diagnostics.energies(sim)
-    assert found["joints"] > 0.0 and abs(found["work_heat"]) > 0.01 * found["joints"]
+    assert found["joints"] > 0.0 and abs(found["work_heat"]) > 5e-3 * found["joints"]
     assert abs(found["joints_lost"]) < 1e-5 * found["joints"] and found["relative"] < 1e-5
 
 

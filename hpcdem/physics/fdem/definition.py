@@ -163,7 +163,7 @@ class ModelDefinition:
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
         self.followed: list[Table] = []
-        """Tables over plastic strain or temperature, as they were when they were given: rows hold their numbers, from 1 on."""
+        """Tables over plastic strain or temperature, as they were given: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
