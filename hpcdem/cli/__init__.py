@@ -56,6 +56,8 @@ def main() -> NoReturn:
         start(words[0], words[1:])
     if words[:1] == ["grade"]:
         importlib.import_module("hpcdem.cli.grade_page").start(words[1:])
+    if words[:1] == ["view"]:
+        importlib.import_module("hpcdem.cli.view").start(words[1:])
     if words[:1] == ["case"]:
         importlib.import_module("hpcdem.cli.case").start(words[1:])
     if words[:1] == ["console"]:

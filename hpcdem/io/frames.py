@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 from collections.abc import Collection
@@ -54,17 +55,36 @@ def list_mesh_frames(folder: str | os.PathLike, stem: str | None = None) -> list
     """The frames of blocks in a folder, `<stem>_<step>.vtkhdf`, in the order of steps; without a stem those of the name
     that most of them have. Those of an earlier run do not count, as in `list_frames`. Raises HpcdemError if the folder
     cannot be read, or has none of this name."""
-    from hpcdem.io.vtkhdf_mesh import is_mesh_frame
-
-    found: dict[str, list[FrameFile]] = {}
-    for name in _names(folder)[0]:
-        parts = _MESH_NAME.fullmatch(name)
-        if parts and (stem is None or parts[1] == stem) and is_mesh_frame(Path(folder) / name):
-            found.setdefault(parts[1], []).append(FrameFile(Path(folder) / name, int(parts[2]), False))
+    found = mesh_frames_by_name(folder, stem)
     if stem is not None and not found:
         raise HpcdemError(f"no frame {stem}_*.vtkhdf of blocks in {os.fspath(folder)}")
     most = max(found, key=lambda name: len(found[name]), default=None)
-    return sorted(found[most], key=lambda file: file.step) if most is not None else []
+    return found[most] if most is not None else []
+
+
+def mesh_frames_by_name(folder: str | os.PathLike, stem: str | None = None) -> dict[str, list[FrameFile]]:
+    """The same of all names that there are, or of one. Raises HpcdemError if the folder cannot be read."""
+    found: dict[str, list[FrameFile]] = {}
+    for name in _names(folder)[0]:
+        parts = _MESH_NAME.fullmatch(name)
+        if parts and (stem is None or parts[1] == stem) and _of_blocks(Path(folder) / name):
+            found.setdefault(parts[1], []).append(FrameFile(Path(folder) / name, int(parts[2]), False))
+    return {name: sorted(files, key=lambda file: file.step) for name, files in found.items()}
+
+
+def _of_blocks(path: Path) -> bool:
+    try:
+        return _known(path, path.stat().st_mtime_ns)
+    except OSError:  # gone in the meantime
+        return False
+
+
+@functools.lru_cache(maxsize=1 << 14)
+def _known(path: Path, changed: int) -> bool:
+    """Whether a file is a frame of blocks: those who follow a run ask every second."""
+    from hpcdem.io.vtkhdf_mesh import is_mesh_frame
+
+    return is_mesh_frame(path)
 
 
 def left_out(folder: str | os.PathLike) -> str:

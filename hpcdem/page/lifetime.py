@@ -52,9 +52,19 @@ def serve(
     values = values_of(request)
     drawing, files = Worker(newest_wins=True), Worker(newest_wins=False, longest=LONGEST_FILE)
     server = PageServer(texts(values, style or {}), calls(drawing, files, style or {}), port)
-    before = signal.signal(signal.SIGTERM, _stop)
     try:
         drawing.start()
+        live(server, browser, say)
+    finally:
+        drawing.close()
+        files.close()
+
+
+def live(server: PageServer, browser: bool, say: Callable[[str], None]) -> None:
+    """Answer until Ctrl-C or SIGTERM. browser: open one where a window can be opened; say: takes the lines for the
+    terminal."""
+    before = signal.signal(signal.SIGTERM, _stop)
+    try:
         say(f"Page: {server.url}")
         say("It is open to this machine only, and to those who know this address. Ctrl-C ends it.")
         if browser and can_open():
@@ -65,18 +75,21 @@ def serve(
     finally:
         signal.signal(signal.SIGTERM, before)
         server.server_close()
-        drawing.close()
-        files.close()
 
 
 def texts(values: dict[str, Any], style: Mapping[str, Any]) -> dict[str, Answer]:
     """What GET answers: the files of the page, and what it begins with."""
-    folder = resources.files("hpcdem.page") / "static"
-    found = {name: Answer((folder / name).read_bytes(), kind) for name, kind in KINDS.items()}
+    found = static(KINDS)
     return found | {
         "": found["index.html"],
         "start": as_json({"request": values, "limits": limits(), "falling": bool(style.get("falling"))}),
     }
+
+
+def static(kinds: Mapping[str, str]) -> dict[str, Answer]:
+    """Files of the page, by name, with their media types."""
+    folder = resources.files("hpcdem.page") / "static"
+    return {name: Answer((folder / name).read_bytes(), kind) for name, kind in kinds.items()}
 
 
 def limits() -> dict[str, Any]:

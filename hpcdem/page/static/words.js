@@ -95,6 +95,11 @@ export const WORDS = {
   },
 };
 
+/** More words, of another page: { en: {...}, zh: {...} }. */
+export function add(more) {
+  for (const code of Object.keys(WORDS)) Object.assign(WORDS[code], more[code]);
+}
+
 const KEPT = "hpcdem.language";
 let language = "en";
 

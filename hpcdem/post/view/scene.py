@@ -156,7 +156,7 @@ def scene(
     """Put a view of a frame together. only: numbers of the objects that may be shown, by kind. HpcdemError for what the
     frame does not have."""
     seen = seen_of(moment, view) if seen is None else seen
-    shifted = _shift(moment, view.deformed)
+    shifted = shift_of(moment, view.deformed)
     layers = [
         painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object))
         for layer in view.layers if layer.visible
@@ -164,7 +164,7 @@ def scene(
     return Scene(moment, view, seen, layers)
 
 
-def _shift(moment: Moment, factor: float) -> np.ndarray | None:
+def shift_of(moment: Moment, factor: float) -> np.ndarray | None:
     """(k, 2) [m] by which the points of elements are moved for the picture."""
     if factor == 1.0:
         return None

@@ -1,0 +1,151 @@
+"""Files that `hpcdem view` makes of what it shows: pictures, vectors, drawings, tables, pages, films."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import tempfile
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.io.frames import FrameFile
+from hpcdem.post import movie
+from hpcdem.post.view.model import ModelView
+from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
+from hpcdem.post.view.paper import Paper, draw
+from hpcdem.post.view.scene import Painted, common_spans, scene, seen_of
+
+FILMS = ("gif", "mp4")
+FORMATS = {
+    "png": "image/png", "svg": "image/svg+xml", "pdf": "application/pdf", "dxf": "image/vnd.dxf", "csv": "text/csv",
+    "html": "text/html", "gif": "image/gif", "mp4": "video/mp4",
+}  # fmt: skip
+"""Their media types."""
+PAPER = Paper(dpi=200.0)
+MOST_VECTORS = 20_000
+"""Objects of a page with vectors; with more it holds a picture of pixels."""
+_drawing = threading.Lock()
+"""Settings of matplotlib are those of the process."""
+
+
+def file(moment: Moment, view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
+    """A file of this kind of one frame. wanted: "label" of the layer of a table. Raises HpcdemError."""
+    if kind == "csv":
+        return table(moment, view, wanted.get("label"))
+    if kind == "dxf":
+        return drawing(moment, view)
+    if kind == "html":
+        return page(moment, view)
+    return _drawn(moment, view, kind)
+
+
+def _drawn(moment: Moment, view: ModelView, kind: str) -> bytes:
+    with tempfile.TemporaryDirectory() as folder, _drawing:
+        return draw(moment, Path(folder) / f"a.{kind}", view, PAPER).read_bytes()
+
+
+def table(moment: Moment, view: ModelView, label: Any) -> bytes:
+    """The objects that a layer shows, one per line: number, place, all fields and components of vectors."""
+    layer = view.layer(str(label)) if label else next((one for one in view.layers if one.visible), None)
+    if layer is None:
+        raise HpcdemError("no layer is chosen")
+    shown = scene(moment, view.changed(layers=[layer.model_dump() | {"visible": True}])).layers[0]
+    objects = moment.of(layer.object)
+    names = [name for name in objects.known() if name in objects.fields and name not in ("x", "y")]
+    columns = [np.asarray(objects.fields[name])[shown.rows] for name in names]
+    middle = objects.centres()[shown.rows]
+    titles = ["x", "y", *names]
+    columns = [middle[:, 0], middle[:, 1], *columns]
+    for name, values in objects.vectors.items():
+        titles += [f"{name}_x", f"{name}_y"]
+        columns += list(np.asarray(values)[shown.rows].T)
+    text = io.StringIO()
+    text.write(",".join(titles) + "\n")
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        text.write(",".join("" if value != value else repr(value) for value in row) + "\n")
+    return text.getvalue().encode()
+
+
+def drawing(moment: Moment, view: ModelView) -> bytes:
+    """DXF (R12) with a layer per layer: circles, filled polygons, lines, in the nearest of its 255 colours."""
+    try:
+        from ezdxf import colors
+        from ezdxf.addons import r12writer
+    except ImportError:
+        raise HpcdemError("DXF needs the package ezdxf, which is not installed: pip install 'hpcdem[mesh]'") from None
+    known = np.array([colors.aci2rgb(k) for k in range(1, 256)], float) / 255.0
+    text = io.StringIO()
+    with r12writer(text) as out:
+        for painted in scene(moment, view).layers:
+            near = 1 + np.array([((known - shade) ** 2).sum(axis=1).argmin() for shade in painted.shades], int)
+            _dxf_layer(out, painted, near)
+    return text.getvalue().encode()
+
+
+def _dxf_layer(out: Any, painted: Painted, near: np.ndarray) -> None:
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in painted.layer.label).upper() or "LAYER"
+    for k, kind in enumerate(painted.kind):
+        look = {"layer": name, "color": int(near[kind])}
+        if painted.kind_of_shape == DISCS:
+            out.add_circle(painted.shape[0][k], radius=painted.shape[1][k], **look)
+        elif painted.kind_of_shape == POLYGONS:
+            points, cells = painted.shape
+            out.add_3dface(points[cells[k][cells[k] >= 0]], **look)
+        else:
+            out.add_line(*painted.shape[0][k], **look)
+
+
+def page(moment: Moment, view: ModelView) -> bytes:
+    """One page that needs nothing else: the figure, which the wheel makes larger and the mouse moves."""
+    count = sum(len(layer.rows) for layer in scene(moment, view).layers)
+    if count <= MOST_VECTORS:
+        text = _drawn(moment, view, "svg").decode()
+        figure = text[text.index("<svg") :]
+    else:
+        figure = f'<img alt="" src="data:image/png;base64,{base64.b64encode(_drawn(moment, view, "png")).decode()}">'
+    title = html.escape(f"hpcdem, step {moment.step}, {moment.time:.6g} s")
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>\n'
+        "<style>body{margin:0;overflow:hidden;background:#fff}#f{transform-origin:0 0;cursor:grab;width:100vw}"
+        "#f>*{width:100vw;height:100vh;object-fit:contain}</style></head>\n"
+        f'<body><div id="f">{figure}</div>\n<script>\n{_MOVED}</script></body></html>\n'
+    ).encode()
+
+
+_MOVED = """const f = document.getElementById("f"); let s = 1, x = 0, y = 0, at = null;
+const put = () => { f.style.transform = `translate(${x}px,${y}px) scale(${s})`; };
+addEventListener("wheel", e => { e.preventDefault(); const k = Math.exp(-e.deltaY / 500);
+  x = e.clientX - k * (e.clientX - x); y = e.clientY - k * (e.clientY - y); s *= k; put(); }, { passive: false });
+addEventListener("pointerdown", e => { e.preventDefault(); at = [e.clientX - x, e.clientY - y]; });
+addEventListener("pointermove", e => { if (at) { x = e.clientX - at[0]; y = e.clientY - at[1]; put(); } });
+addEventListener("pointerup", () => { at = null; });
+addEventListener("dblclick", () => { s = 1; x = y = 0; put(); });
+"""
+
+
+def film(files: Sequence[FrameFile], view: ModelView, kind: str, wanted: dict[str, Any]) -> bytes:
+    """All frames at one place and with one range of colours. Raises HpcdemError."""
+    fps = wanted.get("fps", 10)
+    if not isinstance(fps, (int, float)) or isinstance(fps, bool) or not 0.1 <= fps <= 60.0:
+        raise HpcdemError("fps: expected a number from 0.1 to 60")
+    ranges = common_spans((read_moment(file.path) for file in files), view)
+    view = view.changed(layers=[
+        {**layer.model_dump(), "limits": ranges.get(layer.label, layer.limits)} for layer in view.layers
+    ])  # fmt: skip
+    if view.camera is None and files:
+        seen = seen_of(read_moment(files[-1].path), view)
+        view = view.changed(camera=(seen.left, seen.right, seen.bottom, seen.top))
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = []
+        for k, one in enumerate(files):
+            with _drawing:
+                pictures.append(draw(one.path, Path(folder) / f"{k:06d}.png", view, Paper(dpi=150.0)))
+        path = Path(folder) / f"film.{kind}"
+        (movie.write_gif if kind == "gif" else movie.write_mp4)(pictures, path, float(fps))
+        return path.read_bytes()

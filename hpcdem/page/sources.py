@@ -1,0 +1,171 @@
+"""What `hpcdem view` shows: frames of folders and single files, which grow while a run goes on, and its histories."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError
+from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
+from hpcdem.post.view.moment import Moment, read_moment
+from hpcdem.runtime import run_folder
+
+MOMENTS = 3
+"""Frames that are kept in memory: one on show, and its neighbours."""
+POINTS = 2000
+"""Points of a history that the page gets at most."""
+SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}
+
+
+@dataclass
+class Source:
+    """Frames that follow each other. folder: None for a single file."""
+
+    name: str
+    folder: Path | None
+    frames: list[FrameFile] = field(default_factory=list)
+
+
+class Sources:
+    """All that was named on the command line. HpcdemError where there is nothing to show."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.paths = list(paths)
+        self.found: list[Source] = []
+        self.moments: OrderedDict[tuple[str, int, int], Moment] = OrderedDict()
+        self.lock = threading.Lock()
+        self.look()
+        for path in self.paths:
+            if path.is_dir() and run_folder.running(path) is None and not any(s.folder == path for s in self.found):
+                raise HpcdemError(f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {path}")
+
+    def look(self) -> None:
+        """See which frames there are now."""
+        found: list[Source] = []
+        for path in self.paths:
+            if not path.is_dir():
+                if not path.is_file():
+                    raise HpcdemError(f"cannot read {path}: there is no such file")
+                found.append(Source(path.name, None, [FrameFile(path, read_moment(path).step, False)]))
+                continue
+            label = path.resolve().name
+            if files := list_frames(path):
+                found.append(Source(f"{label}: all", path, files))
+            for stem, files in mesh_frames_by_name(path).items():
+                found.append(Source(f"{label}: {stem}", path, files))
+        self.found = found
+
+    def source(self, number: Any) -> Source:
+        """One of them, by its place. HpcdemError if there is none."""
+        if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(self.found):
+            raise HpcdemError("there are no such frames")
+        return self.found[number]
+
+    def frame(self, number: Any, place: Any) -> FrameFile:
+        """A frame by its source and its place, -1 the last. HpcdemError if there is none."""
+        frames = self.source(number).frames
+        if not isinstance(place, int) or isinstance(place, bool) or not -1 <= place < len(frames) or not frames:
+            raise HpcdemError("there is no such frame")
+        return frames[place]
+
+    def moment(self, file: FrameFile) -> tuple[tuple[str, int, int], Moment]:
+        """What a frame holds, and by what it is known: a file that was written again is another. HpcdemError."""
+        try:
+            status = os.stat(file.path)
+        except OSError:
+            raise HpcdemError(f"cannot read {file.path}: there is no such file") from None
+        key = str(file.path), status.st_mtime_ns, status.st_size
+        with self.lock:
+            if key not in self.moments:
+                self.moments[key] = read_moment(file.path)
+                while len(self.moments) > MOMENTS:
+                    self.moments.popitem(last=False)
+            self.moments.move_to_end(key)
+            return key, self.moments[key]
+
+    # ---- the run ---------------------------------------------------------------------------------------------------
+
+    def folders(self) -> list[Path]:
+        """Each folder once."""
+        return [path for path in self.paths if path.is_dir()]
+
+    def state(self) -> dict[str, Any]:
+        """Frames by source, and of the first folder whether a run writes there, how far it is, and its histories."""
+        self.look()
+        told: dict[str, Any] = {
+            "sources": [
+                {"name": source.name, "frames": [[file.step, file.ini] for file in source.frames]}
+                for source in self.found
+            ],
+            "run": None,
+            "histories": [],
+        }
+        for folder in self.folders()[:1]:
+            told["histories"] = sorted(path.name for path in folder.glob("history_*.csv"))
+            told["run"] = _run(folder)
+        return told
+
+    def history(self, name: Any) -> dict[str, Any]:
+        """Columns of a history: names, and at most POINTS values each. HpcdemError if it cannot be read."""
+        folder = next(iter(self.folders()), None)
+        if folder is None or name not in {path.name for path in folder.glob("history_*.csv")}:
+            raise HpcdemError("there is no such history")
+        try:
+            with open(folder / name, encoding="utf-8") as file:
+                titles = file.readline().strip().split(",")
+                rows = np.loadtxt(file, delimiter=",", ndmin=2)
+        except (OSError, ValueError) as problem:
+            raise HpcdemError(f"cannot read {name}: {problem}") from None
+        if len(rows) > POINTS:
+            rows = rows[np.unique(np.linspace(0, len(rows) - 1, POINTS).round().astype(int))]
+        columns = rows.T if len(rows) else np.zeros((len(titles), 0))
+        return {
+            "titles": titles,
+            "columns": [[float(v) if np.isfinite(v) else None for v in column] for column in columns],
+        }
+
+    def tell(self, what: Any) -> str:
+        """Ask the run that writes into the first folder to stop after a checkpoint, or to save one: the same signals as
+        from a terminal. HpcdemError where none runs on this machine."""
+        if what not in SIGNALS:
+            raise HpcdemError("a run can be told to stop or to save")
+        folder = next(iter(self.folders()), None)
+        holder = None if folder is None else run_folder.running(folder)
+        if holder is None:
+            raise HpcdemError("no run writes into this folder now")
+        if holder.get("host") != socket.gethostname() or not isinstance(holder.get("pid"), int):
+            raise HpcdemError(
+                f"the run is on {holder.get('host', 'another machine')}: send it {SIGNALS[what].name} there"
+            )
+        try:
+            os.kill(holder["pid"], SIGNALS[what])
+        except OSError as problem:
+            raise HpcdemError(f"process {holder['pid']} cannot be reached: {problem.strerror}") from None
+        return f"process {holder['pid']}: {SIGNALS[what].name}"
+
+
+def _run(folder: Path) -> dict[str, Any] | None:
+    """What run.json says, and who holds the folder."""
+    try:
+        record = run_folder.read(folder)
+    except HpcdemError as problem:
+        return {"state": str(problem), "running": False}
+    holder = run_folder.running(folder)
+    if record is None and holder is None:
+        return None
+    state = record.state if record is not None else "running"
+    if state == "running" and holder is None:
+        state = "killed"
+    return {
+        "state": state, "running": holder is not None, "script": Path(record.script).name if record is not None else "",
+        "step": record.step if record is not None else 0, "host": (holder or {}).get("host", ""),
+    }  # fmt: skip

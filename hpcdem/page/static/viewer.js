@@ -1,0 +1,779 @@
+// The viewer: windows on frames. The camera lives here; the server draws what it is asked for (viewer.py). One picture is
+// under way per window, the newest wish wins; while something moves they are JPEG, at rest one finer PNG follows.
+
+import { ask, Refusal } from "./server.js";
+import * as words from "./words.js";
+import "./viewer_words.js";
+
+const { say } = words;
+const $ = (id) => document.getElementById(id);
+const FILES = ["png", "svg", "pdf", "dxf", "csv", "html", "gif", "mp4", "mv"];
+const REST = 180;  // ms without a wish after which the fine picture is asked for
+const LOOK = 1200;  // ms between two looks at the folder
+
+let about = null;  // objects, colours, first view
+let state = { sources: [], run: null, histories: [] };
+let windows = [];
+let current = null;
+let playing = null;
+let theme = "auto";
+let drawn = 0;
+let history = null;
+
+// ---- asking ----------------------------------------------------------------------------------------------------------
+
+async function json(name, content) { return (await ask(name, content)).json(); }
+
+function complain(error) {
+  const text = error instanceof Refusal ? error.message : say("no_server", { why: error.message });
+  told(text, true);
+}
+
+function told(text, bad = false) {
+  $("message").textContent = text;
+  $("message").classList.toggle("bad", bad);
+}
+
+async function unpacked(response) {
+  const bytes = await response.arrayBuffer();
+  const length = new DataView(bytes).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
+  const { offset, count } = header.arrays[0];
+  header.image = new Blob([new Uint8Array(bytes, 4 + length + offset, count)], { type: header.kind });
+  return header;
+}
+
+// ---- a window --------------------------------------------------------------------------------------------------------
+
+class Window {
+  constructor(view, camera, source, frame) {
+    this.view = structuredClone(view);
+    this.camera = { ...camera };
+    this.source = source;
+    this.frame = frame;
+    this.root = document.createElement("div");
+    this.root.className = "window";
+    this.root.innerHTML = '<canvas tabindex="0" role="img"></canvas><canvas class="over"></canvas>' +
+      '<p class="caption"></p><div class="legend"></div>';
+    [this.canvas, this.over] = this.root.querySelectorAll("canvas");
+    this.shown = null;  // header and camera of the picture on the canvas
+    this.busy = false;
+    this.wish = null;
+    this.points = [];
+    listen(this);
+  }
+
+  get size() {
+    const k = Math.min(window.devicePixelRatio || 1, 2);
+    return [Math.max(1, Math.round(this.root.clientWidth * k)), Math.max(1, Math.round(this.root.clientHeight * k))];
+  }
+
+  /** Left, right, bottom, top of what a window of this size shows. */
+  get box() {
+    const [w, h] = this.size;
+    const half = this.camera.width / 2;
+    return [this.camera.x - half, this.camera.x + half, this.camera.y - half * h / w, this.camera.y + half * h / w];
+  }
+
+  request(fine) {
+    const [width, height] = this.size;
+    return { source: this.source, frame: this.frame, view: { ...this.view, camera: this.box }, width, height, fine,
+      dark: document.documentElement.dataset.theme === "dark" };
+  }
+
+  redraw(fine = false) {
+    this.wish = { fine };
+    clearTimeout(this.rest);
+    if (!this.busy) this.fetch();
+    else this.stretch();
+  }
+
+  async fetch() {
+    if (!this.root.isConnected || !this.wish) return;
+    const { fine } = this.wish;
+    this.wish = null;
+    this.busy = true;
+    this.stretch();
+    const began = performance.now();
+    const wanted = this.request(fine);
+    try {
+      const header = await unpacked(await ask("picture", wanted));
+      const image = await createImageBitmap(header.image);
+      this.shown = { header, image, box: wanted.view.camera };
+      this.put();
+      $("pictures").textContent = say("picture", { ms: Math.round(performance.now() - began) });
+      document.body.dataset.pictures = ++drawn;
+      document.body.dataset.fine = fine;
+      if (this.failed) { told(""); this.failed = false; }
+    } catch (error) { this.failed = true; complain(error); }
+    this.busy = false;
+    if (this.wish) this.fetch();
+    else if (!fine && !this.failed) this.rest = setTimeout(() => this.redraw(true), REST);
+  }
+
+  /** The last picture, moved to where it belongs now. */
+  stretch() {
+    if (!this.shown) return;
+    const [w, h] = this.size;
+    if (this.canvas.width !== w || this.canvas.height !== h) { this.canvas.width = w; this.canvas.height = h; }
+    const [left, right, bottom, top] = this.box;
+    const [l, r, b, t] = this.shown.box;
+    const pen = this.canvas.getContext("2d");
+    pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
+    pen.fillRect(0, 0, w, h);
+    const k = w / (right - left);
+    pen.drawImage(this.shown.image, (l - left) * k, (top - t) * k, (r - l) * k, (t - b) * k);
+    this.marks();
+  }
+
+  put() {
+    const { header } = this.shown;
+    this.stretch();
+    this.root.querySelector(".caption").textContent = header.title;
+    this.canvas.setAttribute("aria-label", `${say("model")}: ${header.title}`);
+    legend(this.root.querySelector(".legend"), this.view.legend ? header.legend : []);
+    if (this === current) { counts(); moment(); }
+  }
+
+  marks() {
+    const [w, h] = this.size;
+    if (this.over.width !== w || this.over.height !== h) { this.over.width = w; this.over.height = h; }
+    const pen = this.over.getContext("2d");
+    pen.clearRect(0, 0, w, h);
+    if (!this.points.length) return;
+    const [left, right, , top] = this.box;
+    const k = w / (right - left);
+    pen.strokeStyle = pen.fillStyle = "#d0562a";
+    pen.lineWidth = 2;
+    pen.beginPath();
+    this.points.forEach(([x, y], n) => pen[n ? "lineTo" : "moveTo"]((x - left) * k, (top - y) * k));
+    pen.stroke();
+    for (const [x, y] of this.points) { pen.beginPath(); pen.arc((x - left) * k, (top - y) * k, 4, 0, 7); pen.fill(); }
+  }
+
+  at(event) {
+    const rect = this.canvas.getBoundingClientRect();
+    const [w, h] = this.size;
+    const u = (event.clientX - rect.left) / rect.width, v = (event.clientY - rect.top) / rect.height;
+    const [left, right, bottom, top] = this.box;
+    return { x: left + u * (right - left), y: top - v * (top - bottom), column: Math.min(w - 1, Math.floor(u * w)),
+      row: Math.min(h - 1, Math.floor(v * h)) };
+  }
+
+  fit() {
+    const [left, right, bottom, top] = about.whole;
+    const [w, h] = this.size;
+    this.camera = { x: (left + right) / 2, y: (bottom + top) / 2, width: Math.max(right - left, (top - bottom) * w / h) };
+  }
+}
+
+function moved(one) {
+  const some = $("linked").checked ? windows : [one];
+  for (const other of some) { if (other !== one) other.camera = { ...one.camera }; other.redraw(); }
+}
+
+function zoomed(one, k, at = null) {
+  const centre = at ?? { x: one.camera.x, y: one.camera.y };
+  one.camera.x = centre.x + (one.camera.x - centre.x) * k;
+  one.camera.y = centre.y + (one.camera.y - centre.y) * k;
+  one.camera.width *= k;
+  moved(one);
+}
+
+function listen(one) {
+  let drag = null;
+  const { canvas } = one;
+  canvas.addEventListener("pointerdown", (event) => {
+    choose(one);
+    canvas.focus({ preventScroll: true });
+    if (event.button === 0 && $("mode").value === "query") { query(one, one.at(event)); return; }
+    if (event.button === 0 && $("mode").value === "distance") { measure(one, one.at(event)); return; }
+    drag = { x: event.clientX, y: event.clientY, camera: { ...one.camera } };
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const { x, y } = one.at(event);
+    $("place").textContent = `x ${short(x)}  y ${short(y)} m`;
+    if (!drag) return;
+    const k = one.camera.width / canvas.clientWidth;
+    if (event.clientX === drag.x && event.clientY === drag.y) return;
+    one.camera.x = drag.camera.x - (event.clientX - drag.x) * k;
+    one.camera.y = drag.camera.y + (event.clientY - drag.y) * k;
+    moved(one);
+  });
+  const end = () => { drag = null; };
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", end);
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoomed(one, Math.exp(Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 240) / 600), one.at(event));
+  }, { passive: false });
+  canvas.addEventListener("dblclick", () => { if (!$("answer").hidden && $("mode").value === "query") copy(); });
+}
+
+function short(value, digits = 6) {
+  const size = Math.abs(value);
+  if (size >= 1e5 || (size && size < 1e-3)) return value.toExponential(digits - 1).replace(/\.?0*e\+?/, "e");
+  return Number(value.toPrecision(digits)).toString();
+}
+
+// ---- legend ----------------------------------------------------------------------------------------------------------
+
+function legend(root, parts) {
+  root.replaceChildren(...parts.map((part) => {
+    const box = document.createElement("div");
+    if (part.classes) {
+      for (const [word, colour] of part.classes) {
+        const line = document.createElement("span");
+        const swatch = document.createElement("span");
+        swatch.className = "swatch";
+        swatch.style.background = colour;
+        line.append(swatch, word, document.createElement("br"));
+        box.append(line);
+      }
+      return box;
+    }
+    const bar = document.createElement("canvas");
+    bar.width = 150; bar.height = 10;
+    gradient(bar, part.colours);
+    const ends = document.createElement("span");
+    ends.className = "ends";
+    for (const value of [part.low, part.high]) {
+      const end = document.createElement("span");
+      end.textContent = short(value, 4);
+      ends.append(end);
+    }
+    box.append(part.log ? `${part.title}, log` : part.title, bar, ends);
+    return box;
+  }));
+}
+
+function gradient(canvas, name) {
+  const pen = canvas.getContext("2d");
+  const fill = pen.createLinearGradient(0, 0, canvas.width, 0);
+  const stops = about.colours[name];
+  stops.forEach((colour, k) => fill.addColorStop(k / (stops.length - 1), colour));
+  pen.fillStyle = fill;
+  pen.fillRect(0, 0, canvas.width, canvas.height);
+}
+
+// ---- objects and their properties ------------------------------------------------------------------------------------
+
+let chosen = "";
+const label = (layer) => layer.name || layer.object;
+const spoken = (layer) => layer.name || say(layer.object);
+const layer = () => current?.view.layers.find((one) => label(one) === chosen);
+
+function tree() {
+  const list = current.view.layers;
+  if (!layer()) chosen = list.length ? label(list[0]) : "";
+  $("tree").replaceChildren(...[...list].reverse().map((one) => {
+    const item = document.createElement("li");
+    item.role = "option";
+    item.tabIndex = 0;
+    item.dataset.layer = label(one);
+    item.setAttribute("aria-selected", label(one) === chosen);
+    item.classList.toggle("missing", !(one.object in about.objects));
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = one.visible;
+    box.setAttribute("aria-label", spoken(one));
+    box.addEventListener("change", () => change({ visible: box.checked }, label(one)));
+    const count = document.createElement("small");
+    count.dataset.count = label(one);
+    item.append(box, spoken(one), count);
+    const take = () => { chosen = label(one); tree(); };
+    item.addEventListener("click", (event) => { if (event.target !== box) take(); });
+    item.addEventListener("keydown", (event) => { if (event.key === "Enter") take(); });
+    return item;
+  }));
+  counts();
+  properties();
+}
+
+function counts() {
+  const shown = current?.shown?.header.shown ?? {};
+  for (const mark of $("tree").querySelectorAll("[data-count]")) {
+    const name = mark.dataset.count;
+    const all = about.objects[current.view.layers.find((one) => label(one) === name)?.object];
+    mark.textContent = name in shown ? (shown[name] === all ? all : say("part", { shown: shown[name], all })) : "";
+  }
+}
+
+function options(select, pairs, value) {
+  select.replaceChildren(...pairs.map(([key, text]) => new Option(text, key)));
+  select.value = value;
+}
+
+let asked = 0;
+async function properties() {
+  const one = layer();
+  $("properties").hidden = !one;
+  if (!one) return;
+  $("properties-title").textContent = spoken(one);
+  for (const name of ["opacity", "size", "arrows", "filter"]) $(name).value = one[name];
+  for (const name of ["log", "edges"]) $(name).checked = one[name];
+  $("own").checked = one.colour !== "";
+  $("colour").value = one.colour || "#2f7fb5";
+  $("low").value = one.limits?.[0] ?? "";
+  $("high").value = one.limits?.[1] ?? "";
+  options($("colours"), Object.keys(about.colours).map((name) => [name, name]), one.colours);
+  const mine = ++asked;
+  let found = { fields: [], vectors: [] };
+  try {
+    if (one.object in about.objects) found = await json("fields", { source: current.source, frame: current.frame, object: one.object });
+  } catch (error) { complain(error); }
+  if (mine !== asked) return;
+  const fields = found.fields.map(([name, unit]) => [name, unit ? `${name} (${unit})` : name]);
+  if (one.field && !fields.some(([name]) => name === one.field)) fields.push([one.field, one.field]);
+  options($("field"), [["", say("own_colours")], ...fields], one.field);
+  options($("vectors"), [["", say("none")], ...found.vectors.map((name) => [name, name])], one.vectors);
+}
+
+function change(values, name = chosen) {
+  const one = current.view.layers.find((other) => label(other) === name);
+  if (!one) return;
+  Object.assign(one, values);
+  current.redraw();
+  if ("visible" in values) tree();
+}
+
+function limits() {
+  const [low, high] = ["low", "high"].map((id) => $(id).value.trim());
+  if (!low && !high) { change({ limits: null }); return; }
+  const scale = current.shown?.header.legend.find((part) => part.label === chosen && "low" in part);
+  const found = [low === "" ? scale?.low : Number(low), high === "" ? scale?.high : Number(high)];
+  change({ limits: found.every((value) => typeof value === "number") ? found.map((v) => (Number.isFinite(v) ? v : String(v))) : null });
+}
+
+function add() {
+  const object = $("add").value;
+  $("add").value = "";
+  if (!object) return;
+  const names = current.view.layers.map(label);
+  let name = "";
+  for (let k = 2; names.includes(name || object); k++) name = `${object} ${k}`;
+  current.view.layers.push({ ...structuredClone(BLANK), object, name });
+  chosen = name || object;
+  tree();
+  current.redraw();
+}
+
+const BLANK = { name: "", visible: true, field: "", limits: null, log: false, colours: "viridis", colour: "", opacity: 1,
+  edges: false, size: 1, vectors: "", arrows: 1, filter: "" };
+
+function remove() {
+  current.view.layers = current.view.layers.filter((one) => label(one) !== chosen);
+  tree();
+  current.redraw();
+}
+
+function rename() {
+  const one = layer();
+  const name = one && prompt(say("new_name", { name: spoken(one) }), spoken(one));
+  if (!name || current.view.layers.some((other) => other !== one && label(other) === name)) return;
+  one.name = name;
+  chosen = label(one);
+  tree();
+  current.redraw();
+}
+
+function shift(step) {
+  const list = current.view.layers;
+  const from = list.findIndex((one) => label(one) === chosen);
+  const to = from + step;
+  if (from < 0 || to < 0 || to >= list.length) return;
+  [list[from], list[to]] = [list[to], list[from]];
+  tree();
+  current.redraw();
+}
+
+// ---- asking what is there --------------------------------------------------------------------------------------------
+
+async function query(one, at) {
+  try {
+    const found = await json("pick", { ...one.request(false), column: at.column, row: at.row });
+    one.points = found.object ? [[found.x, found.y]] : [];
+    one.marks();
+    $("answer").hidden = !found.object;
+    if (!found.object) { told(say("nothing")); return; }
+    told("");
+    $("answer-title").textContent = say("number", { object: found.label === found.object ? say(found.object) : found.label, number: found.number });
+    const rows = [["x", short(found.x), "m"], ["y", short(found.y), "m"], ...found.values.filter(([name]) => name !== "x" && name !== "y")];
+    $("values").replaceChildren(...rows.map(([name, value, unit]) => {
+      const row = document.createElement("tr");
+      for (const text of [name, `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
+        const cell = document.createElement("td");
+        cell.textContent = text;
+        row.append(cell);
+      }
+      return row;
+    }));
+    $("answer").scrollIntoView({ block: "nearest" });
+  } catch (error) { complain(error); }
+}
+
+function measure(one, at) {
+  if (one.points.length !== 1) { one.points = [[at.x, at.y]]; told(say("first_point")); one.marks(); return; }
+  one.points.push([at.x, at.y]);
+  const [[x0, y0], [x1, y1]] = one.points;
+  told(say("distance", { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) }));
+  one.marks();
+}
+
+async function copy() {
+  const lines = [...$("values").rows].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t"));
+  try {
+    await navigator.clipboard.writeText([$("answer-title").textContent, ...lines].join("\n"));
+    told(say("copied"));
+  } catch { told(say("not_copied"), true); }
+}
+
+// ---- windows ---------------------------------------------------------------------------------------------------------
+
+function choose(one) {
+  if (current === one) return;
+  current = one;
+  for (const other of windows) other.root.classList.toggle("current", other === one);
+  tree();
+  controls();
+}
+
+function split() {
+  const kind = $("split").value;
+  const count = { 1: 1, 2: 2, "2v": 2, 4: 4 }[kind];
+  while (windows.length > count) windows.pop().root.remove();
+  if (!windows.includes(current)) current = null;
+  const like = current ?? windows[0];
+  while (windows.length < count) {
+    windows.push(new Window(like.view, like.camera, like.source, like.frame));
+    $("windows").append(windows.at(-1).root);
+  }
+  $("windows").dataset.split = kind;
+  choose(current ?? windows[0]);
+  for (const one of windows) one.redraw();
+}
+
+// ---- time ------------------------------------------------------------------------------------------------------------
+
+const frames = () => state.sources[current?.source]?.frames ?? [];
+
+function controls() {
+  const n = frames().length;
+  $("slider").max = Math.max(n - 1, 0);
+  $("slider").value = current.frame;
+  $("slider").setAttribute("aria-valuetext", `${frames()[current.frame]?.[0] ?? ""}`);
+  $("source").value = current.source;
+  $("deformed").value = current.view.deformed;
+  $("deformed").disabled = !about.displaced;
+  $("title").value = current.view.title;
+}
+
+function moment() {
+  const { header } = current.shown;
+  $("moment").textContent = say("moment", { step: header.step, time: short(header.time) });
+  chart();
+}
+
+function go(frame) {
+  const n = frames().length;
+  const to = Math.min(Math.max(frame, 0), n - 1);
+  for (const one of $("linked").checked ? windows : [current]) {
+    const last = (state.sources[one.source]?.frames.length ?? 1) - 1;
+    one.frame = Math.min(to, last);
+    one.redraw();
+  }
+  controls();
+}
+
+function play() {
+  if (playing) { clearTimeout(playing); playing = null; } else if (frames().length > 1) {
+    if (current.frame >= frames().length - 1) go(0);
+    const step = () => {
+      if (!current.busy) {
+        if (current.frame >= frames().length - 1) { playing = null; label_play(); return; }
+        go(current.frame + 1);
+      }
+      playing = setTimeout(step, 1000 / Number($("speed").value));
+    };
+    playing = setTimeout(step, 0);
+  }
+  label_play();
+}
+
+function label_play() {
+  $("play").textContent = playing ? "⏸" : "▶";
+  $("play").setAttribute("aria-label", say(playing ? "pause" : "play"));
+}
+
+// ---- a run that goes on ----------------------------------------------------------------------------------------------
+
+async function look() {
+  try {
+    const before = state.sources.map((source) => source.frames.length);
+    state = await json("state", {});
+    sources();
+    if (!about && state.sources.length) await begin();
+    if (about) {
+      windows.forEach((one) => {
+        const n = state.sources[one.source]?.frames.length ?? 0;
+        if ($("follow").checked && one.frame === before[one.source] - 1 && n > before[one.source]) {
+          one.frame = n - 1;
+          one.redraw();
+        }
+      });
+      controls();
+      histories();
+    }
+    run();
+  } catch (error) { complain(error); }
+  setTimeout(look, LOOK);
+}
+
+function run() {
+  const { run: found } = state;
+  $("run").hidden = !found;
+  if (!found) return;
+  const key = found.running ? "running" : found.state;
+  const text = say(`state_${key}`, { host: found.host, step: found.step });
+  const n = frames().length;
+  $("run-state").textContent = `${found.script && `${found.script}: `}${text.startsWith("state_") ? found.state : text}, ${say("frames", { n })}`;
+  for (const id of ["stop", "checkpoint"]) $(id).disabled = !found.running;
+}
+
+async function tell(what) {
+  if (what === "stop" && !confirm(say("stop_sure"))) return;
+  try { told((await json("tell", { what })).said); } catch (error) { complain(error); }
+}
+
+function sources() {
+  const names = state.sources.map((source, k) => [k, source.name]);
+  const same = [...$("source").options].map((o) => o.text).join() === names.map(([, name]) => name).join();
+  if (!same) options($("source"), names, current?.source ?? 0);
+}
+
+// ---- histories -------------------------------------------------------------------------------------------------------
+
+let read = "";
+async function histories() {
+  const names = state.histories.map((name) => [name, name.replace(/^history_|\.csv$/g, "")]);
+  const same = $("history").options.length === names.length + 1;
+  if (!same) options($("history"), [["", say("none")], ...names], $("history").value);
+  if ($("history").value && (state.run?.running || read !== $("history").value)) await load();
+}
+
+async function load() {
+  const name = $("history").value;
+  $("chart").hidden = !name;
+  read = name;
+  if (!name) { history = null; return; }
+  try { history = await json("history", { name }); chart(); } catch (error) { complain(error); }
+}
+
+function chart() {
+  if (!history || $("chart").hidden) return;
+  const canvas = $("chart"), pen = canvas.getContext("2d"), style = getComputedStyle(document.documentElement);
+  const k = 2;
+  canvas.width = 280 * k; canvas.height = 150 * k;
+  pen.scale(k, k);
+  const [steps, times, values] = history.columns;
+  const points = steps.map((step, n) => [times[n], values[n], step]).filter(([t, v]) => t !== null && v !== null);
+  pen.font = "10px system-ui, sans-serif";
+  pen.fillStyle = style.getPropertyValue("--faint");
+  pen.fillText(history.titles[2] ?? "", 4, 11);
+  canvas.setAttribute("aria-label", say("chart", { name: history.titles[2] ?? "" }));
+  if (!points.length) return;
+  const [t0, t1] = [points[0][0], points.at(-1)[0]];
+  const low = Math.min(...points.map((p) => p[1])), high = Math.max(...points.map((p) => p[1]));
+  const x = (t) => 8 + 264 * (t - t0) / (t1 - t0 || 1), y = (v) => 132 - 112 * (v - low) / (high - low || 1);
+  pen.fillText(short(high, 4), 4, 23);
+  pen.fillText(short(low, 4), 4, 144);
+  pen.textAlign = "right";
+  pen.fillText(`${short(t1, 4)} s`, 276, 144);
+  pen.textAlign = "left";
+  pen.strokeStyle = style.getPropertyValue("--accent");
+  pen.lineWidth = 1.3;
+  pen.beginPath();
+  points.forEach(([t, v], n) => pen[n ? "lineTo" : "moveTo"](x(t), y(v)));
+  pen.stroke();
+  const now = current?.shown?.header.time;
+  if (now >= t0 && now <= t1) {
+    pen.strokeStyle = style.getPropertyValue("--reached");
+    pen.beginPath(); pen.moveTo(x(now), 16); pen.lineTo(x(now), 134); pen.stroke();
+  }
+}
+
+// ---- files -----------------------------------------------------------------------------------------------------------
+
+async function save(format) {
+  if (format === "clip") { await clip(); return; }
+  const step = current.shown?.header.step ?? 0;
+  const name = format === "mv" ? "view.mv" : `view_${String(step).padStart(10, "0")}.${format}`;
+  told(say("saving", { name }));
+  try {
+    const view = { ...current.view, camera: current.box };
+    const blob = await (await ask("file", { source: current.source, frame: current.frame, view, format, label: chosen,
+      fps: Number($("speed").value) })).blob();
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+    told(say("saved", { name, size: Math.ceil(blob.size / 1024) }));
+  } catch (error) { complain(error); }
+}
+
+async function clip() {
+  try {
+    const blob = await new Promise((done) => { current.canvas.toBlob(done, "image/png"); });
+    await navigator.clipboard.write([new ClipboardItem({ "image/png": blob })]);
+    told(say("copied"));
+  } catch { told(say("not_copied"), true); }
+}
+
+async function open(file) {
+  try {
+    const view = await json("view", { view: JSON.parse(await file.text()) });
+    const { camera } = view;
+    current.view = { ...view, camera: null };
+    if (camera) {
+      const [w, h] = current.size;
+      current.camera = { x: (camera[0] + camera[1]) / 2, y: (camera[2] + camera[3]) / 2,
+        width: Math.max(camera[1] - camera[0], (camera[3] - camera[2]) * w / h) };
+    }
+    tree(); controls();
+    current.redraw();
+    told(say("opened", { name: file.name }));
+  } catch (error) { told(`${file.name}: ${error.message}`, true); }
+}
+
+// ---- the page --------------------------------------------------------------------------------------------------------
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+function paint() {
+  document.documentElement.dataset.theme = theme === "auto" ? (dark.matches ? "dark" : "light") : theme;
+  $("theme").textContent = say(`theme_${theme}`);
+  for (const one of windows) one.redraw();
+}
+
+function speak() {
+  words.translate();
+  $("language").textContent = say("language");
+  $("language").lang = say("language_code");
+  options($("save"), [["", say("save_as")], ...[...FILES, "clip"].map((kind) => [kind, say(`save_${kind}`)])], "");
+  if (about) {
+    options($("add"), [["", say("add")], ...about.order.filter((name) => name in about.objects).map((name) => [name, say(name)])], "");
+    tree(); controls(); run();
+  }
+  label_play();
+  paint();
+}
+
+async function begin() {
+  about = await json("about", { source: 0, frame: -1 });
+  const { camera, step, ...view } = about.view;
+  view.camera = null;
+  const list = state.sources[0].frames;
+  const found = step === null ? -1 : list.findIndex(([one]) => one === step);
+  windows = [new Window(view, { x: 0, y: 0, width: 1 }, 0, found < 0 ? list.length - 1 : found)];
+  $("windows").append(windows[0].root);
+  windows[0].fit();
+  if (camera) windows[0].camera = { x: (camera[0] + camera[1]) / 2, y: (camera[2] + camera[3]) / 2, width: camera[1] - camera[0] };
+  choose(windows[0]);
+  speak();
+  connect();
+  new ResizeObserver(() => { for (const one of windows) one.redraw(); }).observe($("windows"));
+}
+
+async function switched() {
+  const source = Number($("source").value);
+  try {
+    about = { ...await json("about", { source, frame: -1 }), colours: about.colours };
+    current.source = source;
+    current.frame = frames().length - 1;
+    current.view = { ...about.view, camera: null };
+    current.fit();
+    speak();
+    current.redraw();
+  } catch (error) { complain(error); }
+}
+
+function key(event) {
+  if (event.target.matches("input:not([type=checkbox]):not([type=range]), select, textarea") || event.ctrlKey || event.metaKey) return;
+  const step = current ? current.camera.width / 10 : 0;
+  const pan = (dx, dy) => { current.camera.x += dx; current.camera.y += dy; moved(current); };
+  const mode = (name) => { $("mode").value = name; modes(); };
+  const actions = {
+    "+": () => zoomed(current, 0.8), "=": () => zoomed(current, 0.8), "-": () => zoomed(current, 1.25),
+    0: () => { current.fit(); moved(current); }, ",": () => go(current.frame - 1), ".": () => go(current.frame + 1),
+    " ": play, q: () => mode("query"), d: () => mode("distance"), m: () => mode("move"), Escape: () => mode("move"),
+    ArrowLeft: () => pan(-step, 0), ArrowRight: () => pan(step, 0), ArrowUp: () => pan(0, step), ArrowDown: () => pan(0, -step),
+  };
+  const onSlider = event.target.matches("input[type=range]") && event.key.startsWith("Arrow");
+  const onButton = event.target.matches("button, input") && event.key === " ";
+  if (!current || !(event.key in actions) || onSlider || onButton) return;
+  event.preventDefault();
+  actions[event.key]();
+}
+
+function modes() {
+  for (const one of windows) { one.root.dataset.mode = $("mode").value; one.points = []; one.marks(); }
+}
+
+function connect() {
+  const on = (id, event, action) => $(id).addEventListener(event, action);
+  on("field", "change", () => { change({ field: $("field").value, limits: null }); $("low").value = $("high").value = ""; });
+  for (const id of ["low", "high"]) on(id, "change", limits);
+  for (const id of ["log", "edges"]) on(id, "change", () => change({ [id]: $(id).checked }));
+  for (const id of ["colours", "vectors"]) on(id, "change", () => change({ [id]: $(id).value }));
+  for (const id of ["opacity", "size", "arrows"]) on(id, "input", () => { if ($(id).value) change({ [id]: Number($(id).value) }); });
+  const own = () => change({ colour: $("own").checked ? $("colour").value : "" });
+  on("own", "change", own);
+  on("colour", "input", () => { $("own").checked = true; own(); });
+  on("apply", "click", () => change({ filter: $("filter").value }));
+  on("filter", "keydown", (event) => { if (event.key === "Enter") change({ filter: $("filter").value }); });
+  on("deformed", "change", () => { current.view.deformed = Number($("deformed").value) || 0; current.redraw(); });
+  on("title", "change", () => { current.view.title = $("title").value; current.redraw(); });
+  on("up", "click", () => shift(-1));
+  on("down", "click", () => shift(1));
+  on("rename", "click", rename);
+  on("remove", "click", remove);
+  on("add", "change", add);
+  on("fit", "click", () => { current.fit(); moved(current); });
+  on("split", "change", split);
+  on("linked", "change", () => moved(current));
+  on("mode", "change", modes);
+  on("source", "change", switched);
+  on("save", "change", () => { const kind = $("save").value; $("save").value = ""; if (kind) save(kind); });
+  on("open", "click", () => $("file").click());
+  on("file", "change", () => { if ($("file").files[0]) open($("file").files[0]); $("file").value = ""; });
+  on("copy", "click", copy);
+  on("first", "click", () => go(0));
+  on("back", "click", () => go(current.frame - 1));
+  on("play", "click", play);
+  on("next", "click", () => go(current.frame + 1));
+  on("last", "click", () => go(frames().length - 1));
+  on("slider", "input", () => go(Number($("slider").value)));
+  on("history", "change", load);
+  on("stop", "click", () => tell("stop"));
+  on("checkpoint", "click", () => tell("save"));
+  document.addEventListener("keydown", key);
+}
+
+function connectFirst() {
+  const on = (id, event, action) => $(id).addEventListener(event, action);
+  on("language", "click", () => { words.choose(words.current() === "en" ? "zh" : "en"); speak(); });
+  on("theme", "click", () => {
+    theme = { auto: "light", light: "dark", dark: "auto" }[theme] ?? "auto";
+    words.keep("hpcdem.theme", theme);
+    paint();
+  });
+  dark.addEventListener("change", paint);
+}
+
+words.begin();
+theme = words.kept("hpcdem.theme") ?? "auto";
+speak();
+connectFirst();
+told(say("keys"));
+look();

@@ -1,0 +1,270 @@
+"""The answers of `hpcdem view`: pictures of a view from a camera, what a pixel shows, histories, files.
+
+Requests say all of it (frame, view, size), so that two windows, or two tabs, do not get into each other's way; what was
+put together for the last pictures is kept, since most requests change the camera only.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.page import exports
+from hpcdem.page.lifetime import live, static
+from hpcdem.page.maker import packed
+from hpcdem.page.server import Answer, Call, PageServer, as_json
+from hpcdem.page.sources import Sources
+from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
+from hpcdem.post.view.moment import Moment, unit_of
+from hpcdem.post.view.scene import Painted, Scene, default_view, painted, seen_of, shades_of, shift_of
+
+KINDS = {
+    "viewer.html": "text/html; charset=utf-8",
+    "page.css": "text/css; charset=utf-8",
+    "viewer.css": "text/css; charset=utf-8",
+    "icon.svg": "image/svg+xml",
+    "viewer.js": "text/javascript; charset=utf-8",
+    "viewer_words.js": "text/javascript; charset=utf-8",
+    "words.js": "text/javascript; charset=utf-8",
+    "server.js": "text/javascript; charset=utf-8",
+}
+LARGEST = 4096
+"""Pixels along a side of a picture."""
+KEPT = 24
+"""Layers that are kept put together."""
+FINE = 2
+"""A picture at rest is the mean of so many squared pixels for each."""
+
+
+def serve(
+    paths: list[Path], view: Path | None = None, port: int = 0, browser: bool = True,
+    say: Callable[[str], None] = print,
+) -> None:  # fmt: skip
+    """Serve the page until Ctrl-C or SIGTERM. view: a file *.mv to begin with. HpcdemError if there is nothing to show,
+    or the port cannot be had."""
+    viewer = Viewer(Sources(paths), read_view(view) if view is not None else None)
+    page = static(KINDS)
+    server = PageServer(page | {"": page["viewer.html"]}, viewer.calls(), port)
+    threading.Thread(target=viewer.warm_up, daemon=True).start()
+    live(server, browser, say)
+
+
+class Viewer:
+    """first: the view that the page begins with, else all that the frame has."""
+
+    def __init__(self, sources: Sources, first: ModelView | None = None) -> None:
+        self.sources, self.first = sources, first
+        self.layers: OrderedDict[tuple, Painted] = OrderedDict()
+        self.turn = threading.Lock()
+        self.last: tuple[str, Any, Scene] | None = None
+        """What was asked for last, its picture and scene: a click is looked up there."""
+
+    def calls(self) -> dict[str, Call]:
+        """What POST answers."""
+        return {
+            "state": lambda wanted: as_json(self.sources.state()),
+            "about": lambda wanted: as_json(self.about(wanted)),
+            "fields": lambda wanted: as_json(self.fields(wanted)),
+            "picture": self.picture,
+            "pick": lambda wanted: as_json(self.pick(wanted)),
+            "history": lambda wanted: as_json(self.sources.history(wanted.get("name"))),
+            "tell": lambda wanted: as_json({"said": self.sources.tell(wanted.get("what"))}),
+            "view": lambda wanted: as_json(self._view(wanted).model_dump()),
+            "file": self.file,
+        }
+
+    def warm_up(self) -> None:
+        """Have the kernels compiled, or loaded, before the first picture is asked for."""
+        from hpcdem.page.warm_up import warm_up
+
+        with self.turn:
+            warm_up()
+
+    # ---- what there is ---------------------------------------------------------------------------------------------
+
+    def about(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Objects of a frame, the view to begin with, colours, and the part of the plane that holds everything."""
+        moment = self._moment(wanted)[1]
+        view = default_view(moment) if self.first is None else self.first
+        left, right, bottom, top = (lambda seen: (seen.left, seen.right, seen.bottom, seen.top))(
+            seen_of(moment, ModelView())
+        )
+        return {
+            "step": moment.step, "time": moment.time, "view": view.model_dump(), "whole": [left, right, bottom, top],
+            "objects": {name: objects.count for name, objects in moment.objects.items()},
+            "order": list(OBJECTS), "displaced": moment.displacement is not None,
+            "colours": {name: _stops(name) for name in COLOURS},
+        }  # fmt: skip
+
+    def fields(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """Fields and vectors of a kind of object, with their units."""
+        moment = self._moment(wanted)[1]
+        objects = moment.of(str(wanted.get("object")))
+        return {
+            "fields": [[name, unit_of(name)] for name in objects.known()],
+            "vectors": list(objects.vectors),
+        }
+
+    # ---- pictures --------------------------------------------------------------------------------------------------
+
+    def picture(self, wanted: dict[str, Any]) -> Answer:
+        """A picture with what the legend says: a header in JSON and the bytes, see maker.packed."""
+        began = time.perf_counter()
+        with self.turn:
+            shown, picture = self._painted(wanted)
+        content = io.BytesIO()
+        from PIL import Image
+
+        image = Image.fromarray(picture.colours)
+        if wanted.get("fine"):
+            image.save(content, "PNG", compress_level=1)
+        else:
+            image.save(content, "JPEG", quality=85)
+        header = {
+            "step": shown.moment.step, "time": shown.moment.time, "title": shown.title(), "legend": _legend(shown),
+            "shown": {layer.layer.label: len(layer.rows) for layer in shown.layers},
+            "seconds": time.perf_counter() - began, "number": wanted.get("number"),
+            "kind": "image/png" if wanted.get("fine") else "image/jpeg",
+        }  # fmt: skip
+        bytes_ = np.frombuffer(content.getvalue(), np.uint8)
+        return Answer(packed(header, {"image": bytes_}), "application/octet-stream")
+
+    def pick(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """What the pixel at column and row shows: layer, number, and all values of the object."""
+        with self.turn:
+            shown, picture = self._painted(wanted | {"fine": False})
+            column, row = (wanted.get(name) for name in ("column", "row"))
+            h, w = picture.layer.shape
+            if not (isinstance(column, int) and isinstance(row, int) and 0 <= column < w and 0 <= row < h):
+                raise HpcdemError("there is no such pixel")
+            place, which = int(picture.layer[row, column]), int(picture.row[row, column])
+        if place < 0:
+            return {"object": None}
+        layer = shown.layers[place].layer
+        objects = shown.moment.of(layer.object)
+        values: list[list[Any]] = []
+        for name in objects.known():
+            value = objects.fields[name][which] if name in objects.fields else objects.vectors[name][which]
+            names = objects.names.get(name)
+            if names:
+                told: Any = names[int(value)] if 0 <= int(value) < len(names) else None
+            elif np.ndim(value):
+                told = f"({value[0]:.6g}, {value[1]:.6g})"
+            else:
+                told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
+            values.append([name, told, unit_of(name)])
+        number = objects.fields[objects.number][which] if objects.number in objects.fields else which
+        x, y = objects.centres()[which]
+        return {
+            "object": layer.object, "label": layer.label, "number": int(number), "x": float(x), "y": float(y),
+            "values": values,
+        }  # fmt: skip
+
+    def file(self, wanted: dict[str, Any]) -> Answer:
+        """A file of what is shown: picture, vectors, table, drawing, page, film, or the view itself."""
+        kind = wanted.get("format")
+        view = self._view(wanted)
+        if kind == "mv":
+            return Answer(written(view).encode(), "application/json")
+        if kind not in exports.FORMATS:
+            raise HpcdemError(f"format: expected one of {', '.join((*exports.FORMATS, 'mv'))}")
+        if kind in exports.FILMS:
+            source = self.sources.source(wanted.get("source"))
+            return Answer(exports.film(source.frames, view, kind, wanted), exports.FORMATS[kind])
+        _, moment = self._moment(wanted)
+        return Answer(exports.file(moment, view, kind, wanted), exports.FORMATS[kind])
+
+    # ---- putting together ------------------------------------------------------------------------------------------
+
+    def _view(self, wanted: dict[str, Any]) -> ModelView:
+        given = wanted.get("view")
+        if not isinstance(given, dict):
+            raise HpcdemError("view: expected names and values")
+        given = {name: value for name, value in given.items() if (name, value) != ("view", 1)}
+        return view_of(given, "view")
+
+    def _moment(self, wanted: dict[str, Any]) -> tuple[tuple[str, int, int], Moment]:
+        return self.sources.moment(self.sources.frame(wanted.get("source", 0), wanted.get("frame", -1)))
+
+    def _painted(self, wanted: dict[str, Any]) -> tuple[Scene, Any]:
+        """Scene and picture of a request; those of the one before if it was the same."""
+        from hpcdem.post.view.screen import paint
+
+        key, moment = self._moment(wanted)
+        view = self._view(wanted)
+        width, height = (wanted.get(name) for name in ("width", "height"))
+        if not all(isinstance(v, int) and not isinstance(v, bool) and 1 <= v <= LARGEST for v in (width, height)):
+            raise UsageError(f"width and height: expected whole numbers from 1 to {LARGEST}")
+        fine, dark = bool(wanted.get("fine")), bool(wanted.get("dark"))
+        asked = json.dumps([key, view.model_dump(), width, height, fine, dark])
+        if self.last is not None and self.last[0] == asked:
+            return self.last[2], self.last[1]
+        shown = self._scene(key, moment, view)
+        picture = paint(shown, int(width), int(height), FINE if fine else 1, dark)  # type: ignore[arg-type]
+        self.last = asked, picture, shown
+        return shown, picture
+
+    def _scene(self, key: tuple, moment: Moment, view: ModelView) -> Scene:
+        """As scene.scene, with layers that were put together before."""
+        seen = seen_of(moment, view)
+        shifted = None
+        layers = []
+        for layer in view.layers:
+            if not layer.visible or layer.object not in moment.objects:
+                continue
+            # Arrows are as long as the picture is wide; all else of a layer does not know the camera.
+            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, seen if layer.vectors else None)
+            if about not in self.layers:
+                if shifted is None and layer.object == "elements":
+                    shifted = shift_of(moment, view.deformed)
+                self.layers[about] = painted(moment, layer, seen, shifted if layer.object == "elements" else None)
+                while len(self.layers) > KEPT or _older(self.layers, key):
+                    self.layers.popitem(last=False)
+            self.layers.move_to_end(about)
+            found = self.layers[about]
+            if found.layer.label != layer.label:
+                found.layer = layer
+            layers.append(found)
+        return Scene(moment, view, seen, layers)
+
+
+def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:
+    """Whether the oldest layer is of another frame than this one, and layers of this one are many bytes."""
+    size = sum(part.nbytes for layer in layers.values() for part in (*layer.shape, layer.kind))
+    return size > 150e6 and next(iter(layers))[0] != key
+
+
+def _legend(shown: Scene) -> list[dict[str, Any]]:
+    told: list[dict[str, Any]] = []
+    for layer in shown.layers:
+        if layer.scale is not None:
+            told.append({
+                "label": layer.layer.label, "title": layer.scale.title, "low": layer.scale.low,
+                "high": layer.scale.high, "log": layer.scale.log, "colours": layer.scale.colours,
+            })  # fmt: skip
+        elif layer.legend:
+            told.append({"label": layer.layer.label, "classes": layer.legend})
+    return told
+
+
+def _stops(name: str) -> list[str]:
+    """Some colours of a field, for the bar on the page."""
+    shades = np.rint(255.0 * shades_of(name)[:: 256 // 16]).astype(int)
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in [*shades, np.rint(255.0 * shades_of(name)[-1]).astype(int)]]
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+__all__ = ["Layer", "Viewer", "serve"]

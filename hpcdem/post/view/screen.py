@@ -1,0 +1,249 @@
+"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, and beside
+the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py` paints the same plainly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from hpcdem.io.axes import View
+from hpcdem.post.view.moment import DISCS, POLYGONS
+from hpcdem.post.view.scene import Painted, Scene
+
+GROUND, DARK_GROUND, RIM = (255, 255, 255), (18, 24, 26), (60, 60, 60)
+DOT = 96.0 / 72.0
+"""Pixels of a point, at one pixel per pixel of the page."""
+NOTHING = -1
+
+
+@dataclass
+class Picture:
+    """colours (h, w, 3) bytes, row 0 at the top; layer (h, w) i1: place of the layer in the scene that a pixel shows,
+    -1 for none; row (h, w) i4: which of its objects."""
+
+    colours: np.ndarray
+    layer: np.ndarray
+    row: np.ndarray
+
+
+def paint(scene: Scene, width: int, height: int, fine: int = 1, dark: bool = False) -> Picture:
+    """The picture of a scene, so many pixels wide and high. fine: each pixel is the mean of so many squared."""
+    w, h = width * fine, height * fine
+    colours = np.empty((h, w, 3), np.uint8)
+    colours[:] = DARK_GROUND if dark else GROUND
+    layer, row = np.full((h, w), NOTHING, np.int8), np.full((h, w), NOTHING, np.int32)
+    place = transform(scene.seen, w, h)
+    for number, painted in enumerate(scene.layers):
+        _layer(painted, number, place, colours, layer, row, fine)
+    if fine > 1:
+        mean = np.zeros((height, width, 3), np.uint16)
+        for i in range(fine):
+            for j in range(fine):
+                mean += colours[i::fine, j::fine]
+        colours = (mean // fine**2).astype(np.uint8)
+        middle = slice(fine // 2, None, fine)
+        layer, row = np.ascontiguousarray(layer[middle, middle]), np.ascontiguousarray(row[middle, middle])
+    return Picture(colours, layer, row)
+
+
+def transform(seen: View, width: int, height: int) -> tuple[float, float, float, float]:
+    """Column = a x + b, row = c y + d of a place [m]."""
+    a, c = width / seen.width, -height / seen.height
+    return a, -a * seen.left, c, -c * seen.top
+
+
+def _layer(painted: Painted, number: int, place: tuple, colours: np.ndarray, layer: np.ndarray, row: np.ndarray,
+           fine: int) -> None:  # fmt: skip
+    shades = np.clip(np.rint(255.0 * painted.shades), 0, 255).astype(np.uint8)
+    kind, rows = painted.kind.astype(np.int64), painted.rows.astype(np.int64)
+    look = painted.layer
+    target, which, opacity = (colours, layer, row), np.int8(number), float(look.opacity)
+    if painted.kind_of_shape == DISCS:
+        centres, radius = map(np.ascontiguousarray, painted.shape)
+        discs(centres, radius, kind, rows, shades, place, look.edges, target, which, opacity)
+    elif painted.kind_of_shape == POLYGONS:
+        points, cells = map(np.ascontiguousarray, painted.shape)
+        polygons(points, cells, kind, rows, shades, place, look.edges, target, which, opacity)
+    else:
+        ends = np.ascontiguousarray(painted.shape[0])
+        lines(ends, kind, rows, shades, place, max(1, round(painted.width * DOT * fine)), target, which, opacity)
+    if painted.arrows is not None:
+        _arrows(*painted.arrows, place, fine, target)
+
+
+def _arrows(at: np.ndarray, far: np.ndarray, place: tuple, fine: int, target: tuple) -> None:
+    """Shafts, and two strokes for each head; they cannot be picked."""
+    tip = at + far
+    strokes = [np.stack([at, tip], axis=1)]
+    for turn in (0.85 * math.pi, -0.85 * math.pi):
+        c, s = math.cos(turn), math.sin(turn)
+        back = 0.3 * np.column_stack([c * far[:, 0] - s * far[:, 1], s * far[:, 0] + c * far[:, 1]])
+        strokes.append(np.stack([tip, tip + back], axis=1))
+    ends = np.ascontiguousarray(np.concatenate(strokes))
+    nobody = np.full(len(ends), NOTHING, np.int64)
+    shades = np.array([[32, 32, 32]], np.uint8)
+    lines(ends, np.zeros(len(ends), np.int64), nobody, shades, place, fine, target, np.int8(NOTHING), 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _put(colours, layer, row, i, j, red, green, blue, opacity, number, which):
+    if opacity >= 1.0:
+        colours[i, j, 0], colours[i, j, 1], colours[i, j, 2] = red, green, blue
+    else:
+        colours[i, j, 0] = np.uint8(colours[i, j, 0] + opacity * (float(red) - colours[i, j, 0]) + 0.5)
+        colours[i, j, 1] = np.uint8(colours[i, j, 1] + opacity * (float(green) - colours[i, j, 1]) + 0.5)
+        colours[i, j, 2] = np.uint8(colours[i, j, 2] + opacity * (float(blue) - colours[i, j, 2]) + 0.5)
+    if which >= 0:
+        layer[i, j], row[i, j] = number, which
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def discs(centres, radius, kind, rows, shades, place, edges, target, number, opacity):
+    """Each pixel whose middle lies in a disc gets its colour; of a disc that holds none, the pixel of its centre."""
+    a, b, c, d = place
+    colours, layer, row = target
+    h, w = layer.shape
+    for k in range(len(radius)):
+        x, y, r = a * centres[k, 0] + b, c * centres[k, 1] + d, a * radius[k]
+        if not (x + r > 0.0 and x - r < w and y + r > 0.0 and y - r < h and r > 0.0):
+            continue
+        s = shades[kind[k]]
+        red, green, blue = s[0], s[1], s[2]
+        if r < 0.75:
+            i, j = math.floor(y), math.floor(x)
+            if 0 <= i < h and 0 <= j < w:
+                _put(colours, layer, row, i, j, red, green, blue, opacity, number, rows[k])
+            continue
+        inner = max(r - max(1.0, 0.08 * r), 0.0) if edges and r > 2.0 else r + 1.0
+        for i in range(max(0, math.ceil(y - r - 0.5)), min(h - 1, math.floor(y + r - 0.5)) + 1):
+            dy = i + 0.5 - y
+            half = math.sqrt(max(r * r - dy * dy, 0.0))
+            for j in range(max(0, math.ceil(x - half - 0.5)), min(w - 1, math.floor(x + half - 0.5)) + 1):
+                dx = j + 0.5 - x
+                if dx * dx + dy * dy > inner * inner:
+                    _put(colours, layer, row, i, j, np.uint8(60), np.uint8(60), np.uint8(60), opacity, number, rows[k])
+                else:
+                    _put(colours, layer, row, i, j, red, green, blue, opacity, number, rows[k])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _side(ax, ay, bx, by, px, py):
+    return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _owns(ax, ay, bx, by):
+    """Whether a pixel on the edge from a to b belongs to the triangle on its positive side, one of two neighbours."""
+    return by - ay > 0.0 or (by == ay and bx - ax < 0.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _triangle(x0, y0, x1, y1, x2, y2, red, green, blue, which, colours, layer, row, number, opacity):
+    """Pixels whose middles lie in the triangle; returns how many there are, -1 off the picture."""
+    h, w = layer.shape
+    low_x, high_x = min(x0, x1, x2), max(x0, x1, x2)
+    low_y, high_y = min(y0, y1, y2), max(y0, y1, y2)
+    if not (high_x > 0.0 and low_x < w and high_y > 0.0 and low_y < h):
+        return -1
+    if _side(x0, y0, x1, y1, x2, y2) < 0.0:
+        x1, y1, x2, y2 = x2, y2, x1, y1
+    first, second, third = _owns(x0, y0, x1, y1), _owns(x1, y1, x2, y2), _owns(x2, y2, x0, y0)
+    count = 0
+    for i in range(max(0, math.ceil(low_y - 0.5)), min(h - 1, math.floor(high_y - 0.5)) + 1):
+        py = i + 0.5
+        for j in range(max(0, math.ceil(low_x - 0.5)), min(w - 1, math.floor(high_x - 0.5)) + 1):
+            px = j + 0.5
+            e0, e1, e2 = (
+                _side(x0, y0, x1, y1, px, py), _side(x1, y1, x2, y2, px, py), _side(x2, y2, x0, y0, px, py)
+            )  # fmt: skip
+            if (
+                (e0 > 0.0 or (e0 == 0.0 and first))
+                and (e1 > 0.0 or (e1 == 0.0 and second))
+                and (e2 > 0.0 or (e2 == 0.0 and third))
+            ):
+                _put(colours, layer, row, i, j, red, green, blue, opacity, number, which)
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def polygons(points, cells, kind, rows, shades, place, edges, target, number, opacity):
+    """Triangles and quads; of one that holds the middle of no pixel, the pixel of its middle. Outlines over them where
+    they are wanted and the cells are larger than some pixels."""
+    a, b, c, d = place
+    colours, layer, row = target
+    h, w = layer.shape
+    for k in range(len(cells)):
+        s = shades[kind[k]]
+        red, green, blue = s[0], s[1], s[2]
+        p, q, r = cells[k, 0], cells[k, 1], cells[k, 2]
+        x0, y0 = a * points[p, 0] + b, c * points[p, 1] + d
+        x1, y1 = a * points[q, 0] + b, c * points[q, 1] + d
+        x2, y2 = a * points[r, 0] + b, c * points[r, 1] + d
+        count = _triangle(x0, y0, x1, y1, x2, y2, red, green, blue, rows[k], colours, layer, row, number, opacity)
+        if cells[k, 3] >= 0:
+            x3, y3 = a * points[cells[k, 3], 0] + b, c * points[cells[k, 3], 1] + d
+            more = _triangle(x0, y0, x2, y2, x3, y3, red, green, blue, rows[k], colours, layer, row, number, opacity)
+            count = max(count, more)
+        if count == 0:
+            i, j = math.floor((y0 + y1 + y2) / 3.0), math.floor((x0 + x1 + x2) / 3.0)
+            if 0 <= i < h and 0 <= j < w:
+                _put(colours, layer, row, i, j, red, green, blue, opacity, number, rows[k])
+    if not edges:
+        return
+    for k in range(len(cells)):
+        n = 4 if cells[k, 3] >= 0 else 3
+        for m in range(n):
+            p, q = cells[k, m], cells[k, (m + 1) % n]
+            x0, y0 = a * points[p, 0] + b, c * points[p, 1] + d
+            x1, y1 = a * points[q, 0] + b, c * points[q, 1] + d
+            if abs(x1 - x0) + abs(y1 - y0) > 3.0:
+                _line(x0, y0, x1, y1, 1, np.uint8(60), np.uint8(60), np.uint8(60), NOTHING, colours, layer, row, number,
+                      0.6 * opacity)  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _line(x0, y0, x1, y1, width, red, green, blue, which, colours, layer, row, number, opacity):
+    """A line as squares of `width` pixels, one per column or row of its longer side, so far as it is on the picture."""
+    h, w = layer.shape
+    # The part of it that may be on the picture (Liang and Barsky 1984).
+    begin, end = 0.0, 1.0
+    dx, dy = x1 - x0, y1 - y0
+    for way, room in ((-dx, x0 + width), (dx, w + width - x0), (-dy, y0 + width), (dy, h + width - y0)):
+        if way == 0.0:
+            if room < 0.0:
+                return
+        elif way < 0.0:
+            begin = max(begin, room / way)
+        else:
+            end = min(end, room / way)
+    if not begin <= end:
+        return
+    x0, y0, x1, y1 = x0 + begin * dx, y0 + begin * dy, x0 + end * dx, y0 + end * dy
+    steps = math.ceil(max(abs(x1 - x0), abs(y1 - y0))) + 1
+    flat = abs(x1 - x0) >= abs(y1 - y0)
+    for m in range(steps):
+        part = m / (steps - 1) if steps > 1 else 0.0
+        x, y = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
+        for n in range(width):
+            off = n - 0.5 * (width - 1)
+            i, j = (
+                math.floor(y + off) if flat else math.floor(y),
+                (math.floor(x) if flat else math.floor(x + off)),
+            )
+            if 0 <= i < h and 0 <= j < w:
+                _put(colours, layer, row, i, j, red, green, blue, opacity, number, which)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def lines(ends, kind, rows, shades, place, width, target, number, opacity):
+    """Lines of so many pixels."""
+    a, b, c, d = place
+    colours, layer, row = target
+    for k in range(len(ends)):
+        s = shades[kind[k]]
+        _line(a * ends[k, 0, 0] + b, c * ends[k, 0, 1] + d, a * ends[k, 1, 0] + b, c * ends[k, 1, 1] + d, width, s[0],
+              s[1], s[2], rows[k], colours, layer, row, number, opacity)  # fmt: skip
