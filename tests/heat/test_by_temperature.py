@@ -177,14 +177,15 @@ def test_energy_of_joints_that_get_weaker_adds_up() -> None:
     sim.option(collision=False)
     sim.velocity_condition(at(sim, x=0.0), vx=0.0)
     sim.velocity_condition(at(sim, x=0.4), vx=1.5e-3)
+    sim.time_step(value=5e-6)
     diagnostics.account_energy(sim)
-    for k in range(400):
-        if k == 200:
+    for k in range(800):
+        if k == 400:
             heat.prescribe(None, 220.0)
         sim.step()
     found = diagnostics.energies(sim)
     assert found["joints"] > 0.0 and abs(found["work_heat"]) > 5e-3 * found["joints"]
-    assert abs(found["joints_lost"]) < 1e-5 * found["joints"] and found["relative"] < 1e-5
+    assert abs(found["joints_lost"]) < 1e-2 * abs(found["work_heat"]) and found["relative"] < 1e-5
 
 
 def test_a_stronger_property_takes_the_place_of_a_table() -> None:
