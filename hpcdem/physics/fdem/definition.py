@@ -47,6 +47,9 @@ SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """What becomes of bodies that overlap before the first step."""
+POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
+"""What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
+four times the smallest of its barycentric coordinates (Munjiza 2004)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
 
@@ -96,12 +99,13 @@ TRACTIONS = {
 
 @dataclass(frozen=True)
 class Options:
-    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
-    one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles of
-    flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
-    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
-    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most
+    one of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space.
+    mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant: grains move in it;
+    flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many as are needed)
+    of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often as those
+    of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]: Rayleigh
+    damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -114,6 +118,7 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    potential: str = DISTANCE
     mechanical: bool = True
     hydraulic: bool = True
     one_way: bool = False
@@ -335,16 +340,9 @@ class ModelDefinition:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
         if name != MECH_ISO_ELASTIC.name:
             self.refuse_in_space(f"model {name} of elements")
-        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
-
-    def _refuse_surfaces(self, given: Mapping[str, Value]) -> None:
-        """CommandError for properties of contact in a model whose bodies do not touch."""
-        for name in ("friction", "penalty"):
-            if name in given:
-                self.refuse_in_space(f"{name} of surfaces, which is for contact")
 
     def yielding(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can yield."""
@@ -377,13 +375,11 @@ class ModelDefinition:
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
-        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
 
     def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a contact model to faces, also to those that will be free only when a joint breaks."""
-        self.refuse_in_space("contact of surfaces")
         at = self.numbers_of_faces(faces)
         self._assign(self.face_rows, (self.face_row, at), at, FACE, name, properties)
 
@@ -832,16 +828,24 @@ class ModelDefinition:
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
         large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
-        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are.
+        potential ("distance"): of contact in space, see `POTENTIAL`."""
         given = {"dynamic": dynamic, "collision": collision, "large_strain": large_strain}
         if overlap is not None and overlap not in OVERLAP:
             raise CommandError(f"overlap is one of {', '.join(OVERLAP)}, got {overlap}")
         changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
         if overlap is not None:
             changes["overlap"] = overlap
+        if potential is not None:
+            if self.mesh is not None:
+                self._only_in_space("choice of the potential of contact", potential)
+            if potential not in POTENTIAL:
+                raise CommandError(f"the potential of contact is one of {', '.join(POTENTIAL)}, got {potential}")
+            changes["potential"] = potential
         self._set(**changes)
 
     def parts(

@@ -29,7 +29,7 @@ from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, user_laws
-from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
+from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
 from hpcdem.physics.fdem.kernels import elements, plasticity, space, tets
@@ -191,15 +191,17 @@ class Blocks(State):
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
         changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
-        it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        it; "relax": a static stage moves them apart; "keep": they start as they are. potential ("distance"): of contact
+        in space, see `definition.POTENTIAL`."""
         before = self.options.dynamic
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
-        super().option(dynamic, collision, large_strain, overlap)
+        super().option(dynamic, collision, large_strain, overlap, potential)
         if self.options.dynamic != before:
             self.v[:] = 0.0
 
@@ -282,11 +284,8 @@ class Blocks(State):
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
         o = self.options
-        if self.dim == 3 and o.collision:
-            raise CommandError(
-                "in three dimensions surfaces do not touch in this version: model option collision off says that they "
-                "may pass through each other"
-            )
+        if self.dim == 2 and o.potential != DISTANCE:
+            raise CommandError("in two dimensions there is no choice of the potential of contact")
         flows = o.hydraulic and "fluid" in self.surface_loads
         heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
