@@ -764,7 +764,8 @@ class Tables(Words):
         self._do("table delete", {"name": name})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x" or "y" in the mesh, or over "plastic-strain" (what softens or hardens)."""
+        """For a property: the table over "x" or "y" in the mesh, over "plastic-strain" (what softens or hardens), or
+        over "temperature" (moduli and strengths)."""
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))

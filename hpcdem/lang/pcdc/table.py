@@ -186,7 +186,7 @@ def declared(
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
         kind = limited(one.low, one.high, one.low_itself, one.unit)
-        kind = kind if uniform else varied(kind, one.softens)
+        kind = kind if uniform else varied(kind, one.softens, one.warms)
         required = not (default or one.optional)
         options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
     return tuple(options)
@@ -850,6 +850,8 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
              "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model mech-iso-elastic property density 2600 poisson-ratio 0.25 young table 'E_of_T' over "
+             "temperature",
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),

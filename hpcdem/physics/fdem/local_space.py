@@ -27,7 +27,7 @@ class LocalSpace(Local):
     """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
 
     dim, force_width, stride = 3, tets.ROW, tets.STRIDE
-    plastic = creeps = yields = False
+    plastic = creeps = yields = warms = False
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
