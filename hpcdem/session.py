@@ -282,9 +282,9 @@ def _plastic_tangent() -> WarmUp:
 
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
-    from hpcdem.physics.fdem.kernels import space, tets
+    from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
 
-    return warm_up.in_space, (tets, space, tetrahedra)
+    return warm_up.in_space, (tets, space, tetrahedra, contact_space, detect_space)
 
 
 KINDS = {

@@ -764,7 +764,8 @@ class Tables(Words):
         self._do("table delete", {"name": name})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x" or "y" in the mesh, or over "plastic-strain" (what softens or hardens)."""
+        """For a property: the table over "x" or "y" in the mesh, over "plastic-strain" (what softens or hardens), or
+        over "temperature" (moduli and strengths)."""
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))
@@ -1001,6 +1002,7 @@ class BlockCommands:
         dynamic: bool | None = None,
         collision: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
         large_strain: bool | None = None,
         energy: bool | None = None,
         mechanical: bool | None = None,
@@ -1010,12 +1012,13 @@ class BlockCommands:
         proppant: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
-        "refuse", "relax" or "keep"; rotations of elements; keep the energy budget; motion at all; flow of fluid, and
-        whether it does not push; flow of heat; proppant that moves in the fluid."""
+        "refuse", "relax" or "keep"; the potential of contact in space, "distance" or "munjiza"; rotations of elements;
+        keep the energy budget; motion at all; flow of fluid, and whether it does not push; flow of heat; proppant that
+        moves in the fluid."""
         given = {
-            "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
-            "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way,
-            "thermal": thermal, "proppant": proppant,
+            "dynamic": dynamic, "collision": collision, "overlap": overlap, "potential": potential,
+            "large_strain": large_strain, "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic,
+            "one_way": one_way, "thermal": thermal, "proppant": proppant,
         }  # fmt: skip
         self._blocks("model option", given)
 

@@ -208,6 +208,7 @@ REFUSED = [
     ("geometry create sphere (0,0) 1 as-layer 's'", "'geometry create sphere' is for three dimensions"),
     ("model gravity (0,0,-9.81)", "read '(0,0,-9.81)', expected a vector (x,y) for 'gravity'"),
     ("mesh structured (0,0) (1,1) cells 2 2 2", "read '2', expected a keyword after 'mesh structured'"),
+    ("model option potential munjiza", "'potential' is for three dimensions"),
     ("element initial stress-xz 1", "'stress-xz' is for three dimensions"),
     ("element group 'a' range between 'b' 'c'", "read 'between' after 'element group range'"),
     ("mesh create from-layer 'a'", "'mesh create' lacks size"),

@@ -120,6 +120,8 @@ SAME: list[tuple[str, str]] = [
      "where=\"geometry 'hole'\")"),
     ("pcdc element property cohesion table 'c' over plastic-strain",
      "sim.elements.property(cohesion=sim.tables.over('c', 'plastic-strain'))"),
+    ("pcdc face-joint property tensile-strength table 'c' over temperature",
+     "sim.joints.property(tensile_strength=sim.tables.over('c', 'temperature'))"),
     ("pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2 y 1 3",
      "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
      "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
@@ -334,6 +336,9 @@ def carry_out(sim: Simulation, text: str) -> Any:
 
 
 IN_SPACE: list[tuple[str, str]] = [
+    ("pcdc model option potential munjiza overlap keep", "sim.option(potential='munjiza', overlap='keep')"),
+    ("pcdc element-face c-model contact-m-c property p-n 1e9 friction 30 range boundary",
+     "sim.faces.model('contact-m-c', penalty_normal=1e9, friction=30, where='boundary')"),
     ("pcdc model gravity (0,1,-9.81)", "sim.gravity((0, 1, -9.81))"),
     ("pcdc geometry create box (0,0,0) (1,2,3) as-layer 'l'", "sim.geometry.box((0, 0, 0), (1, 2, 3), 'l')"),
     ("pcdc geometry create sphere (0,1,2) 3 as-layer 'l'", "sim.geometry.sphere((0, 1, 2), 3, 'l')"),
@@ -472,7 +477,8 @@ WRONG = {
     "two distributions": ("sim.fields.create('f', seed=1, normal=(1, 1), weibull=(1, 1))", "one distribution"),
     "covariance of nothing": ("sim.fields.create('f', seed=1, normal=(1, 1), covariance='gaussian')",
                               "covariance goes with correlation"),
-    "no axis": ("sim.tables.over('E', 'z')", "tables.over: axis: expected 'x', 'y', 'plastic-strain', got 'z'"),
+    "no axis": ("sim.tables.over('E', 'z')",
+                "tables.over: axis: expected 'x', 'y', 'plastic-strain', 'temperature', got 'z'"),
     "nothing that softens": ("sim.elements.property(young=sim.tables.over('E', 'plastic-strain'))",
                              "young: a table over plastic-strain cannot stand for it"),
     "unsorted table": ("sim.tables.create('v', [(1, 0), (0, 0)])", "tables.create: table 'v': times must ascend"),

@@ -61,6 +61,38 @@ def settling(sim: Blocks) -> None:
     sim.gravity(0.0, 1.0, -9.81)
 
 
+def crowding(sim: Blocks) -> None:
+    """Blocks of several kinds that hit a plate and each other, slide over it through all strips, stick and rub; faces
+    and elements differ, contacts are damped, and one block is dug out while others lie on it."""
+    plate = box((16, 3, 1), (3.2, 0.6, 0.2), shaken=0.15)
+    stone = box((2, 2, 1), (0.24, 0.22, 0.14), 5), box((2, 1, 2), (0.2, 0.13, 0.2), 12)
+    away = [(0.11 + 0.34 * k, 0.05 + 0.03 * (k % 4), 0.21 + 0.005 * k) for k in range(6)]
+    away += [(0.16 + 0.34 * k, 0.13, 0.45 + 0.003 * k) for k in range(5)]
+    parts = [(plate, (0.0, 0.0, 0.0)), *((stone[k % 2], at) for k, at in enumerate(away))]
+    begin = np.cumsum([0, *(len(mesh.points) for mesh, _ in parts)])
+    mesh = Mesh.of(
+        np.concatenate([mesh.points + np.array(at) for mesh, at in parts]),
+        np.concatenate([mesh.cells + k for (mesh, _), k in zip(parts, begin)]),
+    )
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 2e7, "damp_factor": 0.05, "friction": 25.0})
+    sim.velocity_condition(np.flatnonzero(mesh.points[: begin[1], 2] < 1e-9), vx=0.0, vy=0.0, vz=0.0)
+    edges = mesh.edges()
+    free = edges.faces[~edges.inner, 0]
+    top = free[(np.abs(mesh.points[mesh.face_points(free)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
+    sim.face_model(top, "contact_mohr_coulomb", {"penalty_normal": 4e8, "friction": 10.0, "damping_ratio": 0.2})
+    sim.face_model(free[::7], "contact_mohr_coulomb", {"penalty_normal": 2e8, "friction": 40.0, "damping_b": 1.5})
+    sim.gravity(4.0, 0.0, -9.81)
+    changes.set_velocity(sim, np.arange(begin[1], len(mesh.points)), 5.0, 0.2, -1.0)
+    changes.set_velocity(sim, np.arange(begin[-3], begin[-2]), -8.0, 0.0, -2.0)
+
+
+def dig_below(sim: Blocks) -> None:
+    """The first block is taken out."""
+    if sim.clock.step == 900:
+        changes.null(sim, np.arange(16 * 3 * 6, 16 * 3 * 6 + 20))
+
+
 VECTORS = "position", "velocity", "displacement", "reaction", "unbalanced"
 NAMES = (
     *(f"{name}_{axis}" for name in VECTORS for axis in "xyz"),
@@ -84,6 +116,22 @@ def it_swings(found: Found) -> None:
     assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
 
 
+def touching(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with the contacts in the order of their pairs."""
+    found = result(sim, notes)
+    parts = sim.comm.allgather(diagnostics.contacts(sim))
+    every = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    order = np.lexsort((every["element_2"], every["face"]))
+    return found | {f"contact_{name}": values[order] for name, values in every.items()}
+
+
+def it_crowds(found: Found) -> None:
+    assert len(found["contact_face"]) > 50
+    assert np.nanmax(found["displacement_x"]) > 0.3
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+    assert found["about"][0] > 10
+
+
 def it_settles(found: Found) -> None:
     assert found["time"][2] < 1e-2
     assert np.abs(found["stress_zz"]).max() > 2e4
@@ -91,5 +139,6 @@ def it_settles(found: Found) -> None:
 
 MODELS = {
     "swinging": Model(swinging, result, it_swings, dig, steps=1000, middle=401, come=10),
+    "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hpcdem.commands.fdem import coupling
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
@@ -32,6 +34,7 @@ def option(
     collision: bool | None = None,
     large_strain: bool | None = None,
     overlap: str | None = None,
+    potential: str | None = None,
     energy: bool | None = None,
     mechanical: bool | None = None,
     hydraulic: bool | None = None,
@@ -39,8 +42,9 @@ def option(
     thermal: bool | None = None,
     proppant: bool | None = None,
 ) -> None:
-    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
+    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, potential: of contact
+    in space, see `Blocks.option`; energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal,
+    proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {
@@ -50,8 +54,13 @@ def option(
         project.blocks.parts(**parts)
     if dynamic is not None:
         project.dynamic = dynamic
-    if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
-        project.blocks.option(dynamic=dynamic, collision=collision, large_strain=large_strain, overlap=overlap)
+    of_blocks: dict[str, Any] = {
+        "dynamic": dynamic, "collision": collision, "large_strain": large_strain, "overlap": overlap,
+        "potential": potential,
+    }  # fmt: skip
+    given = {name: value for name, value in of_blocks.items() if value is not None}
+    if given:
+        project.blocks.option(**given)
     if energy is not None:
         needed = [name for name, history in project.histories.items() if history.value in ENERGIES]
         if not energy and needed:

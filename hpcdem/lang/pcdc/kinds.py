@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN
+from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,19 @@ class Kind:
     """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
     softens: bool = False
     """``table 'name' over plastic-strain`` may, too."""
+    warms: bool = False
+    """So may ``table 'name' over temperature``."""
 
     @property
     def axes(self) -> tuple[str, ...]:
         """What a table that stands for it can be over."""
-        return AXES if self.softens else AXES[:PLASTIC_STRAIN]
+        there = {PLASTIC_STRAIN: self.softens, TEMPERATURE: self.warms}
+        return tuple(axis for k, axis in enumerate(AXES) if there.get(k, True))
 
 
-def varied(kind: Kind, softens: bool = False) -> Kind:
+def varied(kind: Kind, softens: bool = False, warms: bool = False) -> Kind:
     """The same for a property of elements, faces or joints."""
-    made = replace(kind, varied=True, softens=softens)
+    made = replace(kind, varied=True, softens=softens, warms=warms)
     return replace(made, pattern=f"{kind.pattern}|table <s> over {'|'.join(made.axes)}|field <s>")
 
 

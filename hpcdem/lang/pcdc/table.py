@@ -186,7 +186,7 @@ def declared(
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
         kind = limited(one.low, one.high, one.low_itself, one.unit)
-        kind = kind if uniform else varied(kind, one.softens)
+        kind = kind if uniform else varied(kind, one.softens, one.warms)
         required = not (default or one.optional)
         options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
     return tuple(options)
@@ -350,7 +350,7 @@ CONTACT = Model(
     "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
     declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
              "d{amping}-b", "d{amping}-r{atio}"),
-    of=properties.CONTACT_MOHR_COULOMB,
+    of=properties.CONTACT_MOHR_COULOMB, dims=BOTH,
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
@@ -597,7 +597,10 @@ _MODEL = (
                 Option("col{lision}", (BOOL,), "contact of surfaces", default="on"),
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
-                       default="refuse", dims=PLANE),
+                       default="refuse"),
+                Option("pot{ential}", (choice("distance", "munjiza"),), "what contact presses with: the distance to "
+                       "the nearest side of an element over the usual altitude in its body, or four times the smallest "
+                       "of its barycentric coordinates", default="distance", dims=SPACE),
                 Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid or heat flows",
                        default="on", dims=PLANE),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
@@ -847,6 +850,8 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
              "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model mech-iso-elastic property density 2600 poisson-ratio 0.25 young table 'E_of_T' over "
+             "temperature",
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),
@@ -880,10 +885,10 @@ _OBJECTS = (
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),
-            models=(CONTACT,), ranged="element-face", manual=True),
+            models=(CONTACT,), ranged="element-face", manual=True, dims=BOTH),
     Command("element-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
             ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
-            ranged="element-face", needs_option=True),
+            ranged="element-face", needs_option=True, dims=BOTH),
     Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
             ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",

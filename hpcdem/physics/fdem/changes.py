@@ -60,7 +60,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     stay = np.flatnonzero(~dying[sim.number])
     sim.number, sim.x, sim.v = sim.number[stay], sim.x[stay], sim.v[stay]
     sim.cold = {name: values[stay] for name, values in sim.cold.items()}
-    sim.histories = sim.histories.take(stay).without_partners(dying)
+    sim.histories = sim.histories.take(stay).without_partners(dying, sim.dim)
     if left is not None:
         begin = sim.clock.time if sim.options.dynamic else float(sim.clock.step)
         sim.relaxations.append(Relaxation(*left, begin, span, not sim.options.dynamic))

@@ -21,18 +21,20 @@ from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import (
+    COHESIVE,
     ELEMENT,
     FACE,
     JOINT,
     MECH_BURGERS,
     MECH_ISO_ELASTIC,
     MECH_MOHR_COULOMB,
-    SOFTENS,
     Model,
     Rows,
+    softening_rows,
     softening_table,
+    temperature_table,
 )
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Drawn, Over, Table, Value
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Table, Value
 from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 Numbers = np.ndarray | Sequence[int] | None
@@ -45,6 +47,9 @@ SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """What becomes of bodies that overlap before the first step."""
+POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
+"""What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
+four times the smallest of its barycentric coordinates (Munjiza 2004)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
 
@@ -94,12 +99,13 @@ TRACTIONS = {
 
 @dataclass(frozen=True)
 class Options:
-    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
-    one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles of
-    flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
-    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
-    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most
+    one of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space.
+    mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant: grains move in it;
+    flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many as are needed)
+    of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often as those
+    of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]: Rayleigh
+    damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0
@@ -112,6 +118,7 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    potential: str = DISTANCE
     mechanical: bool = True
     hydraulic: bool = True
     one_way: bool = False
@@ -160,8 +167,8 @@ class ModelDefinition:
         self.fields: dict[str, RandomField] = {}
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
-        self.softening: list[Table] = []
-        """Tables over plastic strain, as they were when elements got them: rows hold their numbers, from 1 on."""
+        self.followed: list[Table] = []
+        """Tables over plastic strain or temperature, as they were given: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
@@ -333,16 +340,9 @@ class ModelDefinition:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
         if name != MECH_ISO_ELASTIC.name:
             self.refuse_in_space(f"model {name} of elements")
-        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
-
-    def _refuse_surfaces(self, given: Mapping[str, Value]) -> None:
-        """CommandError for properties of contact in a model whose bodies do not touch."""
-        for name in ("friction", "penalty"):
-            if name in given:
-                self.refuse_in_space(f"{name} of surfaces, which is for contact")
 
     def yielding(self) -> np.ndarray:
         """(ne,) bool: elements that are there and have a model that can yield."""
@@ -357,10 +357,16 @@ class ModelDefinition:
         return self.alive & np.array([name == model.name for name in names])[self.element_row]
 
     def softens(self) -> bool:
-        """Whether an element that is there has a property that follows a table over plastic strain."""
-        rows = self.element_rows
-        tables = np.any([rows.column(softening_table(name)) > 0.0 for name in SOFTENS], axis=0)
-        return bool(tables[self.element_row[self.alive]].any())
+        """Whether an element that is there can yield, and has a strength that follows a table."""
+        return bool(softening_rows(self.element_rows)[self.element_row[self.alive]].any())
+
+    def warms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature."""
+        elements, joints = (
+            np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
+            for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
+        )
+        return self.alive & elements[self.element_row], self.joint_exists() & joints[self.joint_row]
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
@@ -369,13 +375,11 @@ class ModelDefinition:
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         """Change some properties of elements that have a model. The stress follows the strain (total form)."""
-        self._refuse_surfaces(properties)
         at = self.numbers_of_elements(elements)
         self._adjust(self.element_rows, (self.element_row, at), at, ELEMENT, properties, _keep_moduli)
 
     def face_model(self, faces: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a contact model to faces, also to those that will be free only when a joint breaks."""
-        self.refuse_in_space("contact of surfaces")
         at = self.numbers_of_faces(faces)
         self._assign(self.face_rows, (self.face_row, at), at, FACE, name, properties)
 
@@ -463,7 +467,7 @@ class ModelDefinition:
     ) -> np.ndarray:  # fmt: skip
         """Complete, checked properties of objects `of` (n,): (n, properties), or (1, properties) if none of them
         differs from object to object. CommandError names the first object whose value cannot be."""
-        given = self._with_softening(model, given)
+        given = self._with_tables(model, given)
         each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
@@ -483,28 +487,48 @@ class ModelDefinition:
                 raise CommandError(f"{on} {number}: {error}") from None
         raise AssertionError("both ways to complete properties agree")
 
-    def _with_softening(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Properties of which those with a table over plastic strain have their value before any flow, and those that
-        can have one the number of their table."""
+    def _with_tables(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
+        """Properties of which those with a table over plastic strain have their value before any flow, those with one
+        over temperature the largest, and those that can have one the number of their table."""
         out = dict(given)
+        of_moduli = "young" in given or "shear" in given or "bulk" in given
+        if of_moduli and model.has(temperature_table("young")):
+            out[temperature_table("young")] = 0.0
         for name, value in given.items():
+            for table in (softening_table(name), temperature_table(name)):
+                if model.has(table):
+                    out[table] = 0.0
             if isinstance(value, Over) and value.axis == PLASTIC_STRAIN:
                 if not model.property(name).softens:
                     raise CommandError(f"{name} of {model.name} cannot follow a table over plastic strain")
-                self._value(name, value.table)
-                table = self.tables[value.table]
-                if table.times[0] < 0.0:
+                number = self._kept(model, name, value.table)
+                if self.followed[number - 1].times[0] < 0.0:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
-                for one in table.values.tolist():
-                    model.property(name).check(one)
-                known = [one.pairs() for one in self.softening]
-                if table.pairs() not in known:
-                    known.append(table.pairs())
-                    self.softening.append(table)
-                out[name], out[softening_table(name)] = table(0.0), 1.0 + known.index(table.pairs())
-            elif model.has(softening_table(name)):
-                out[softening_table(name)] = 0.0
+                out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
+            elif isinstance(value, Over) and value.axis == TEMPERATURE:
+                if not model.has(temperature_table(name)):
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
+                number = self._kept(model, name, value.table)
+                values = self.followed[number - 1].values
+                if name in ("gf1", "gf2") and values.min() == 0.0:
+                    raise CommandError(
+                        f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)"
+                    )
+                out[name], out[temperature_table(name)] = float(values.max()), float(number)
         return out
+
+    def _kept(self, model: Model, name: str, table: str) -> int:
+        """The number, from 1 on, of a table as it is now among those that rows follow; CommandError if a value of it is
+        none that this property can have."""
+        self._value(name, table)
+        found = self.tables[table]
+        for one in found.values.tolist():
+            model.property(name).check(one)
+        known = [one.pairs() for one in self.followed]
+        if found.pairs() not in known:
+            known.append(found.pairs())
+            self.followed.append(found)
+        return 1 + known.index(found.pairs())
 
     def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
         """The complete sets of properties (n, k); CommandError if flow makes dilation larger than friction."""
@@ -512,7 +536,7 @@ class ModelDefinition:
             place = {p.name: k for k, p in enumerate(model.properties)}
             pair = [place[name] for one in ("dilation", "friction") for name in (one, softening_table(one))]
             for row in np.unique(values[:, pair], axis=0):
-                tables = [self.softening[int(number) - 1] if number else None for number in row[[1, 3]]]
+                tables = [self.followed[int(number) - 1] if number else None for number in row[[1, 3]]]
                 if any(tables):
                     at = np.unique(np.concatenate([one.times for one in tables if one]))
                     dilation, friction = (one.at(at) if one else value for one, value in zip(tables, row[[0, 2]]))
@@ -804,16 +828,24 @@ class ModelDefinition:
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
         large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
-        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are.
+        potential ("distance"): of contact in space, see `POTENTIAL`."""
         given = {"dynamic": dynamic, "collision": collision, "large_strain": large_strain}
         if overlap is not None and overlap not in OVERLAP:
             raise CommandError(f"overlap is one of {', '.join(OVERLAP)}, got {overlap}")
         changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
         if overlap is not None:
             changes["overlap"] = overlap
+        if potential is not None:
+            if self.mesh is not None:
+                self._only_in_space("choice of the potential of contact", potential)
+            if potential not in POTENTIAL:
+                raise CommandError(f"the potential of contact is one of {', '.join(POTENTIAL)}, got {potential}")
+            changes["potential"] = potential
         self._set(**changes)
 
     def parts(
@@ -981,7 +1013,7 @@ class ModelDefinition:
             "tables": {name: table.pairs() for name, table in self.tables.items()},
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
-            "softening": [table.pairs() for table in self.softening],
+            "softening": [table.pairs() for table in self.followed],
             "element_rows": self.element_rows.state(),
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
@@ -999,7 +1031,7 @@ class ModelDefinition:
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]
-        self.softening = [Table.of(pairs) for pairs in state.get("softening", [])]
+        self.followed = [Table.of(pairs) for pairs in state.get("softening", [])]
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
@@ -1020,7 +1052,7 @@ def _is_number(value: Value) -> bool:
 
 def _differs(value: Value) -> bool:
     """From object to object."""
-    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis != PLASTIC_STRAIN)
+    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis < PLASTIC_STRAIN)
 
 
 def _can_be_number(value: Any) -> bool:

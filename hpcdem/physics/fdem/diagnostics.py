@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -451,9 +452,11 @@ def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def contacts(sim: Blocks) -> dict[str, np.ndarray]:
     """Touching pairs of this rank: element_1 < element_2, force_x, force_y [N/m] on element_1, x, y: middle of both
-    [m]. Every pair is on one rank, the owner of element_1. Collective."""
-    sim.refuse_in_space("contact")
+    [m]. Every pair is on one rank, the owner of element_1. In space element_1 has the face that touches, `face`, with
+    force_z and z. Collective."""
     seen = sim.evaluate()
+    if sim.dim == 3:
+        return _contacts_in_space(sim, seen)
     pairs, own = sim.local.pairs, sim.owned
     out = seen.pair_force
     at = np.flatnonzero(seen.touching)
@@ -473,6 +476,23 @@ def contacts(sim: Blocks) -> dict[str, np.ndarray]:
     for c, axis in enumerate("xy"):
         ends = [flat[pairs.x_place[body] + 2 * k + c] for body in (first, second) for k in range(3)]
         columns[axis] = np.mean(ends, axis=0) if len(at) else np.empty(0)
+    return columns
+
+
+def _contacts_in_space(sim: Blocks, seen: Evaluation) -> dict[str, np.ndarray]:
+    pairs: Any = sim.local.pairs
+    own, at = sim.owned, np.flatnonzero(seen.touching)
+    row = pairs.face_row[pairs.first[at]]
+    at = at[(row >= own.start) & (row < own.stop)]
+    first, second = pairs.first[at], pairs.second[at]
+    force = seen.pair_force[at, :9].reshape(-1, 3, 3).sum(axis=1)
+    flat = sim.x.reshape(-1)
+    columns = {
+        "element_1": pairs.face[first] // 4, "element_2": pairs.element[second], "face": pairs.face[first],
+    }  # fmt: skip
+    for c, axis in enumerate("xyz"):
+        columns[f"force_{axis}"] = force[:, c].copy()
+        columns[axis] = flat[pairs.corner[first] + c].mean(axis=1)
     return columns
 
 

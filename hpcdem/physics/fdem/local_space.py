@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from hpcdem.physics.fdem.kernels import elements, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import HISTORY
 from hpcdem.physics.fdem.local import ALPHA, Evaluation, Local, element_table
+from hpcdem.physics.fdem.pairs import Surfaces
+from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace
+from hpcdem.physics.fdem.tetrahedra import FACES
 from hpcdem.physics.fdem.user_functions import Placed
 
 if TYPE_CHECKING:
@@ -19,20 +23,11 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
-class NoPairs:
-    """Bodies in space do not touch in this version."""
-
-    rows = np.empty(0, np.int64)
-
-    def __len__(self) -> int:
-        return 0
-
-
 class LocalSpace(Local):
     """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
 
     dim, force_width, stride = 3, tets.ROW, tets.STRIDE
-    plastic = creeps = yields = False
+    plastic = creeps = yields = warms = False
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -44,11 +39,16 @@ class LocalSpace(Local):
         self.laws: list = []
         self._make_constants()
         self._make_joints()
-        self.pairs: Any = NoPairs()
+        self.pairs: Any = ContactSpace(sim, self, *ContactSpace.remembered(sim))
         self._make_loads()
         self._make_nodes()
         self._set_masses()
         self._bind()
+
+    @cached_property
+    def shapes(self) -> Any:
+        """What contact needs to know of the elements held here, by storage row."""
+        return ShapesSpace(self.sim, self.sim.number)
 
     def _make_constants(self) -> None:
         sim, mesh = self.sim, self.sim.the_mesh()
@@ -88,16 +88,42 @@ class LocalSpace(Local):
         pass
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """None: joints and contact are not there."""
-        return np.zeros((self.sim.n_own, 4)), np.zeros((self.sim.n_own, 4))
+        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: what the contact
+        of its free faces can have, k = P A (1 / h + 1 / h_other) / 3 per face, h_other: the smallest of all."""
+        sim, own = self.sim, self.sim.owned
+        springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
+        if not sim.options.collision:
+            return springs, dashpots
+        faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
+        length = self.shapes.double_area[own]
+        surfaces = Surfaces(sim, self.shapes, faces, np.repeat(np.arange(own.start, own.stop), 4))
+        silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
+        ratio = surfaces.ratio.max(initial=0.0)
+        found = np.array([float(np.max(1.0 / length, initial=0.0)), float(silent.any()), ratio])
+        highest, some, ratio = sim.comm.max_into(found).tolist()
+        most = surfaces.slope * surfaces.most_penalty(some == 0.0).reshape(-1, 4)
+        contact = most * self.shapes.area[own] / 3.0 * (1.0 / length[:, None] + highest)
+        may_touch = ~sim.closed_faces()[faces]
+        if sim.options.dynamic:
+            may_touch |= sim.joint_row[faces] > 0  # once they break
+        contact = np.where(may_touch.reshape(-1, 4), contact, 0.0)
+        # A third of 2 xi sqrt(k m) A, with k A = 3 `contact` and m A no more than three corners of the element have.
+        drag = 2.0 * ratio * np.sqrt(contact * self.true_mass[own].max(axis=1, initial=0.0)[:, None])
+        for k in range(4):
+            for c in FACES[k]:
+                springs[:, c] += contact[:, k]
+                dashpots[:, c] += drag[:, k]
+        return springs, dashpots
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
         o = self.sim.options
         rows = self.rows[: self.count]
-        return space.time_step(self.c, rows, o.mass_damping, o.stiffness_damping, o.safety, target, mass)
+        return space.time_step(
+            self.c, rows, self.sim.n_left, *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass
+        )
 
     def _make_static_masses(self) -> None:
-        space.static_masses(self.c, self.rows[: self.count], ALPHA, self.mass)
+        space.static_masses(self.c, self.rows[: self.count], self.sim.n_left, self.springs()[0], ALPHA, self.mass)
 
     def _set_kicks(self, dt: float) -> None:
         pass
@@ -110,8 +136,11 @@ class LocalSpace(Local):
 
     def forces(self) -> None:
         """Forces at the present positions, and the velocities that follow from them. Collective."""
-        timers = self.sim.timers
+        sim, timers = self.sim, self.sim.timers
         self.passes += 1
+        if len(self.pairs):
+            with timers("contact"):
+                self.pairs.forces(sim.x, sim.v, sim.clock.dt)
         with timers("force"):
             self._fill(self.force)
         with timers("node"):
@@ -123,6 +152,7 @@ class LocalSpace(Local):
             sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, sim.stress0 is not None,
             not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
         )  # fmt: skip
+        self.pairs.add_to(force)
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
@@ -164,15 +194,20 @@ class LocalSpace(Local):
 
     def evaluation(self, contact: bool = True) -> Evaluation:
         """Forces at the present positions; everything is put back as it was. Collective."""
-        sim = self.sim
-        kept = [(table, table.copy()) for table in (sim.v, self.outside, self.felt)]
+        sim, pairs = self.sim, self.pairs
+        kept = [
+            (table, table.copy()) for table in (sim.v, self.outside, self.felt, pairs.history, pairs.touching)
+        ]  # fmt: skip
         stored, self.force = self.force, np.zeros((len(sim.number), tets.ROW))
+        if not contact:
+            pairs.pushed[:] = 0.0
+        elif len(pairs):
+            pairs.forces(sim.x, sim.v, sim.clock.dt)
         self._fill(self.force)
         self.move_nodes()
-        nothing = np.zeros((0, 0))
         found = Evaluation(
-            self.force, np.zeros_like(self.force), nothing, np.empty(0, bool), nothing, self.outside.copy(),
-            self.felt.copy(), sim.v.copy(),
+            self.force, np.zeros_like(self.force), pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
+            self.outside.copy(), self.felt.copy(), sim.v.copy(),
         )  # fmt: skip
         self.force = stored
         for table, values in kept:
@@ -198,14 +233,15 @@ class LocalSpace(Local):
         return np.zeros(self.sim.n_own)
 
     def histories(self, transfer: bool) -> Histories:
-        """None: neither joints nor contacts are there."""
-        return Histories.empty(self.sim.n_own)
+        """What contacts of the owned elements remember."""
+        return Histories.of(self.sim.n_own, *self.pairs.histories(self.sim))
 
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same."""
+        """Contact histories of joints that have just broken: there are none."""
         return np.empty(0, np.int64), np.zeros((0, WORDS))
 
     def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
-        """There are no lists; masses change with the mode. Collective."""
+        """New contact lists. Collective."""
+        self.pairs = ContactSpace(self.sim, self, *self.pairs.known())
         if self.sim.masses_change():
             self._set_masses()

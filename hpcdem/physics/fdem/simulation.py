@@ -28,8 +28,8 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, overlaps, user_laws
-from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
+from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, user_laws
+from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
 from hpcdem.physics.fdem.kernels import elements, plasticity, space, tets
@@ -40,7 +40,7 @@ from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.local_space import LocalSpace
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
-from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS
+from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS, temperature_table
 from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, ListState, State
 from hpcdem.physics.fdem.tables import Value
 
@@ -191,15 +191,17 @@ class Blocks(State):
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
         changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
-        it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        it; "relax": a static stage moves them apart; "keep": they start as they are. potential ("distance"): of contact
+        in space, see `definition.POTENTIAL`."""
         before = self.options.dynamic
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
-        super().option(dynamic, collision, large_strain, overlap)
+        super().option(dynamic, collision, large_strain, overlap, potential)
         if self.options.dynamic != before:
             self.v[:] = 0.0
 
@@ -282,11 +284,8 @@ class Blocks(State):
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
         o = self.options
-        if self.dim == 3 and o.collision:
-            raise CommandError(
-                "in three dimensions surfaces do not touch in this version: model option collision off says that they "
-                "may pass through each other"
-            )
+        if self.dim == 2 and o.potential != DISTANCE:
+            raise CommandError("in two dimensions there is no choice of the potential of contact")
         flows = o.hydraulic and "fluid" in self.surface_loads
         heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
@@ -573,10 +572,30 @@ class Blocks(State):
             raise CommandError(f"element {bare[0]} has no model ({len(bare)} elements in all)")
         if not self.alive.any():
             raise CommandError("there are no elements left")
+        self._check_warmth()
         if self.options.stiffness_damping and user_laws.in_use(self):
             raise CommandError(
                 f"the stiffness of {user_laws.some(self)}, which has a law of the user, is not known: Rayleigh damping "
                 "can have its part mass only"
+            )
+
+    def _check_warmth(self) -> None:
+        """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
+        elements, joints = self.warms()
+        if by_temperature.TEMPERATURE not in self.cold:
+            for what, at in (("element", elements), ("joint", joints)):
+                if at.any():
+                    raise CommandError(
+                        f"a property of {what} {np.flatnonzero(at)[0]} follows a table over temperature, but there is "
+                        "no heat: element c-model thermal-iso-heat for all"
+                    )
+        soft = elements & (self.element_rows.column(temperature_table("young"))[self.element_row] > 0.0)
+        beside = np.flatnonzero(self.quiet_faces() & np.repeat(soft, 4))
+        if len(beside) or (soft.any() and "free_field" in self.surface_loads):
+            element = beside[0] // 4 if len(beside) else np.flatnonzero(soft)[0]
+            raise CommandError(
+                f"young of element {element} follows a table over temperature: quiet faces and free-field sides have "
+                "dashpots of one modulus, a number"
             )
 
     def renew_topology(self) -> None:

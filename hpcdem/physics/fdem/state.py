@@ -134,6 +134,8 @@ class State(ModelDefinition, Model):
         self._topology_stale = True
         self._longest = 0.0
         self.mean_edge = 0.0
+        self.surface: Any = None
+        """In space: what contact knows of the surface, see `pairs_space.Surface`."""
         self.untouched = True
         """Nothing has moved since there is this mesh."""
         self._told_step = 0.0

@@ -140,11 +140,12 @@ def _creep(mesh: Mesh, threads: int) -> None:
 def in_space(threads: int = 1) -> None:
     """Those of tetrahedra: in motion with conditions and loads, and at rest."""
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
-    mesh = Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)])
+    below = [(x, y, z - 1.001) for x, y, z in points[:4]]
+    mesh = Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
     sim = Blocks(SerialComm(), threads)
     sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", {k: v for k, v in ROCK.items() if k != "friction"})
-    sim.option(collision=False)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.face_model([0], "contact_mohr_coulomb", {"penalty_normal": 1e10})
     sim.initial_stress(None, yy=1e3)
     sim.velocity_condition([0], vx=0.0, vz=0.0)
     sim.stress_condition([0], normal=-1.0)

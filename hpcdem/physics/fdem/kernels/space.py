@@ -13,6 +13,7 @@ from numba import njit, prange
 
 from hpcdem.core.cells import COLUMN, index
 from hpcdem.physics.fdem.kernels import laws
+from hpcdem.physics.fdem.kernels.limits import corner_step
 from hpcdem.physics.fdem.kernels.nodes import ACCELERATION, FREE, VELOCITY
 from hpcdem.physics.fdem.kernels.tets import ETA, INVERSE, LAMBDA, ROW, STRIDE, TWO_MU, WEIGHT
 
@@ -285,36 +286,26 @@ def _omega2(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stable(omega_e2, true_mass, mass, drag, eta, modulus):
-    """Time step of a corner, see `limits`."""
-    omega2 = omega_e2 * true_mass / mass
-    if omega2 <= 0.0:
-        return math.inf
-    omega = math.sqrt(omega2)
-    xi = 0.5 * eta * omega2 / (modulus * omega) + 0.5 * drag * true_mass / (mass * omega)
-    return 2.0 / omega * (math.sqrt(1.0 + xi * xi) - xi)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def time_step(c, rows, drag, beta, safety, target, mass):
-    """Largest stable time step over the corners of tetrahedra [s], see `limits.time_step`."""
+def time_step(c, rows, first, springs, dashpots, drag, beta, safety, target, mass):
+    """Largest stable time step over the corners of tetrahedra [s], see `limits.time_step`; springs (n_own, 4) [N/m],
+    dashpots [N s/m]: of contact, k = P A (1 / h_t + 1 / h_c) / 3 per face of the area A."""
     least = math.inf
     for i in range(len(rows)):
         modulus = c[i, LAMBDA] + c[i, TWO_MU]
         omega2, eta = _omega2(c[i]), c[i, ETA] + beta * modulus
         for k in range(4):
-            true = mass[rows[i], k]
-            dt = _stable(omega2, true, true, drag, eta, modulus)
+            true, spring, dashpot = mass[rows[i], k], springs[rows[i] - first, k], dashpots[rows[i] - first, k]
+            dt = corner_step(omega2, true, true, spring, dashpot, drag, eta, modulus)
             while safety * dt < target:
                 mass[rows[i], k] *= max((target / (safety * dt)) ** 2, 1.0 + 1e-6)
-                dt = _stable(omega2, true, mass[rows[i], k], drag, eta, modulus)
+                dt = corner_step(omega2, true, mass[rows[i], k], spring, dashpot, drag, eta, modulus)
             least = min(least, dt)
     return least
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def static_masses(c, rows, alpha, mass):
-    """Fictitious masses for a time step of 1, see `limits.static_masses`."""
+def static_masses(c, rows, first, springs, alpha, mass):
+    """Fictitious masses for a time step of 1, see `limits.static_masses`; springs: see `time_step`."""
     factor = 0.25 * 1.25 * (1.0 + alpha)
     g = np.empty((4, 3))
     for i in range(len(rows)):
@@ -335,4 +326,4 @@ def static_masses(c, rows, alpha, mass):
                         more = mu * both if a == b else 0.0
                         row += abs(lam * g[k, a] * g[m, b] + mu * g[k, b] * g[m, a] + more)
                 most = max(most, row)
-            mass[rows[i], k] = factor * most / (6.0 * det)
+            mass[rows[i], k] = factor * (most / (6.0 * det) + 2.0 * springs[rows[i] - first, k])
