@@ -65,6 +65,9 @@ def members(
         choices[name] = _choice(script, name, words, sampling is not None and name != "seed")
     lists = {name: values for name, values in choices.items() if isinstance(values, list)}
     ranges = {name: values for name, values in choices.items() if isinstance(values, Range)}
+    number = math.prod(map(len, lists.values())) * (1 if sampling is None else sampling.number)
+    if number > MOST:
+        raise UsageError(f"these are {number} members, more than {MOST}")
     samples: list[dict[str, Value]] = [{}]
     if sampling is not None:
         if not ranges:
@@ -75,8 +78,6 @@ def members(
         points = sampling.points(len(ranges))
         samples = [{n: r.at(u) for (n, r), u in zip(ranges.items(), point.tolist(), strict=True)} for point in points]
     crossed = [dict(zip(lists, values, strict=True)) for values in itertools.product(*lists.values())]
-    if len(samples) * len(crossed) > MOST:
-        raise UsageError(f"these are {len(samples) * len(crossed)} members, more than {MOST}")
     found = [{name: (one | other)[name] for name in wanted} for one in samples for other in crossed]
     for values in found:
         script.with_values(values)  # ScriptError before anything runs

@@ -83,6 +83,7 @@ def test_log_ranges_are_even_in_the_logarithm():
         ({"friction": ","}, None, "no value"),
         ({"friction": "1:90000", "n": "1:90000"}, None, "more than"),
         ({"n": "1:900000000000"}, None, "more than"),
+        ({"n": "1:9"}, Sampling("sobol", 2**40), "more than"),
     ],
 )
 def test_what_cannot_be_is_refused(wanted, sampling, why):

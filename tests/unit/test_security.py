@@ -58,8 +58,8 @@ KNOWN = {
     ("page/maker.py", "zipfile.ZipFile"),
     # This Python with a module of this package; requests reach it as JSON in a pipe.
     ("page/worker.py", "subprocess.Popen"),
-    # This Python with a module of this package; sbatch with a job script that was just written. Of a sweep's folder only
-    # the name of the script is taken, which is the user's own.
+    # This Python with a module of this package; sbatch with a job script that was just written. Of a sweep's folder
+    # only the name of the script is taken, which is the user's own.
     ("sweep/driver.py", "subprocess.Popen"),
     ("sweep/member.py", "subprocess.Popen"),
     ("sweep/array.py", "subprocess.run"),
