@@ -38,7 +38,7 @@ def cracking(sim: Blocks) -> None:
     for one in np.unique(np.round(x, 1)):
         changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
     heat = Heat.of(sim)
-    heat.assign(None, {**HOT, "conductivity_across": 1.0, "conductivity_angle": 20.0})
+    heat.assign(None, {**HOT, "conductivity_across": 1.0, "conductivity_angle": 20.0, "friction_heat": 0.8})
     heat.initial(None, 20.0)
     sim.table("oven", [(0.0, 20.0), (3e4, 320.0), (1e5, 120.0)])
     heat.prescribe(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.15), "oven")
