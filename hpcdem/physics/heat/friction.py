@@ -1,8 +1,8 @@
-"""Heat of friction where surfaces slide: the work of the tangential forces of contact over a step, -F_s v_s dt, goes to
-both walls.
+"""Heat of friction where surfaces slide: the work of the tangential forces of contact over a step, -F_s v_s dt, goes
+to both walls.
 
-F_s, what an edge remembers of its friction (physics/fdem/kernels/contact.py), and the sliding speed v_s at the centre of
-the force are those by which the contact works on the blocks. Each wall takes the share of its effusivity
+F_s, what an edge remembers of its friction (physics/fdem/kernels/contact.py), and the sliding speed v_s at the centre
+of the force are those by which the contact works on the blocks. Each wall takes the share of its effusivity
 e = sqrt(k rho c): e_1 / (e_1 + e_2), as two half spaces that have one temperature where they touch; its corners take it
 by the same weights as the force. What the springs of friction store comes back when they let go.
 """

@@ -45,8 +45,8 @@ SPREAD = 0.1
 TEMPERATURE, GIVEN, CAPACITY, UNSTRESSED = "temperature", "heat_given", "heat_capacity", "unstressed"
 RUBBED = "heat_of_friction"
 """Columns of elements: of corners temperature [K], heat that conditions gave [J/m], heat capacity [J/(m K)]; mean
-temperature at which the element is free of thermal stress [K]; of corners heat of friction that waits for the next cycle
-[J/m]."""
+temperature at which the element is free of thermal stress [K]; of corners heat of friction that waits for the next
+cycle [J/m]."""
 _NAMES = tuple(one.name for one in ISO_HEAT.properties)
 
 
