@@ -214,6 +214,6 @@ def it_flows(found: Found) -> None:
 MODELS = {
     "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
     "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703),
-    "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=900, middle=503),
+    "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503),
     "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503),
 }
