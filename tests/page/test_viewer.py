@@ -392,3 +392,25 @@ def test_every_pixel_picks_what_is_there(viewing: Viewing, folder: Path):
         found = viewing.ask("pick", wanted)
         assert found["object"] == "elements" and found["number"] >= number, number  # later ones may lie over it
         assert found["number"] == number or number < 9
+
+
+def test_fields_that_take_long_are_told_once_they_were_chosen(tmp_path: Path):
+    """The stress of particles is made from all contacts: a click shows it after it was the colour."""
+    frames.write_discs(tmp_path)
+    viewing = Viewing(tmp_path)
+    try:
+        view = viewing.ask("about", {})["view"] | {"camera": [-0.5, 4.5, -0.5, 4.5]}
+        view["layers"] = [one for one in view["layers"] if one["object"] == "particles"]
+        wanted = {"view": view, "width": 500, "height": 500, "column": 250, "row": 250}
+
+        def told() -> dict[str, Any]:
+            found = viewing.ask("pick", wanted)
+            assert found["object"] == "particles" and found["number"] == 22
+            return {name: value for name, value, _ in found["values"]}
+
+        names = [name for name, _ in viewing.ask("fields", {"object": "particles"})["fields"]]
+        assert "stress_xx" in names and "stress_xx" not in told() and told()["vx"] == 12.0
+        view["layers"][0]["field"] = "stress_xx"
+        assert isinstance(told()["stress_xx"], float)
+    finally:
+        viewing.close()
