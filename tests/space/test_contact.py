@@ -443,3 +443,18 @@ pcdc model solve time 0.4
         found.append(way(sim, top)[2])
     assert -0.201 < min(found) and max(found) < -0.195  # it still rings
     assert found[0] != found[1]
+
+
+def test_bodies_that_overlap_are_moved_apart() -> None:
+    """By a static stage, after which the dynamic one begins without a word."""
+    sim, block = on_a_plate(box((1, 1, 1), (0.2, 0.2, 0.2)), (0.43, 0.21, 0.199))
+    sim.option(overlap="relax")
+    with pytest.raises(CommandError, match="moved apart by a static stage"):
+        sim.step()
+    sim.option(dynamic=False)
+    for _ in range(300):
+        sim.step()
+    assert len(overlaps.deepest(sim, sim.local)) == 0
+    assert way(sim, block)[2] > 0.9e-3
+    sim.option(dynamic=True, overlap="refuse")
+    sim.step()

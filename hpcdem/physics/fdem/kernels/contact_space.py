@@ -24,6 +24,7 @@ import math
 import numpy as np
 from numba import njit, prange
 
+from hpcdem.numerics.lanes import U
 from hpcdem.physics.fdem.kernels.tets import ROW, STRIDE
 from hpcdem.physics.fdem.tetrahedra import FACES
 
@@ -46,9 +47,14 @@ AGAINST = -0.1
 # Scratch: four polygons of at most twelve corners (u, v), distances of their corners from a cut, lambda_k and
 # s_k lambda_k at the corners of the face (4, 3), inward normals of the sides of the target (4, 3), of length 6 V / H_k.
 _MOST = 24
-_FIRST, _SECOND, _THIRD, _FOURTH = 0, _MOST, 2 * _MOST, 3 * _MOST
-_DISTANCE, _LAMBDA, _G, _NORMALS = 96, 108, 120, 132
+_FIRST, _SECOND, _THIRD, _FOURTH = (U(k * _MOST) for k in range(4))
+_DISTANCE = U(96)
+_LAMBDA, _G, _NORMALS = 108, 120, 132
 SCRATCH = 144
+_0, _1, _2, _3, _4 = (U(k) for k in range(5))
+_NEXT = U(3)
+"""From s_k lambda_k at the first corner of the face to that of the next k."""
+_AT_G = U(_G)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -57,38 +63,40 @@ def _cut(n, at, to, a, b, c, tie, w):
     or still at `at` if it is the whole. tie: what is zero everywhere belongs to it."""
     most, least = -math.inf, math.inf
     for i in range(n):
-        d = a + (b * w[at + 2 * i] + c * w[at + 2 * i + 1])
+        d = a + (b * w[at + _2 * i] + c * w[at + _2 * i + _1])
         w[_DISTANCE + i] = d
-        most, least = max(most, d), min(least, d)
+        most = d if d > most else most
+        least = d if d < least else least
     if least >= 0.0 and (most > 0.0 or tie):
         return n, at
     if most <= 0.0:
-        return 0, at
-    m, before = 0, n - 1
+        return _0, at
+    m = _0
+    last = at + _2 * (n - _1)
+    d0, u0, v0 = w[_DISTANCE + n - _1], w[last], w[last + _1]
     for i in range(n):
-        d0, d1 = w[_DISTANCE + before], w[_DISTANCE + i]
+        d1, u1, v1 = w[_DISTANCE + i], w[at + _2 * i], w[at + _2 * i + _1]
         if (d0 > 0.0 and d1 < 0.0) or (d0 < 0.0 and d1 > 0.0):
             part = d0 / (d0 - d1)
-            u, v = w[at + 2 * before], w[at + 2 * before + 1]
-            w[to + 2 * m] = u + part * (w[at + 2 * i] - u)
-            w[to + 2 * m + 1] = v + part * (w[at + 2 * i + 1] - v)
-            m += 1
+            w[to + _2 * m] = u0 + part * (u1 - u0)
+            w[to + _2 * m + _1] = v0 + part * (v1 - v0)
+            m += _1
         if d1 >= 0.0:
-            w[to + 2 * m], w[to + 2 * m + 1] = w[at + 2 * i], w[at + 2 * i + 1]
-            m += 1
-        before = i
+            w[to + _2 * m], w[to + _2 * m + _1] = u1, v1
+            m += _1
+        d0, u0, v0 = d1, u1, v1
     return m, to
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _integrate(n, at, a, b, c, w):
     """Integrals over a polygon of g = a + b u + c v, g u, g v and 1, and the largest g at a corner."""
-    u0, v0, u1, v1 = w[at], w[at + 1], w[at + 2], w[at + 3]
+    u0, v0, u1, v1 = w[at], w[at + _1], w[at + _2], w[at + _3]
     g0, g1 = a + (b * u0 + c * v0), a + (b * u1 + c * v1)
     zero = of_u = of_v = area = 0.0
     deepest = max(g0, g1)
-    for i in range(2, n):
-        u2, v2 = w[at + 2 * i], w[at + 2 * i + 1]
+    for i in range(_2, n):
+        u2, v2 = w[at + _2 * i], w[at + _2 * i + _1]
         g2 = a + (b * u2 + c * v2)
         double = (u1 - u0) * (v2 - v0) - (v1 - v0) * (u2 - u0)
         all_three = g0 + (g1 + g2)
@@ -105,32 +113,35 @@ def _integrate(n, at, a, b, c, w):
 def _integrals(w):
     """Integrals of phi = min g_k, phi u, phi v and 1 over the part of the face where phi > 0, and the largest phi;
     g_k at the corners of the face are in the scratch. The area of the whole face is 1/2."""
-    for i in range(6):
+    for i in range(U(6)):
         w[_FIRST + i] = 0.0
-    w[_FIRST + 2] = w[_FIRST + 5] = 1.0
-    n, at = 3, _FIRST
-    for k in range(4):
-        a = w[_G + 3 * k]
-        n, at = _cut(
-            n, at, _SECOND if at == _FIRST else _FIRST, a, w[_G + 3 * k + 1] - a, w[_G + 3 * k + 2] - a, False, w
-        )
-        if n < 3:
+    w[_FIRST + _2] = w[_FIRST + U(5)] = 1.0
+    n, at = _3, _FIRST
+    for k in range(_4):
+        g = _AT_G + _NEXT * k
+        a = w[g]
+        n, at = _cut(n, at, _SECOND if at == _FIRST else _FIRST, a, w[g + _1] - a, w[g + _2] - a, False, w)
+        if n < _3:
             return 0.0, 0.0, 0.0, 0.0, 0.0
     zero = of_u = of_v = area = deepest = 0.0
-    for k in range(4):
-        a = w[_G + 3 * k]
-        b, c = w[_G + 3 * k + 1] - a, w[_G + 3 * k + 2] - a
+    for k in range(_4):
+        g = _AT_G + _NEXT * k
+        a = w[g]
+        b, c = w[g + _1] - a, w[g + _2] - a
         m, here = n, at
-        for j in range(4):
+        for j in range(_4):
             if j == k:
                 continue
-            a2 = w[_G + 3 * j]
-            b2, c2 = w[_G + 3 * j + 1] - a2, w[_G + 3 * j + 2] - a2
+            g = _AT_G + _NEXT * j
+            a2 = w[g]
             # Where two are equal all over the face the part belongs to the first one.
-            m, here = _cut(m, here, _FOURTH if here == _THIRD else _THIRD, a2 - a, b2 - b, c2 - c, j > k, w)
-            if m < 3:
+            m, here = _cut(
+                m, here, _FOURTH if here == _THIRD else _THIRD, a2 - a, (w[g + _1] - a2) - b, (w[g + _2] - a2) - c,
+                j > k, w,
+            )  # fmt: skip
+            if m < _3:
                 break
-        if m < 3:
+        if m < _3:
             continue
         one, two, three, four, five = _integrate(m, here, a, b, c, w)
         zero, of_u, of_v, area, deepest = zero + one, of_u + two, of_v + three, area + four, max(deepest, five)
