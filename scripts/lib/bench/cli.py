@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench import blocks, coupled, launch, other, runs, strain_stress, tables
+from bench import blocks, coupled, launch, other, runs, strain_stress, tables, view
 from bench.launch import Layout
 from bench.peers import PEERS
 from bench.workloads import PEER_WORKLOADS, cache_folder, workloads
@@ -186,6 +186,24 @@ def memory(
     The bed is laid out of copies of the settled unit bed and does not settle again, so ten million take minutes.
     """
     other.memory(int(particles), unit, layouts, steps, checkpoint, tables.Lines(json_file), maker(layouts))
+
+
+@bench.command("view", context_settings=HELP)
+@click.option("--objects", type=float, multiple=True, default=(1e5, 1e6), metavar="N", help="Several times.")
+@click.option(
+    "--kind", "kinds", type=click.Choice(view.KINDS), multiple=True, default=view.KINDS, help="Several times."
+)
+@click.option("--frames", type=click.IntRange(2), default=6, metavar="N", help="Frames in the folder [6].")
+@JSON
+def view_(objects: tuple[float, ...], kinds: tuple[str, ...], frames: int, json_file: str | None) -> None:
+    """First picture, pictures per second, clicks and memory of `hpcdem view` at 1280 x 720."""
+    lines = tables.Lines(json_file)
+    for kind in kinds:
+        for size in objects:
+            view.measure(kind, int(size), frames, lines)
+    for row in lines.rows:
+        runs.say(", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()))
+    lines.close()
 
 
 @bench.command("strain-stress", context_settings=HELP)

@@ -1,0 +1,113 @@
+"""How fast `hpcdem view` is: frames of so many objects are made up, and its page is asked as a browser asks it."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.strain_stress import make_frames
+from bench.tables import Lines
+
+KINDS = ("discs", "triangles")
+WIDTH, HEIGHT = 1280, 720
+PICTURES = 30
+
+
+def measure(kind: str, size: int, frames: int, lines: Lines) -> None:
+    """Time to the first picture from the start of the program, pictures per second while the camera moves and while
+    frames go by, time of a click, and largest memory of the server."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = (
+            make_frames(Path(folder), size, frames, "vtkhdf")
+            if kind == "discs"
+            else _blocks(Path(folder), size, frames)
+        )
+        for path in Path(folder).iterdir():  # into the cache of the system: frames are warm
+            path.read_bytes()
+        began = time.perf_counter()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "hpcdem", "view", folder, "--no-browser"], stdout=subprocess.PIPE, text=True
+        )
+        try:
+            assert process.stdout is not None
+            url = re.match(r"Page: (\S+)", process.stdout.readline())[1]  # type: ignore[index]
+            row = _asked(url, began, "vx" if kind == "discs" else "stress_yy")
+            status = Path(f"/proc/{process.pid}/status").read_text()
+            row["memory_mb"] = int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1e3  # type: ignore[index]
+        finally:
+            process.terminate()
+            process.wait()
+    lines.add({"code": "hpcdem view", "kind": kind, "objects": made, "frames": frames, **row})
+
+
+def _asked(url: str, began: float, field: str) -> dict[str, Any]:
+    state = json.loads(_ask(url, "state", {}))
+    count = len(state["sources"][0]["frames"])
+    about = json.loads(_ask(url, "about", {}))
+    left, right, bottom, top = about["whole"]
+    # All of the model, at the shape of the window.
+    half = 0.5 * max(top - bottom, (right - left) * HEIGHT / WIDTH)
+    wide = half * WIDTH / HEIGHT
+    x, y = 0.5 * (left + right), 0.5 * (bottom + top)
+    about["view"]["layers"][0]["field"] = field
+
+    def wanted(shift: float, frame: int) -> dict[str, Any]:
+        camera = [x - wide + shift * wide, x + wide + shift * wide, y - half, y + half]
+        return {"view": about["view"] | {"camera": camera}, "frame": frame, "width": WIDTH, "height": HEIGHT}
+
+    _ask(url, "picture", wanted(0.0, count - 1))
+    first = time.perf_counter() - began
+    moving = _pace(lambda k: _ask(url, "picture", wanted(1e-3 * (k + 1), count - 1)))
+    scrubbing = _pace(lambda k: _ask(url, "picture", wanted(0.0, k % count)))
+    asked = time.perf_counter()
+    _ask(url, "pick", wanted(0.0, (PICTURES - 1) % count) | {"column": WIDTH // 2, "row": HEIGHT // 2})
+    return {
+        "first_s": first, "moving_per_s": moving, "scrubbing_per_s": scrubbing,
+        "pick_ms": 1e3 * (time.perf_counter() - asked),
+    }  # fmt: skip
+
+
+def _pace(one: Any) -> float:
+    began = time.perf_counter()
+    for k in range(PICTURES):
+        one(k)
+    return PICTURES / (time.perf_counter() - began)
+
+
+def _ask(url: str, name: str, content: dict[str, Any]) -> bytes:
+    request = urllib.request.Request(url + name, json.dumps(content).encode(), {"Content-Type": "application/json"})
+    with urllib.request.urlopen(request, timeout=120) as response:
+        return response.read()
+
+
+def _blocks(folder: Path, size: int, frames: int) -> int:
+    """Triangles of squares, with a stress that differs from frame to frame."""
+    from hpcdem.halo.comm import SerialComm
+    from hpcdem.io.frame import Table
+    from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
+
+    side = int((size / 2) ** 0.5)
+    x, y = (v.ravel().astype(float) for v in np.meshgrid(np.arange(side), np.arange(side)))
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 0], [1, 1], [0, 1]], float)
+    at = (np.stack([x, y], 1)[:, None] + square).reshape(-1, 2)
+    count = 2 * side * side
+    number = (4 * np.arange(count)[:, None] + np.arange(3)).ravel()
+    no_joints = {name: np.zeros(0, np.int64) for name in ("number", "first", "last")}
+    for k in range(frames):
+        stress = np.sin(0.05 * np.arange(count) / side + 0.3 * k)
+        frame = MeshFrame(
+            k, 0.1 * k, 0.1, Table({"number": number, "x": at[:, 0], "y": at[:, 1]}, 0, len(at)),
+            Table({"number": np.arange(count), "corners": np.full(count, 3), "stress_yy": stress}, 0, count),
+            Table(no_joints | {"state": np.zeros(0), "mode": np.zeros(0)}, 0, 0), {},
+        )  # fmt: skip
+        write_mesh_frame(folder / f"rock_{k:010d}.vtkhdf", frame, SerialComm())  # type: ignore[arg-type]
+    return count
