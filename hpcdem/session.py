@@ -280,6 +280,13 @@ def _plastic_tangent() -> WarmUp:
     return warm_up.plastic_tangent, (plastic_stiffness,)
 
 
+def _space() -> WarmUp:
+    from hpcdem.physics.fdem import tetrahedra, warm_up
+    from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
+
+    return warm_up.in_space, (tets, space, tetrahedra, contact_space, detect_space)
+
+
 KINDS = {
     "shared": Kernels(_shared),
     "": Kernels(_particles),
@@ -294,10 +301,11 @@ KINDS = {
     "creep": Kernels(_creep),
     "tangent": Kernels(_tangent),
     "plastic-tangent": Kernels(_plastic_tangent, after=("yielding", "tangent")),
+    "space": Kernels(_space),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent")
+OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space")
 """Those that come when a model of blocks asks for them."""
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError, ScriptError
 from hpcdem.lang.pcdc import bindings, parser, rules, trial
 from hpcdem.lang.pcdc.keywords import matching
-from hpcdem.lang.pcdc.kinds import FunctionName, Kind, TableName
+from hpcdem.lang.pcdc.kinds import FunctionName, Kind, TableName, fitting
 from hpcdem.lang.pcdc.lexer import short
 from hpcdem.lang.pcdc.table import PCDC, Command, Model, Option
 from hpcdem.lang.zdem.nearest import hint
@@ -32,11 +32,13 @@ _WORDS = {
 }
 
 
-def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False) -> dict[str, Any]:
-    """Those of a command without models, by the names of Python; what is None is left out. ranged: it has a range.
-    ValueError names the one that is wrong, CommandError a value that no model could make right."""
+def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False, dim: int = 2) -> dict[str, Any]:
+    """Those of a command without models, by the names of Python; what is None is left out. ranged: it has a range; dim:
+    dimensions of the model. ValueError names the one that is wrong, CommandError a value that no model could make
+    right."""
+    _there(command.name, command.dims, dim)
     options = (*command.leading, *command.options)
-    found = _read(options, given, command.name)
+    found = _read(options, given, command.name, dim)
     if command.needs_option and not any(option.name in found for option in command.options):
         raise ValueError(f"needs at least one of {_listed(command.options)}")
     rules.check(command, found, () if ranged else None)
@@ -44,13 +46,15 @@ def arguments(command: Command, given: Mapping[str, Any], ranged: bool = False) 
     return found
 
 
-def model_arguments(command: Command, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+def model_arguments(command: Command, name: str, given: Mapping[str, Any], dim: int = 2) -> dict[str, Any]:
     """The same of a command that names a constitutive model or condition."""
+    _there(command.name, command.dims, dim)
     model = _model(command, name)
+    _there(f"model {model.keyword}", model.dims, dim)
     leading = {option.name: given[option.name] for option in model.leading if option.name in given}
-    first = _read(model.leading, leading, f"model {model.keyword}")
+    first = _read(model.leading, leading, f"model {model.keyword}", dim)
     given = {name: value for name, value in given.items() if name not in first}
-    properties = _read(model.options, given, f"model {model.keyword}")
+    properties = _read(model.options, given, f"model {model.keyword}", dim)
     if model.any_of and not properties:
         raise ValueError(f"needs at least one of {_listed(model.options)}")
     if model.one_of and not any(all(word in properties for word in words) for words in model.one_of):
@@ -59,6 +63,12 @@ def model_arguments(command: Command, name: str, given: Mapping[str, Any]) -> di
     found = {"model": model.keyword.name, **first, "properties": properties}
     trial.check(command, {**found, "properties": _known(properties)}, None)
     return found
+
+
+def _there(word: str, dims: tuple[int, ...], dim: int) -> None:
+    if dim not in dims:
+        what = "sim.start(dim=3) begins a model in three" if dim == 2 else "this version has it in two only"
+        raise ValueError(f"{word} is for {dims[0]} dimensions; {what}")
 
 
 def _known(given: dict[str, Any]) -> dict[str, Any]:
@@ -72,31 +82,28 @@ def _model(command: Command, name: str) -> Model:
     typed = name.replace("_", "-")
     found = matching(typed, command.models)
     if len(found) != 1:
-        names = [model.keyword.name for model in command.models if not model.later]
+        names = [model.keyword.name for model in command.models]
         raise ValueError(f"there is no model '{name}'; there is {', '.join(names)}{hint(typed, names)}")
-    if found[0].later:
-        raise ValueError(f"model {found[0].keyword} is not there yet: {found[0].later}")
     return found[0]
 
 
-def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str) -> dict[str, Any]:
+def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str, dim: int) -> dict[str, Any]:
     """Values by the names of the table, as the parser hands them over."""
     found = {}
     for name, value in given.items():
         if value is None:
             continue
         option = _option(options, name, of)
-        if option.later:
-            raise ValueError(f"{name} is not there yet: {option.later}")
         if not option.values:
             if not isinstance(value, (bool, np.bool_)):
                 raise ValueError(f"{name}: expected True or False, got {_shown(value)}")
             if not value:
                 continue
+        _there(name, option.dims, dim)
         if option.repeated:
-            found[option.name] = [_values(option, one, name) for one in _items(value, name)]
+            found[option.name] = [_values(option, one, name, dim) for one in _items(value, name)]
         else:
-            found[option.name] = _values(option, value, name)
+            found[option.name] = _values(option, value, name, dim)
     missing = [option for option in options if option.required and option.name not in found]
     if missing:
         raise ValueError(f"{of} needs {_listed(missing)}")
@@ -108,21 +115,21 @@ def _option(options: tuple[Option, ...], name: str, of: str) -> Option:
     for option in options:
         if option.keyword.is_exactly(typed):
             return option
-    names = [trial.python(option.name) for option in options if not option.later]
+    names = [trial.python(option.name) for option in options]
     raise ValueError(f"{of} has no {name}; it has {', '.join(names)}{hint(name, names)}")
 
 
-def _values(option: Option, given: Any, name: str) -> Any:
+def _values(option: Option, given: Any, name: str, dim: int) -> Any:
     """What follows a keyword in a script: one value, a tuple of several, or a dict where more words may follow."""
     if option.more:
         parts = given if isinstance(given, dict) and "value" in given else {"value": given}
         more = {word: value for word, value in parts.items() if word != "value"}
-        return {"value": _plain(option, parts["value"], name), **_read(option.more, more, name)}
-    return _plain(option, given, name)
+        return {"value": _plain(option, parts["value"], name, dim), **_read(option.more, more, name, dim)}
+    return _plain(option, given, name, dim)
 
 
-def _plain(option: Option, given: Any, name: str) -> Any:
-    kinds = option.values
+def _plain(option: Option, given: Any, name: str, dim: int) -> Any:
+    kinds = [fitting(kind, dim) for kind in option.values if dim in kind.dims]
     if not kinds:
         return True
     if len(kinds) == 1 and not kinds[0].many:
@@ -164,7 +171,7 @@ def _one(kind: Kind, value: Any, name: str) -> Any:
 
 
 def _listed(options: Iterable[Option]) -> str:
-    return ", ".join(trial.python(option.name) for option in options if not option.later)
+    return ", ".join(trial.python(option.name) for option in options)
 
 
 def _shown(value: Any) -> str:
@@ -192,7 +199,7 @@ def _parsed(text: str, kind: str) -> g.Range | None:
     try:
         if "\n" in text:
             raise CommandError(f"where: expected one line, got {_shown(text)}")
-        statement = parser.parse(line, "where", 0, "", PCDC)
+        statement = parser.parse(line, "where", 0, "", PCDC, dim=None)
     except ScriptError as error:
         raise CommandError(f"where '{short(text)}': {error.message.removeprefix(': ')}") from None
     if statement.expressions:

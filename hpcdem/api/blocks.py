@@ -27,7 +27,8 @@ from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
 
-Point = tuple[float, float]
+Point = tuple[float, ...]
+"""Two numbers, three in a model of three dimensions."""
 File = str | Path
 Number = float | str | FunctionName
 """Of a condition: a number, the name of a table of time, or what `nodes.function` gives."""
@@ -78,9 +79,9 @@ class Orders:
         row = PCDC.command(command)
         chosen = chosen_by(where, kind)
         if model is None:
-            found = arguments(row, given, chosen is not None)
+            found = arguments(row, given, chosen is not None, project.dim)
         else:
-            found = model_arguments(row, model, given)
+            found = model_arguments(row, model, given, project.dim)
         project.line = place()[1]
         call = Call(project, found, None, lambda names, file: None)
         call.where = chosen
@@ -125,6 +126,18 @@ class Geometry(Words):
     def point(self, points: Sequence[Point], as_layer: str) -> None:
         """Single points, which become points of the mesh."""
         self._shape("point", as_layer, points=points)
+
+    def box(self, first: Point, second: Point, as_layer: str) -> None:
+        """In three dimensions: a box along the axes, from corner to corner."""
+        self._shape("box", as_layer, first=first, second=second)
+
+    def sphere(self, centre: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: a sphere."""
+        self._shape("sphere", as_layer, centre=centre, radius=radius)
+
+    def cylinder(self, first: Point, second: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: a round cylinder between the middles of its ends."""
+        self._shape("cylinder", as_layer, first=first, second=second, radius=radius)
 
     def fractures(
         self,
@@ -220,19 +233,21 @@ class Mesh(Words):
         self,
         first: Point,
         second: Point,
-        cells: tuple[int, int],
+        cells: tuple[int, ...],
         type: str | None = None,
         diagonal: str | None = None,
         *,
-        ratio: tuple[float, float] | None = None,
+        split: int | None = None,
+        ratio: tuple[float, ...] | None = None,
         group: str | None = None,
         set: str | None = None,
     ) -> None:
         """A regular mesh of the rectangle between two corners [m], cells along x and y. diagonal: "right", "left",
-        "alternate" or "both"; ratio: along x and y each cell is so many times as large as the one before."""
+        "alternate" or "both"; ratio: along x and y each cell is so many times as large as the one before. In
+        three dimensions tetrahedra of a box, cells and ratio along x, y and z; split: 5, 6 or 12 of each cell."""
         given = {
-            "first": first, "second": second, "cells": cells, "type": type, "diagonal": diagonal, "ratio": ratio,
-            "group": _group(group, set),
+            "first": first, "second": second, "cells": cells, "type": type, "diagonal": diagonal,
+            "split": split, "ratio": ratio, "group": _group(group, set),
         }  # fmt: skip
         self._do("mesh structured", given)
 
@@ -348,12 +363,14 @@ class Elements(_Modelled):
         yy: float | None = None,
         xy: float | None = None,
         zz: float | None = None,
+        xz: float | None = None,
+        yz: float | None = None,
         gradient: Mapping[str, Point] | None = None,
         where: Where = None,
     ) -> None:
-        """Stress [Pa] from the beginning, tension positive; gradient: by component, per metre in x and y [Pa/m],
-        ``{"yy": (0.0, 25e3)}``."""
-        stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz}
+        """Stress [Pa] from the beginning, tension positive; gradient: by component, per metre in x and y (and z)
+        [Pa/m], ``{"yy": (0.0, 25e3)}``."""
+        stress = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
         slopes = dict(gradient or {})
         for name in slopes:
             if stress.get(name) is None:
@@ -384,6 +401,7 @@ class Faces(_Modelled):
         *,
         xx: Number | None = None,
         yy: Number | None = None,
+        zz: Number | None = None,
         normal: Number | None = None,
         quiet: bool | None = None,
         incoming_x: Number | None = None,
@@ -394,8 +412,8 @@ class Faces(_Modelled):
         time. quiet: waves leave through them in dynamic runs; incoming_x, incoming_y: velocity [m/s] of a plane wave
         that comes in through them. Without a range: the whole surface of the model."""
         given = {
-            "stress_xx": xx, "stress_yy": yy, "stress_normal": normal, "quiet": quiet, "incoming_x": incoming_x,
-            "incoming_y": incoming_y,
+            "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "quiet": quiet,
+            "incoming_x": incoming_x, "incoming_y": incoming_y,
         }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
 
@@ -447,12 +465,17 @@ class Nodes(Objects):
         *,
         vx: Number | None = None,
         vy: Number | None = None,
+        vz: Number | None = None,
         ax: Number | None = None,
         ay: Number | None = None,
+        az: Number | None = None,
         where: Where = None,
     ) -> None:
         """Velocity [m/s] or acceleration [m/s2] that nodes have from now on; components left out stay free."""
-        given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
+        given = {
+            "velocity_x": vx, "velocity_y": vy, "velocity_z": vz, "acceleration_x": ax, "acceleration_y": ay,
+            "acceleration_z": az,
+        }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-velocity-boundary-condition")
 
     def function(self, function: str) -> FunctionName:
@@ -461,13 +484,20 @@ class Nodes(Objects):
         self._do("node function", {"function": function})
         return FunctionName(function)
 
-    def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
-        """Force on each node [N per m of thickness]."""
-        given = {"force_x": fx, "force_y": fy}
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        fz: Number | None = None,
+        where: Where = None,
+    ) -> None:
+        """Force on each node [N per m of thickness, in three dimensions N]."""
+        given = {"force_x": fx, "force_y": fy, "force_z": fz}
         self._carry_out("boundary", given, where, "mechanical-force-boundary-condition")
 
     def move(self, type: int, along: Point | None = None, *, where: Where = None) -> None:
-        """Freedom of nodes: 0 free, 1 held, 2 along a vector only."""
+        """Freedom of nodes: 0 free, 1 held, 2 along a vector only, 3 (in three dimensions) across it only."""
         given = {"type": (type,) if along is None else (type, along)}
         self._carry_out("boundary", given, where, "mechanical-move-boundary-constraint")
 
@@ -734,7 +764,8 @@ class Tables(Words):
         self._do("table delete", {"name": name})
 
     def over(self, name: str, axis: str) -> Over:
-        """For a property: the table over "x" or "y" in the mesh, or over "plastic-strain" (what softens or hardens)."""
+        """For a property: the table over "x" or "y" in the mesh, over "plastic-strain" (what softens or hardens), or
+        over "temperature" (moduli and strengths)."""
         if axis not in AXES:
             raise ValueError(f"axis: expected {', '.join(map(repr, AXES))}, got {axis!r}")
         return Over(name, AXES.index(axis))
@@ -971,6 +1002,7 @@ class BlockCommands:
         dynamic: bool | None = None,
         collision: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
         large_strain: bool | None = None,
         energy: bool | None = None,
         mechanical: bool | None = None,
@@ -980,12 +1012,13 @@ class BlockCommands:
         proppant: bool | None = None,
     ) -> None:
         """Of blocks: motion in time or towards equilibrium; contact of surfaces; of bodies that overlap at first
-        "refuse", "relax" or "keep"; rotations of elements; keep the energy budget; motion at all; flow of fluid, and
-        whether it does not push; flow of heat; proppant that moves in the fluid."""
+        "refuse", "relax" or "keep"; the potential of contact in space, "distance" or "munjiza"; rotations of elements;
+        keep the energy budget; motion at all; flow of fluid, and whether it does not push; flow of heat; proppant that
+        moves in the fluid."""
         given = {
-            "dynamic": dynamic, "collision": collision, "overlap": overlap, "large_strain": large_strain,
-            "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic, "one_way": one_way,
-            "thermal": thermal, "proppant": proppant,
+            "dynamic": dynamic, "collision": collision, "overlap": overlap, "potential": potential,
+            "large_strain": large_strain, "energy": energy, "mechanical": mechanical, "hydraulic": hydraulic,
+            "one_way": one_way, "thermal": thermal, "proppant": proppant,
         }  # fmt: skip
         self._blocks("model option", given)
 

@@ -187,11 +187,13 @@ class Simulation(BlockCommands):
     # ---- who is there ----------------------------------------------------------------------------------------------
 
     @_command
-    def start(self) -> None:
-        """START, model new: forget everything and begin a new, empty model."""
+    def start(self, dim: int = 2) -> None:
+        """START, model new: forget everything and begin a new, empty model; dim 3: of blocks in three dimensions."""
         self._refuse_coupled("start")
+        if dim != 2:
+            self._made_project()
         if self._project is not None:
-            fdem.settings.new(self._project)
+            fdem.settings.new(self._project, dim)
         if self._project is None or self._engine is not None:
             engine = self.engine
             dem.particles.start(engine)

@@ -12,6 +12,8 @@ from hpcdem.io.frame import Frame
 
 UNITS = ((1000.0, 1000.0, "km"), (1.0, 1.0, "m"), (0.05, 0.01, "cm"), (0.0, 0.001, "mm"))
 """Smallest longer side [m], length of the unit [m], its name."""
+CM = 1.0 / 2.54
+"""A centimetre in inches."""
 MOST = 12.0
 """Steps along an axis at most."""
 

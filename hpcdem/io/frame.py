@@ -33,6 +33,10 @@ class Columns(Mapping[str, np.ndarray]):
     def __len__(self) -> int:
         return len(self._readers)
 
+    def was_read(self, name: str) -> bool:
+        """Whether a column was asked for before."""
+        return name in self._read
+
     @property
     def size(self) -> int:
         """Bytes that have been read."""

@@ -1,9 +1,9 @@
 """Frames of blocks as VTKHDF UnstructuredGrid 2.0, opened by ParaView and pyvista as they are.
 
-Points are the corners of the elements, element by element (z = 0): where joints open, corners that began as one point
-part. Cells are the elements in the order of their numbers (VTK_TRIANGLE, VTK_QUAD), then the joints (VTK_LINE, along
-the edge of their lower face). The cell data `cell` tells them apart; what one of them does not have is NaN, or -1 for
-whole numbers.
+Points are the corners of the elements, element by element (in the plane z = 0): where joints open, corners that began
+as one point part. Cells are the elements in the order of their numbers (VTK_TRIANGLE, VTK_QUAD, in space VTK_TETRA),
+then the joints (VTK_LINE, along the edge of their lower face). The cell data `cell` tells them apart; what one of them
+does not have is NaN, or -1 for whole numbers.
 
 Format: VTK File Formats, section VTKHDF, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
 """
@@ -25,7 +25,7 @@ from hpcdem.io.slabs import find_rows
 
 ELEMENT, JOINT = 0, 1
 """Values of the cell data `cell`."""
-_LINE, _TRIANGLE, _QUAD = 3, 5, 9
+_LINE, _TRIANGLE, _QUAD, _TETRA = 3, 5, 9, 10
 SUPPORTS = ("bolts", "liners")
 """Groups of a file with tables of their nodes and elements."""
 Supports = Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
@@ -55,9 +55,9 @@ class MeshFrame:
 class MeshState:
     """A whole frame, to be drawn or measured.
 
-    points (n, 2): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles; joints (nj, 2):
-    rows of points at their ends; of_points, of_elements, of_joints: columns by name, vectors (n, 2); group_names and
-    supports as in `MeshFrame`.
+    points (n, 2), in space (n, 3): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles;
+    joints (nj, 2): rows of points at their ends; of_points, of_elements, of_joints: columns by name, vectors as points;
+    group_names and supports as in `MeshFrame`.
     """
 
     step: int
@@ -82,8 +82,8 @@ def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
     number = corners["number"]
     ends = np.stack([np.searchsorted(number, joints[k]) for k in ("first", "last")], axis=1)
     return MeshState(
-        frame.step, frame.time, frame.dt, np.stack([corners["x"], corners["y"]], axis=1), _cells(elements["corners"]),
-        ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y")}),
+        frame.step, frame.time, frame.dt, np.stack([corners[c] for c in "xyz" if c in corners], axis=1),
+        _cells(elements["corners"]), ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y", "z")}),
         {k: v for k, v in elements.items() if k != "corners"},
         {k: v for k, v in joints.items() if k not in ("first", "last")}, frame.group_names, frame.supports,
     )  # fmt: skip
@@ -98,8 +98,9 @@ def _cells(sizes: np.ndarray) -> np.ndarray:
 
 
 def _flat(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Vectors with two components."""
-    return {k: v[:, :2] if v.ndim == 2 else v for k, v in _packed(columns).items()}
+    """Vectors with as many components as there are dimensions of space."""
+    dim = 3 if any(name.endswith("_z") for name in columns) else 2
+    return {k: v[:, :dim] if v.ndim == 2 else v for k, v in _packed(columns).items()}
 
 
 def is_mesh_frame(path: str | os.PathLike) -> bool:
@@ -111,17 +112,20 @@ def is_mesh_frame(path: str | os.PathLike) -> bool:
         return False
 
 
-def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
-    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for. Serial. HpcdemError if
-    it is missing, foreign or damaged."""
+def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool = False) -> MeshState:
+    """A frame that `write_mesh_frame` wrote. lazily: columns are read when they are asked for; solid: whether it may be
+    one in three dimensions. Serial. HpcdemError if it is missing, foreign or damaged."""
     with h5.reading(path) as file:
         try:
             top, about = file["VTKHDF"], file["hpcdem"].attrs
             types, kind = top["Types"][...], top["CellData/cell"][...]
             elements, joints = kind == ELEMENT, kind == JOINT
             n = int(elements.sum())
-            sizes = np.where(types[:n] == _QUAD, 4, 3)
-            points = top["Points"][:, :2]
+            sizes = np.where(types[:n] == _TRIANGLE, 3, 4)
+            dim = 3 if (types[:n] == _TETRA).any() else 2
+            if dim == 3 and not solid:
+                raise NotImplementedError
+            points = top["Points"][:, :dim]
             ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, 2)
             whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
             if not whole or (len(ends) and not 0 <= ends.min() <= ends.max() < len(points)):
@@ -129,7 +133,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
             tables: list[Mapping[str, np.ndarray]] = []
             for group, rows in (("PointData", slice(None)), ("CellData", slice(0, n)), ("CellData", slice(n, None))):
                 places = {
-                    k: (f"VTKHDF/{group}/{k}", (rows, slice(0, 2)) if v.ndim == 2 else rows)
+                    k: (f"VTKHDF/{group}/{k}", (rows, slice(0, dim)) if v.ndim == 2 else rows)
                     for k, v in top[group].items()
                 }
                 tables.append(
@@ -146,6 +150,8 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False) -> MeshState:
                 int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends, of_points,
                 of_elements, of_joints, names, supports,
             )  # fmt: skip
+        except NotImplementedError:
+            raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions: this is for two") from None
         except (KeyError, TypeError, AttributeError, OSError, RuntimeError, ValueError) as problem:
             raise HpcdemError(f"{os.fspath(path)} is no frame of blocks, or damaged: {problem}") from None
 
@@ -170,7 +176,7 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
         ):
             out.whole(f"VTKHDF/{name}", np.array([number], np.int64))
         columns = corners.columns
-        out.slabs("VTKHDF/Points", _vector(columns["x"], columns["y"]), corners.offset, n_corners)
+        out.slabs("VTKHDF/Points", _vector(*(columns[c] for c in "xyz" if c in columns)), corners.offset, n_corners)
         # Corners lie in the order of elements, so the elements simply count them up.
         counted = np.arange(first, first + int(sizes.sum()), dtype=np.int64)
         out.parts(
@@ -186,10 +192,11 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
             1 + n + n_joints,
         )
         starts = elements.offset, n + joints.offset
-        types = np.where(sizes == 4, _QUAD, _TRIANGLE).astype(np.uint8), np.full(len(joints), _LINE, np.uint8)
+        four = _TETRA if "z" in columns else _QUAD
+        types = np.where(sizes == 4, four, _TRIANGLE).astype(np.uint8), np.full(len(joints), _LINE, np.uint8)
         out.parts("VTKHDF/Types", list(zip(types, starts, strict=True)), n + n_joints)
         out.group("VTKHDF/PointData")
-        for name, values in _packed({k: v for k, v in columns.items() if k not in ("x", "y")}).items():
+        for name, values in _packed({k: v for k, v in columns.items() if k not in ("x", "y", "z")}).items():
             out.slabs(f"VTKHDF/PointData/{name}", values, corners.offset, n_corners)
         out.group("VTKHDF/CellData")
         for name, parts in _cell_data(elements, joints).items():
@@ -209,18 +216,18 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
             out.whole(f"hpcdem/{name}", np.array(encoded, dtype=f"S{max([1, *map(len, encoded)])}"))
 
 
-def _vector(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(n, 3) with z = 0."""
-    return np.stack([x, y, np.zeros(len(x))], axis=1)
+def _vector(x: np.ndarray, y: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
+    """(n, 3), in the plane with z = 0."""
+    return np.stack([x, y, np.zeros(len(x)) if z is None else z], axis=1)
 
 
 def _packed(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Columns with the components `name_x` and `name_y` of vectors put together."""
+    """Columns with the components `name_x`, `name_y` and `name_z` of vectors put together."""
     found: dict[str, np.ndarray] = {}
     for name, values in columns.items():
         stem, _, part = name.rpartition("_")
-        if part in ("x", "y") and f"{stem}_x" in columns and f"{stem}_y" in columns:
-            found[stem] = _vector(columns[f"{stem}_x"], columns[f"{stem}_y"])
+        if part in ("x", "y", "z") and f"{stem}_x" in columns and f"{stem}_y" in columns:
+            found[stem] = _vector(columns[f"{stem}_x"], columns[f"{stem}_y"], columns.get(f"{stem}_z"))
         else:
             found[name] = values
     return found

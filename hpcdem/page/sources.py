@@ -21,6 +21,8 @@ from hpcdem.runtime import run_folder
 
 MOMENTS = 3
 """Frames that are kept in memory: one on show, and its neighbours."""
+OBJECTS = 1_500_000
+"""So many objects of them together, if there is more than one."""
 POINTS = 2000
 """Points of a history that the page gets at most."""
 SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}
@@ -87,10 +89,13 @@ class Sources:
         with self.lock:
             if key not in self.moments:
                 self.moments[key] = read_moment(file.path)
-                while len(self.moments) > MOMENTS:
+                while len(self.moments) > MOMENTS or (len(self.moments) > 1 and self._objects() > OBJECTS):
                     self.moments.popitem(last=False)
             self.moments.move_to_end(key)
             return key, self.moments[key]
+
+    def _objects(self) -> int:
+        return sum(objects.count for moment in self.moments.values() for objects in moment.objects.values())
 
     # ---- the run ---------------------------------------------------------------------------------------------------
 

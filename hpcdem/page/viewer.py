@@ -110,8 +110,9 @@ class Viewer:
         """Fields and vectors of a kind of object, with their units."""
         moment = self._moment(wanted)[1]
         objects = moment.of(str(wanted.get("object")))
+        waiting = objects.waiting()
         return {
-            "fields": [[name, unit_of(name)] for name in objects.known()],
+            "fields": [[name, unit_of(name)] for name in objects.fields if name in waiting or objects.filled(name)],
             "vectors": list(objects.vectors),
         }
 
@@ -153,7 +154,10 @@ class Viewer:
         layer = shown.layers[place].layer
         objects = shown.moment.of(layer.object)
         values: list[list[Any]] = []
-        for name in objects.known():
+        waiting = objects.waiting()
+        for name in (*objects.fields, *objects.vectors):
+            if name in waiting or not objects.filled(name):
+                continue
             value = objects.fields[name][which] if name in objects.fields else objects.vectors[name][which]
             names = objects.names.get(name)
             if names:
@@ -241,7 +245,7 @@ class Viewer:
 def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:
     """Whether the oldest layer is of another frame than this one, and layers of this one are many bytes."""
     size = sum(part.nbytes for layer in layers.values() for part in (*layer.shape, layer.kind))
-    return size > 150e6 and next(iter(layers))[0] != key
+    return size > 50e6 and next(iter(layers))[0] != key
 
 
 def _legend(shown: Scene) -> list[dict[str, Any]]:

@@ -17,13 +17,12 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import View
+from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post import bolts, fluid, liners
 
 CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
 PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
-CM = 1.0 / 2.54
 FORMATS = (".jpg", ".jpeg", ".png", ".pdf", ".svg")
 FREE, YIELDED, BROKEN = 0.0, 2.0, 3.0
 """States of joints, as frames have them; free: cracks that were there from the beginning."""
@@ -191,13 +190,17 @@ def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: 
 
 def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
     """Draw the frame in a file."""
-    plot(read_mesh_frame(source), path, looks, seen)
+    plot(read_mesh_frame(source, solid=True), path, looks, seen)
 
 
 def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
     """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
     from matplotlib.figure import Figure
 
+    if state.points.shape[1] == 3:
+        from hpcdem.post import solids
+
+        return solids.draw(state, looks.page, looks.font)
     seen = view(state) if seen is None else seen
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width

@@ -116,7 +116,7 @@ def _groups(project: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
 
 def _frame(path: Path) -> Facts:
     if path.suffix == ".vtkhdf" and is_mesh_frame(path):
-        state = read_mesh_frame(path)
+        state = read_mesh_frame(path, solid=True)
         return {
             "kind": "frame of blocks", "whole": True, "step": state.step, "time": state.time, "dt": state.dt,
             "elements": len(state.cells), "joints": len(state.joints),

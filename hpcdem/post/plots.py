@@ -13,13 +13,12 @@ from typing import Any
 
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import Ticks, View, particle_extent, view
+from hpcdem.io.axes import CM, Ticks, View, particle_extent, view
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.frames import read_frame
 from hpcdem.post.layers import USUAL, Look, coloured
 from hpcdem.post.saved import FORMATS, SAVED, saving
 
-CM = 1.0 / 2.54
 PAGE_WIDTH = 17.0
 """Width of a figure [cm]: that of a printed page."""
 TALLEST = 22.0 / 17.0

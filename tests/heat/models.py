@@ -9,6 +9,7 @@ import numpy as np
 from hpcdem.physics.fdem import changes, creep, diagnostics
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import TEMPERATURE, Over
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 from tests.blocks.models import COHESIVE, WEAK
@@ -27,8 +28,11 @@ def cracking(sim: Blocks) -> None:
     """A jointed block is heated from inside until it breaks, while it flies to the right through the strips of the
     ranks; heat has a clock that runs ahead."""
     sim.take_mesh(shaken(rectangle(16, 6, 1.6, 0.6, kind="mixed"), 0.2))
-    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
-    sim.joint_model(inner(sim.mesh), COHESIVE, WEAK)
+    sim.table("weaker", [(20.0, 1.5e6), (320.0, 1e6)])
+    sim.table("softer", [(20.0, ROCK["young"]), (320.0, 0.8 * ROCK["young"])])
+    warm = {"young": Over("softer", TEMPERATURE), "friction": 20.0, "damp_factor": 0.05}
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, **warm})
+    sim.joint_model(inner(sim.mesh), COHESIVE, {**WEAK, "tensile_strength": Over("weaker", TEMPERATURE)})
     sim.gravity(3.0, -9.81)
     x = sim.mesh.points[:, 0]
     for one in np.unique(np.round(x, 1)):
@@ -60,8 +64,10 @@ def warming(sim: Blocks) -> None:
     """Clay that creeps and yields is warmed at rest, then moves."""
     sim.take_mesh(shaken(rectangle(20, 6, 2.0, 0.6), 0.2))
     solid = {"density": 2000.0, "young": 1e9, "poisson_ratio": 0.3}
+    sim.table("weaker", [(0.0, 2e5), (300.0, 1.5e5)])
     changes.element_model(sim, None, "mech_mohr_coulomb",
-                          {**solid, "friction": 20.0, "cohesion": 2e5, "tensile": 1e5})  # fmt: skip
+                          {**solid, "friction": 20.0, "cohesion": Over("weaker", TEMPERATURE),
+                           "tensile": 1e5})  # fmt: skip
     right = np.flatnonzero(sim.mesh.centroids()[:, 0] > 1.0)
     changes.element_model(sim, right, "mech_burgers", {**solid, "maxwell_viscosity": 1e8})
     heat = Heat.of(sim)

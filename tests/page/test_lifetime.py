@@ -15,7 +15,7 @@ import urllib.request
 import pytest
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.page import lifetime
+from hpcdem.page import lifetime, viewer
 from hpcdem.page.limits import LIMITS
 from hpcdem.page.maker import request_of, values_of
 from hpcdem.pre.specimen import Request
@@ -133,12 +133,14 @@ def test_what_the_page_cannot_show_is_refused_at_once(values, message):
         lifetime.serve(request, browser=False)
 
 
-def test_all_files_of_the_page_are_there_and_served():
+def test_all_files_of_the_pages_are_there_and_served():
     folder = lifetime.resources.files("hpcdem.page") / "static"
-    assert {file.name for file in folder.iterdir()} == set(lifetime.KINDS)
-    page = (folder / "index.html").read_text(encoding="utf-8")
-    for name in re.findall(r'(?:src|href)="([\w.]+)"', page):
-        assert name in lifetime.KINDS
+    assert {file.name for file in folder.iterdir()} == {*lifetime.KINDS, *viewer.KINDS}
+    for first, kinds in (("index.html", lifetime.KINDS), ("viewer.html", viewer.KINDS)):
+        texts = [(folder / name).read_text(encoding="utf-8") for name in kinds if name.endswith((".js", ".html"))]
+        assert (folder / first).read_text(encoding="utf-8") in texts
+        for name in re.findall(r'(?:(?:src|href)=|from )"(?:\./)?([\w.]+)"', "".join(texts)):
+            assert name in kinds, name
 
 
 def test_a_port_out_of_range_is_a_clear_error():

@@ -10,5 +10,6 @@ from tests.heat.models import MODELS as HEAT
 from tests.liners.models import MODELS as LINERS
 from tests.parallel.model import Model
 from tests.proppant.models import MODELS as PROPPANT
+from tests.space.models import MODELS as SPACE
 
-KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | PROPPANT | HEAT | COUPLED
+KINDS: dict[str, Model] = BLOCKS | BOLTS | LINERS | FLOW | PROPPANT | HEAT | COUPLED | SPACE

@@ -14,9 +14,11 @@ from hpcdem.physics.fdem.tables import Drawn, Over
 SAMPLES: dict[str, tuple[str, object]] = {
     "<f>": ("0.25", 0.25), "<f>|table <s>|function <s>": ("0.25", 0.25),
     "<f>|table <s> over x|y|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|temperature|field <s>": ("0.25", 0.25),
     "<f>|table <s> over x|y|plastic-strain|field <s>": ("0.25", 0.25),
+    "<f>|table <s> over x|y|plastic-strain|temperature|field <s>": ("0.25", 0.25),
     "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
-    "0|1|2": ("2", 2), "2|3": ("2", 2), "<s>": ("'a'", "a"),
+    "0|1|2": ("2", 2), "5|6|12": ("6", 6), "2|3": ("2", 2), "<s>": ("'a'", "a"),
     "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),
     "<v> <v> ...": ("(0,0) (1,0) (1,1)", [(0, 0), (1, 0), (1, 1)]), "<s> ...": ("'a' 'b'", ["a", "b"]),
 }  # fmt: skip
@@ -34,26 +36,34 @@ def fits(kind: kinds.Kind, value: object) -> bool:
 class Writer:
     """Writes a line, with every value as it is (expressions False) or as an expression, v[0], v[1], ..."""
 
-    def __init__(self, expressions: bool) -> None:
-        self.expressions, self.values = expressions, []
+    def __init__(self, expressions: bool, dim: int) -> None:
+        self.expressions, self.dim, self.values = expressions, dim, []
 
     def value(self, kind: kinds.Kind) -> str:
-        text, value = SAMPLES[kind.pattern] if kind.pattern in SAMPLES else (kind.words[0], kind.words[0])
-        if text == "0.25" and not fits(kind, value):
-            text, value = "1.5", 1.5
+        if self.dim == 3 and kind.pattern in ("<v>", "[<v>]"):
+            text, value = "(1,2,3)", (1, 2, 3)
+        else:
+            text, value = self._sample(kind)
         if not self.expressions:
             return text
         self.values.append(value)
         return f"[v[{len(self.values) - 1}]]"
 
+    @staticmethod
+    def _sample(kind: kinds.Kind) -> tuple[str, object]:
+        text, value = SAMPLES[kind.pattern] if kind.pattern in SAMPLES else (kind.words[0], kind.words[0])
+        if text == "0.25" and not fits(kind, value):
+            return "1.5", 1.5
+        return text, value
+
     def option(self, option: Option) -> str:
         """A keyword with its values and all that may follow it."""
-        words = [option.name, *(self.value(kind) for kind in option.values)]
+        words = [option.name, *(self.value(kind) for kind in option.values if self.dim in kind.dims)]
         return " ".join(words + [self.option(more) for more in option.more])
 
 
-def _without(options: tuple[Option, ...], *names: str) -> list[Option]:
-    return [o for o in options if o.name not in names and not o.later]
+def _without(options: tuple[Option, ...], dim: int, *names: str) -> list[Option]:
+    return [o for o in options if o.name not in names and dim in o.dims]
 
 
 EXCLUDING = {
@@ -67,47 +77,51 @@ EXCLUDING = {
     "chart add": ("values", "x", "y"), "field create": ("weibull", "lognormal"), "output vtk": ("off",),
 }  # fmt: skip
 """Keywords that do not go with the others of their command."""
+EXCLUDING_IN_SPACE = {**EXCLUDING, "chart add": ("values",)}
 
 
-def rows() -> list[tuple[str, Command, Model | None, Option | None]]:
+def rows(dim: int) -> list[tuple[str, Command, Model | None, Option | None, int]]:
     """Every command; every model of those that have some; every command with a range once per term of it."""
     found = []
     for command in PCDC.commands:
-        if command.later:
+        if dim not in command.dims:
             continue
-        models = [m for m in command.models if not m.later] or [None]
-        found += [(f"{command.name} {m.keyword.name if m else ''}".strip(), command, m, None) for m in models]
+        models = [m for m in command.models if dim in m.dims] or [None]
+        found += [(f"{command.name} {m.keyword.name if m else ''}".strip(), command, m, None, dim) for m in models]
         for term in PCDC.range_terms if command.ranged else ():
-            if not term.later and (not term.only or command.ranged in (*term.only, "any")):
-                found.append((f"{command.name} range {term.name}", command, models[0], term))
-    return found
+            fits = not term.only or command.ranged in (*term.only, "any")
+            fits &= command.name != "chart add" or dim == 2  # range goes with what is there in the plane only
+            if fits and dim in term.dims:
+                found.append((f"{command.name} range {term.name}", command, models[0], term, dim))
+    return [(f"{name} in {dim} dimensions" if dim == 3 else name, *row) for name, *row in found]
 
 
 def written(command: Command, model: Model | None, term: Option | None, writer: Writer) -> str:
     """One line with all its keywords."""
+    excluding = EXCLUDING if writer.dim == 2 else EXCLUDING_IN_SPACE
     words = [command.name, *(writer.value(kind) for o in command.leading for kind in o.values)]
     options = command.options if model is None else model.options
     if model is not None:
         words += [model.keyword.name, *(writer.value(kind) for o in model.leading for kind in o.values)]
         words += ["property"] * bool(model.options)
-    words += [writer.option(o) for o in _without(options, *EXCLUDING.get(command.name, ()))]
+    words += [writer.option(o) for o in _without(options, writer.dim, *excluding.get(command.name, ()))]
     if term is not None:
         words += ["range", writer.option(term)]
     return " ".join(words)
 
 
-ROWS = rows()
+ROWS = rows(2) + rows(3)
 
 
-@pytest.mark.parametrize(("command", "model", "term"), [row[1:] for row in ROWS], ids=[row[0] for row in ROWS])
-def test_every_value_can_be_an_expression(command, model, term, monkeypatch):
+@pytest.mark.parametrize(("command", "model", "term", "dim"), [row[1:] for row in ROWS], ids=[row[0] for row in ROWS])
+def test_every_value_can_be_an_expression(command, model, term, dim, monkeypatch):
     """The same line, written out and with expressions, is the same command in the end; whether its values make sense
     together is no matter."""
     monkeypatch.setattr(trial, "check", lambda *_: None)
-    plain, with_brackets = Writer(False), Writer(True)
-    one = parse(written(command, model, term, plain), "a.sc", 1, "a", PCDC).resolve(())
+    plain, with_brackets = Writer(False, dim), Writer(True, dim)
+    one = parse(written(command, model, term, plain), "a.sc", 1, "a", PCDC, dim=dim).resolve(())
     text = written(command, model, term, with_brackets)
-    statement = parse(text, "a.sc", 1, text, PCDC)
+    statement = parse(text, "a.sc", 1, text, PCDC, dim=dim)
     known = {"v": with_brackets.values}
     other = statement.resolve(tuple(eval(code, known) for code in statement.expressions))
     assert other == one and len(statement.expressions) == len(with_brackets.values)
@@ -118,7 +132,10 @@ def test_the_table_is_walked_whole():
     """Every kind of value of every row has a sample."""
     assert len(ROWS) > 150
     patterns = {
-        kind.pattern for _, c, m, t in ROWS for o in (*c.leading, *(m.options if m else c.options)) for kind in o.values
+        kind.pattern
+        for _, c, m, t, _ in ROWS
+        for o in (*c.leading, *(m.options if m else c.options))
+        for kind in o.values
     }
     assert set(SAMPLES) - {"[<i>]"} <= patterns
 
@@ -149,7 +166,7 @@ def test_names_of_tables_too(name):
      ("history create 'h' [v] value [w] range x 0 1 sum", ("node", "position-x"), "read 'sum'"),
      ("history create 'h' [v] value [w] max", ("model", "time"), "a history of the model takes no maximum"),
      ("history create 'h' [v] value [w] max", ("cell", "time"), "expected one of node, element, joint, bolt-node"),
-     ("model new dim [v]", (3,), "dim 3 is not there yet"),
+     ("model new dim [v]", (4,), "expected 2 or 3"),
      ("model time-step auto [v] value 1e-6", (True,), "value and auto on exclude each other"),
      ("node boundary mech-m-b-c type [v] range id 1", (0.5,), "read 0.5 from '[v]', expected 0 free, 1 held or 2")],
 )  # fmt: skip

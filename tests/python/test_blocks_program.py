@@ -34,6 +34,7 @@ from tests.short_push import contents
 
 SAME: list[tuple[str, str]] = [
     ("pcdc model new", "sim.start()"),
+    ("pcdc model new dim 3", "sim.start(dim=3)"),
     ("pcdc model save 'a.sav'", "sim.save('a.sav')"),
     ("pcdc model restore 'a.sav'", "sim.restore('a.sav')"),
     ("pcdc model gravity (0,-9.81)", "sim.gravity((0, -9.81))"),
@@ -119,6 +120,8 @@ SAME: list[tuple[str, str]] = [
      "where=\"geometry 'hole'\")"),
     ("pcdc element property cohesion table 'c' over plastic-strain",
      "sim.elements.property(cohesion=sim.tables.over('c', 'plastic-strain'))"),
+    ("pcdc face-joint property tensile-strength table 'c' over temperature",
+     "sim.joints.property(tensile_strength=sim.tables.over('c', 'temperature'))"),
     ("pcdc element initial stress-xx -5e6 stress-yy 0 gradient (0,25e3) range x 0 2 y 1 3",
      "sim.elements.initial_stress(xx=-5e6, yy=0, gradient={'yy': (0, 25e3)}, "
      "where=(g.Span(0, 0.0, 2.0), g.Span(1, 1.0, 3.0)))"),
@@ -332,16 +335,43 @@ def carry_out(sim: Simulation, text: str) -> Any:
     )
 
 
+IN_SPACE: list[tuple[str, str]] = [
+    ("pcdc model option potential munjiza overlap keep", "sim.option(potential='munjiza', overlap='keep')"),
+    ("pcdc element-face c-model contact-m-c property p-n 1e9 friction 30 range boundary",
+     "sim.faces.model('contact-m-c', penalty_normal=1e9, friction=30, where='boundary')"),
+    ("pcdc model gravity (0,1,-9.81)", "sim.gravity((0, 1, -9.81))"),
+    ("pcdc geometry create box (0,0,0) (1,2,3) as-layer 'l'", "sim.geometry.box((0, 0, 0), (1, 2, 3), 'l')"),
+    ("pcdc geometry create sphere (0,1,2) 3 as-layer 'l'", "sim.geometry.sphere((0, 1, 2), 3, 'l')"),
+    ("pcdc geometry create cylinder (0,0,0) (0,0,1) 2 as-layer 'l'",
+     "sim.geometry.cylinder((0, 0, 0), (0, 0, 1), 2, 'l')"),
+    ("pcdc mesh structured (0,0,0) (4,2,1) cells 4 2 1 split 12 ratio 1.5 1 2 group 'rock' set 'd'",
+     "sim.mesh.structured((0, 0, 0), (4, 2, 1), (4, 2, 1), split=12, ratio=(1.5, 1, 2), group='rock', set='d')"),
+    ("pcdc mesh create from-layer 'o' size 0.5 hole 'h'", "sim.mesh.create('o', 0.5, hole=['h'])"),
+    ("pcdc node boundary mech-vel-b-c velocity-z 1 acceleration-x 2", "sim.nodes.velocity(vz=1, ax=2)"),
+    ("pcdc node boundary mech-vel-b-c acceleration-z 1", "sim.nodes.velocity(az=1)"),
+    ("pcdc node boundary mech-f-b-c force-z 1 range z 0 1", "sim.nodes.force(fz=1, where='z 0 1')"),
+    ("pcdc node boundary mech-m-b-c type 3 (0,1,1)", "sim.nodes.move(3, (0, 1, 1))"),
+    ("pcdc node initial velocity (1,2,3)", "sim.nodes.initial_velocity((1, 2, 3))"),
+    ("pcdc element-face boundary m-s-b-c stress-zz -1 range boundary", "sim.faces.stress(zz=-1, where='boundary')"),
+    ("pcdc element initial stress-xz 1 stress-yz 2 gradient (0,0,1)",
+     "sim.elements.initial_stress(xz=1, yz=2, gradient={'yz': (0, 0, 1)})"),
+    ("pcdc history create 'h' node nearest (0,0,1) value displacement-z",
+     "sim.histories.create('h', 'node', 'displacement-z', nearest=(0, 0, 1))"),
+]  # fmt: skip
+"""In three dimensions."""
+
+
 @pytest.fixture
 def bench(tmp_path: Path) -> Bench:
     return Bench(tmp_path)
 
 
-@pytest.mark.parametrize(("line", "call"), SAME)
+@pytest.mark.parametrize(("line", "call"), SAME + IN_SPACE)
 def test_a_method_is_the_command(bench: Bench, tmp_path: Path, monkeypatch: Any, line: str, call: str) -> None:
     recorders = Recorder(), Recorder()
     for module in (bindings, execute, api, simulation):
         monkeypatch.setattr(module, "fdem", recorders[0])
+    bench.project.dim = 3 if (line, call) in IN_SPACE else 2
     bench(line + "\n")
     for module in (bindings, execute, api, simulation):
         monkeypatch.setattr(module, "fdem", recorders[1])
@@ -354,15 +384,15 @@ def test_a_method_is_the_command(bench: Bench, tmp_path: Path, monkeypatch: Any,
 def test_every_command_has_a_method() -> None:
     """SAME has every command that scripts have, with each of its options and models."""
     said: dict[str, set[str]] = {}
-    for line, _ in SAME:
-        statement = Bench(Path()).interpreter.read(line, "a.sc").statements[0]
+    for line, call in SAME + IN_SPACE:
+        bench = Bench(Path())
+        bench.project.dim = 3 if (line, call) in IN_SPACE else 2
+        statement = bench.interpreter.read(line, "a.sc").statements[0]
         names = {name for name in statement.arguments if name not in ("model", "properties")}
         if "model" in statement.arguments:
             names |= {statement.arguments["model"], *statement.arguments["properties"]}
         said.setdefault(statement.command.name, set()).update(names)
     for command in PCDC.commands:
-        if command.later:
-            continue
         assert command.name in said, command.name
         of_models = {
             "element property",
@@ -370,16 +400,15 @@ def test_every_command_has_a_method() -> None:
             "face-joint property",
         }  # any property goes the same way
         options = () if command.name in of_models else command.options
-        wanted = {option.name for option in options if not option.later}
+        wanted = {option.name for option in options}
         for model in command.models:
-            wanted |= set() if model.later else {model.keyword.name}
-            if not model.later and model.of is None:  # those of a law go the same way, whatever their names
-                wanted |= {option.name for option in model.options if not option.later}
+            wanted |= {model.keyword.name}
+            if model.of is None:  # those of a law go the same way, whatever their names
+                wanted |= {option.name for option in model.options if {*option.dims} & {*command.dims} & {*model.dims}}
         assert wanted - said[command.name] <= NOT_IN_PYTHON.get(command.name, set()), command.name
 
 
-NOT_IN_PYTHON = {"model new": {"dim"}}
-"""`dim` is 2 or refused."""
+NOT_IN_PYTHON: dict[str, set[str]] = {}
 
 
 def test_every_way_to_look(bench: Bench) -> None:
@@ -448,7 +477,8 @@ WRONG = {
     "two distributions": ("sim.fields.create('f', seed=1, normal=(1, 1), weibull=(1, 1))", "one distribution"),
     "covariance of nothing": ("sim.fields.create('f', seed=1, normal=(1, 1), covariance='gaussian')",
                               "covariance goes with correlation"),
-    "no axis": ("sim.tables.over('E', 'z')", "tables.over: axis: expected 'x', 'y', 'plastic-strain', got 'z'"),
+    "no axis": ("sim.tables.over('E', 'z')",
+                "tables.over: axis: expected 'x', 'y', 'plastic-strain', 'temperature', got 'z'"),
     "nothing that softens": ("sim.elements.property(young=sim.tables.over('E', 'plastic-strain'))",
                              "young: a table over plastic-strain cannot stand for it"),
     "unsorted table": ("sim.tables.create('v', [(1, 0), (0, 0)])", "tables.create: table 'v': times must ascend"),
@@ -475,7 +505,7 @@ WRONG = {
     "looks of nothing": ("sim.output.image('f', log=True)", "log goes with field or object"),
     "no such colours": ("sim.output.image('f', colours='jet')", "colours: expected one of viridis"),
     "frames every and off": ("sim.output.vtk('f', every=1, off=True)", "every and off exclude each other"),
-    "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "nodes.group: where 'z 0 1': .*not there yet"),
+    "wrong RANGE": ("sim.nodes.group('a', where='z 0 1')", "a range in z needs a model in three dimensions"),
     "RANGE of others": ("sim.elements.group('a', where='boundary')", "where 'boundary': .*read 'boundary'"),
     "RANGE the wrong way": ("sim.nodes.group('a', where='x 1 0')", "where 'x 1 0': .*the first is above the second"),
     "empty RANGE": ("sim.nodes.group('a', where='')", "where ''"),

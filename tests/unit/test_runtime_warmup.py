@@ -157,8 +157,13 @@ pcdc table create 'times' values (0,0) (1,1)
 pcdc history create 'time' model value time
 pcdc chart export 'chart' 'chart.svg'
 pcdc output vtk 'frames'
+pcdc model new dim 3
+pcdc geometry create box (0,0,0) (1,1,1) as-layer 'cube'
+pcdc geometry create sphere (0,0,0) 1 as-layer 'ball'
+pcdc geometry create cylinder (0,0,0) (0,0,1) 1 as-layer 'core'
 '''
-assert trial._TRIALS.keys() == {statement.command.name for statement in check.read(text, "script.sc").statements}
+read = {statement.command.name for statement in check.read(text, "script.sc").statements}
+assert trial._TRIALS.keys() | {"model new"} == read
 """
 READ_ZDEM = """
 from hpcdem.lang.zdem import execute, parser, plan

@@ -58,6 +58,8 @@ KNOWN = {
     ("page/maker.py", "zipfile.ZipFile"),
     # This Python with a module of this package; requests reach it as JSON in a pipe.
     ("page/worker.py", "subprocess.Popen"),
+    # Gmsh, with a description as JSON; it answers with arrays of numbers in a file of a folder made for that.
+    ("pre/mesh/fill.py", "subprocess.run"),
     # The same to compile kernels; what is pickled goes from the parent to its child through a pipe.
     ("runtime/compilers.py", "subprocess.Popen"),
     ("runtime/compilers.py", "import pickle"),

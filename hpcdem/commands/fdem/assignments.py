@@ -130,15 +130,17 @@ def _usual_penalty(project: Project, numbers: np.ndarray, faces: np.ndarray) -> 
 def initial_stress(
     project: Project,
     stress: Mapping[str, float],
-    gradient: Mapping[str, tuple[float, float]] | None = None,
+    gradient: Mapping[str, tuple[float, ...]] | None = None,
     where: Range | None = None,
 ) -> None:
-    """Stress [Pa] by component xx, yy, xy, zz; gradient: by component, per metre in x and y."""
+    """Stress [Pa] by component xx, yy, xy, zz, in space xz and yz too; gradient: by component, per metre."""
     project.ready().initial_stress(chosen(project, ELEMENT, where), **stress, gradient=gradient or None)
 
 
-def initial_velocity(project: Project, velocity: tuple[float, float], where: Range | None = None) -> None:
-    """Velocity (2,) [m/s] of nodes now."""
+def initial_velocity(project: Project, velocity: tuple[float, ...], where: Range | None = None) -> None:
+    """Velocity (2,), in space (3,), [m/s] of nodes now."""
+    if len(velocity) != project.dim:
+        raise CommandError(f"velocity: a vector of {project.dim} numbers is needed, got {len(velocity)}")
     changes.set_velocity(project.ready(), chosen(project, NODE, where), *velocity)
 
 
@@ -152,23 +154,31 @@ def velocity(
     ax: Number | None = None,
     ay: Number | None = None,
     where: Range | None = None,
+    vz: Number | None = None,
+    az: Number | None = None,
 ) -> None:
     """Velocity [m/s] or acceleration [m/s2] of nodes; a text is the name of a table of time."""
-    _known(project, vx, vy, ax, ay)
-    project.ready().velocity_condition(chosen(project, NODE, where), vx, vy, ax, ay)
+    _known(project, vx, vy, ax, ay, vz, az)
+    project.ready().velocity_condition(chosen(project, NODE, where), vx, vy, ax, ay, vz, az)
 
 
-def force(project: Project, fx: Number | None = None, fy: Number | None = None, where: Range | None = None) -> None:
-    """Force on each node [N per m of thickness]."""
-    _known(project, fx, fy)
-    project.ready().force_condition(chosen(project, NODE, where), fx, fy)
+def force(
+    project: Project,
+    fx: Number | None = None,
+    fy: Number | None = None,
+    where: Range | None = None,
+    fz: Number | None = None,
+) -> None:
+    """Force on each node [N per m of thickness, in space N]."""
+    _known(project, fx, fy, fz)
+    project.ready().force_condition(chosen(project, NODE, where), fx, fy, fz)
 
 
-def move(project: Project, kind: int, direction: tuple[float, float] = (0.0, 0.0), where: Range | None = None) -> None:
-    """Freedom of nodes: 0 free, 1 held, 2 along the direction only."""
-    if kind not in (0, 1, 2):
+def move(project: Project, kind: int, direction: tuple[float, ...] = (0.0, 0.0), where: Range | None = None) -> None:
+    """Freedom of nodes: 0 free, 1 held, 2 along the direction only, 3 (in space) across it only."""
+    if kind not in (0, 1, 2) and (kind != 3 or project.dim == 2):
         raise CommandError(f"type {kind} is unknown: 0 free, 1 held, 2 along a vector" + ", 3 is for 3-D" * (kind == 3))
-    if kind == 2 and not np.hypot(*direction) > 0.0:
+    if kind in (2, 3) and not any(direction):
         raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
     project.ready().move_constraint(chosen(project, NODE, where), kind, direction)
 
@@ -182,18 +192,21 @@ def stress(
     incoming_x: Number | None = None,
     incoming_y: Number | None = None,
     where: Range | None = None,
+    zz: Number | None = None,
 ) -> None:
     """Traction of faces [Pa]; quiet: waves leave through them; incoming_x, _y: velocity [m/s] of one that comes in.
     Without a range: all faces on the surface of the model."""
-    _known(project, xx, yy, normal, incoming_x, incoming_y)
+    _known(project, xx, yy, zz, normal, incoming_x, incoming_y)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
     project.ready().stress_condition(
-        faces, xx=xx, yy=yy, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y
+        faces, xx=xx, yy=yy, zz=zz, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y
     )
 
 
 def free_field(project: Project, where: Range | None = None) -> None:
-    """Faces are free-field sides, see free_field.py. Without a range: all faces on the surface of the model."""
+    """Faces are free-field sides (in the plane), see free_field.py. Without a range: all faces on the surface of the
+    model."""
+    project.ready().refuse_in_space("free-field")
     FreeField.create(project.ready(), chosen(project, FACE, (OnBoundary(),) if where is None else where))
 
 

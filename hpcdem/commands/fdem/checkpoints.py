@@ -17,6 +17,7 @@ from hpcdem.commands.fdem.records import Chart, Curve, History
 from hpcdem.core.errors import CommandError, UsageError
 from hpcdem.physics.fdem.groups import Groups
 from hpcdem.physics.user_files import UnknownLaw
+from hpcdem.pre.mesh import solids
 from hpcdem.pre.mesh.geometry import Layers
 from hpcdem.runtime import checkpoints, run_folder
 
@@ -146,7 +147,9 @@ def _state(project: Project) -> dict[str, Any]:
     """What the project holds beside the simulation, as JSON values."""
     return {
         "format": FORMAT,
+        "dim": project.dim,
         "layers": {name: values.tolist() for name, values in project.layers.tables().items()},
+        "solids": {name: solids.state(project.layers[name]) for name in project.layers} if project.dim == 3 else {},
         "groups": {kind: groups.state() for kind, groups in project.groups.items()},
         "null": np.flatnonzero(~project.alive).tolist(),
         "histories": {name: asdict(history) for name, history in project.histories.items()},
@@ -168,6 +171,8 @@ def _take(project: Project, state: dict[str, Any]) -> None:
         tables[name] = tables[name].astype(np.float64)
     tables["points"] = tables["points"].reshape(-1, 2)
     layers = Layers.from_tables(tables)
+    for name, of in state.get("solids", {}).items():
+        layers.add(name, *solids.restored(of))
     groups = {kind: Groups.restored(kind, of) for kind, of in state["groups"].items()}
     histories = {name: _history(given) for name, given in state["histories"].items()}
     charts = {
@@ -178,6 +183,7 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     alive = np.ones(0 if mesh is None else len(mesh.cells), bool)
     alive[np.array(state["null"], np.int64)] = False
     project.layers, project.mesh, project.alive = layers, mesh, alive
+    project.dim = int(state.get("dim", 2))
     project.groups.update(groups)
     project.histories, project.charts, project.frames = histories, charts, dict(state["frames"])
     project.framed, project.cracks_filed = dict(state["framed"]), None

@@ -9,10 +9,11 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import groups as g
-from hpcdem.physics.fdem.connectivity import centroids, corner_counts, face_points, find_edges
+from hpcdem.physics.fdem.mesh import centres
 from hpcdem.physics.flow.model import Flow
 from hpcdem.pre.mesh import geometry
 from hpcdem.pre.mesh.cracks import TOLERANCE, edges_on
+from hpcdem.pre.mesh.solids import Solid, on_surface
 
 if TYPE_CHECKING:
     from hpcdem.commands.fdem.project import Project
@@ -41,7 +42,7 @@ def everything(project: Project, kind: str, where: g.Range | None, null_too: boo
 
 
 def places(project: Project, kind: str) -> np.ndarray:
-    """(n, 2) [m] where the objects of a kind that are there are now: their middle."""
+    """(n, 2), in space (n, 3) [m] where the objects of a kind that are there are now: their middle."""
     objects = _Objects(project, kind)
     objects.now = True
     return objects.places().mean(axis=1)
@@ -65,9 +66,9 @@ _NOT_SUPPORTS = (*_NOT_ELEMENTS, g.OnLayer)
 
 
 class _Objects:
-    """All objects of a kind that are there: numbers (n,), ends (n, 2) point numbers of faces and joints, sides (n, 2)
-    of joints. An element is there unless it was taken out, a node or face if one of its elements is, a joint if both
-    are. null_too: those that are not there as well."""
+    """All objects of a kind that are there: numbers (n,), ends (n, 2), in space (n, 3), point numbers of faces and
+    joints, sides (n, 2) of joints. An element is there unless it was taken out, a node or face if one of its elements
+    is, a joint if both are. null_too: those that are not there as well."""
 
     def __init__(self, project: Project, kind: str, null_too: bool = False) -> None:
         self.project, self.kind, self.null_too = project, kind, null_too
@@ -103,7 +104,7 @@ class _Objects:
             else:
                 faces = np.sort(edges.faces[edges.faces >= 0])
                 self.numbers = faces[there[faces // 4]]
-            self.ends = face_points(mesh.cells, self.numbers)
+            self.ends = mesh.face_points(self.numbers)
 
     def all_of(self, where: g.Range) -> np.ndarray:
         """(n,) bool: which of them all terms hold for."""
@@ -116,8 +117,8 @@ class _Objects:
         return mask
 
     def places(self) -> np.ndarray:
-        """(n, k, 2) [m] where x, y and geometry look for each: the centre of an element, a node, both ends of a face or
-        joint (of the element that it is numbered by) or of an element of a bolt or liner."""
+        """(n, k, dim) [m] where x, y, z and geometry look for each: the centre of an element, a node, the points of a
+        face or joint (of the element that it is numbered by) or the ends of an element of a bolt or liner."""
         mesh = self.mesh
         if self.kind in g.SUPPORTS:
             at = self.support.nodes["x" if self.now else "origin"]
@@ -125,7 +126,7 @@ class _Objects:
             return found[self.numbers]
         if not self.now:
             if self.kind == g.ELEMENT:
-                return centroids(mesh.points, mesh.cells[self.numbers])[:, None]
+                return mesh.centroids(self.numbers)[:, None]
             return mesh.points[self.numbers][:, None] if self.kind == g.NODE else mesh.points[self.ends]
         if self.kind == g.NODE:
             return self.project.positions()[self.numbers][:, None]
@@ -133,9 +134,8 @@ class _Objects:
         if self.kind == g.ELEMENT:
             own = np.arange(4 * len(self.numbers)).reshape(-1, 4)
             cells = np.where(mesh.cells[self.numbers] >= 0, own, -1)
-            return centroids(corners.reshape(-1, 4, 2)[self.numbers].reshape(-1, 2), cells)[:, None]
-        e, k = np.divmod(self.numbers, 4)
-        return corners[np.column_stack([self.numbers, 4 * e + (k + 1) % corner_counts(mesh.cells[e])])]
+            return centres(corners.reshape(-1, 4, mesh.dim)[self.numbers].reshape(-1, mesh.dim), cells)[:, None]
+        return corners[mesh.face_corners(self.numbers)]
 
     def mask(self, term: g.Term) -> np.ndarray:
         """(n,) bool: which of them a term holds for."""
@@ -168,7 +168,7 @@ class _Objects:
             case g.Present():
                 return np.ones(len(self.numbers), bool)
             case g.OnCrack():
-                rows = find_edges(self.edges, self.mesh.cracks, len(self.mesh.points))
+                rows = self.mesh.find_edges(self.edges, self.mesh.cracks)
                 return np.isin(self.numbers, self.edges.faces[rows[rows >= 0], 0])
         raise AssertionError(term)
 
@@ -198,13 +198,17 @@ class _Objects:
         return mask
 
     def _span(self, axis: int, low: float, high: float) -> np.ndarray:
+        if axis >= self.mesh.dim:
+            raise CommandError("a range in z needs a model in three dimensions")
         if low > high:
-            raise CommandError(f"{'xy'[axis]} {low:g} {high:g}: the first bound is above the second")
+            raise CommandError(f"{'xyz'[axis]} {low:g} {high:g}: the first bound is above the second")
         slack = NEAR * float(np.ptp(self.mesh.points, axis=0).max())
         at = self.places()[:, :, axis]
         return ((at >= low - slack) & (at <= high + slack)).all(axis=1)
 
     def _layer(self, layer: str) -> np.ndarray:
+        if self.mesh.dim == 3:
+            return self._solid(layer)
         if self.kind == g.ELEMENT:
             return _inside(self._curves(layer), self.places()[:, 0], layer)
         if self.now:
@@ -215,8 +219,32 @@ class _Objects:
         pairs = self.mesh.layers[layer] if layer in self.mesh.layers else edges_on(self.mesh, self._curves(layer))
         if self.kind == g.NODE:
             return np.isin(self.numbers, pairs) | self._on_points(layer)
-        rows = find_edges(self.edges, pairs, len(self.mesh.points))
+        rows = self.mesh.find_edges(self.edges, pairs)
         return np.isin(self.numbers, self.edges.faces[rows[rows >= 0]])
+
+    def _solid(self, layer: str) -> np.ndarray:
+        """In space: elements whose centre is inside of a solid of the layer; nodes, and faces with all points, on the
+        surface of one."""
+        if layer in self.mesh.layers and self.kind != g.ELEMENT:
+            if self.now:
+                raise CommandError(f"which {self.kind}s lie on '{layer}' is known in the mesh: leave out present")
+            points = self.mesh.layers[layer]
+            if self.kind == g.NODE:
+                return np.isin(self.numbers, points)
+            rows = self.mesh.find_edges(self.edges, points)
+            return np.isin(self.numbers, self.edges.faces[rows[rows >= 0]])
+        solids = self._solids(layer)
+        places = self.places()
+        if self.kind == g.ELEMENT:
+            return np.any([one.distance(places[:, 0]) < 0.0 for one in solids], axis=0)
+        slack = TOLERANCE * float(np.ptp(self.mesh.points, axis=0).max())
+        return np.any([on_surface(one, places, slack) for one in solids], axis=0)
+
+    def _solids(self, layer: str) -> list[Solid]:
+        if layer not in self.project.layers:
+            known = ", ".join(f"'{name}'" for name in {**self.mesh.layers, **dict.fromkeys(self.project.layers)})
+            raise CommandError(f"there is no geometry layer '{layer}'; there is {known or 'none so far'}")
+        return self.project.layers[layer]
 
     def _on_points(self, layer: str) -> np.ndarray:
         """Nodes on the single points of a layer, or on a line of which no edge of the mesh is a part."""

@@ -29,6 +29,8 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
     from hpcdem.commands.dem import cycles
     from hpcdem.physics.coupling.model import Coupled
 
+    if project.dim == 3:
+        raise CommandError("discs move in a plane: they cannot be stepped with blocks in three dimensions")
     if project.coupled is not None:
         raise CommandError("the blocks of this script are coupled to particles already")
     if Path(particles.outdir).resolve() == Path(project.outdir).resolve():

@@ -21,7 +21,6 @@ from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT
 from hpcdem.physics.fdem.simulation import Blocks
@@ -117,7 +116,8 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
     varied = {name for on, name in blocks.varied if on == {"joint": JOINT}.get(kind, kind)}
     return [
         name for name, quantity in QUANTITIES.items()
-        if quantity.on == kind and (quantity.framed or PROPERTIES[kind].get(name) in varied)
+        if quantity.on == kind and blocks.dim in quantity.dims
+        and (quantity.framed or PROPERTIES[kind].get(name) in varied)
         and (yields or not name.startswith("plastic_")) and (creeps or not name.startswith(("creep_", "kelvin_")))
         and (name != "mean_temperature" or "heat" in blocks.surface_loads)
     ] + (user_laws.quantities(blocks) if kind == ELEMENT else [])  # fmt: skip
@@ -125,11 +125,13 @@ def _names(blocks: Blocks, kind: str) -> list[str]:
 
 def _corners(blocks: Blocks) -> dict[str, np.ndarray]:
     """Every corner of this rank's elements by itself, with its node: those of broken joints part."""
-    vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in "xy"]
+    axes = "xyz"[: blocks.dim]
+    vectors = [f"{name}_{axis}" for name in ("position", "displacement", "velocity") for axis in axes]
     heat = ["temperature"] if "heat" in blocks.surface_loads else []
     columns = diagnostics.owned_values(blocks, "corner", vectors + heat)
     columns["node"] = blocks.the_mesh().cells[columns["number"] // 4, columns["number"] % 4].astype(np.int64)
-    return {{"position_x": "x", "position_y": "y"}.get(name, name): values for name, values in columns.items()}
+    places = {f"position_{axis}": axis for axis in axes}
+    return {places.get(name, name): values for name, values in columns.items()}
 
 
 def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -139,7 +141,7 @@ def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndar
     faces = (4 * elements[:, None] + np.arange(4)).reshape(-1)
     beside = blocks.partner[faces]
     cracks = faces[(beside > faces) & blocks.open[faces] & (blocks.joint_row[faces] == 0) & blocks.alive[beside // 4]]
-    ends = mesh.points[face_points(mesh.cells, cracks)]
+    ends = mesh.points[mesh.face_points(cracks)]
     known = {"number": cracks, "state": np.zeros(len(cracks)), "mode": np.zeros(len(cracks)),
              "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
     nothing = np.full(len(cracks), np.nan)
@@ -169,7 +171,7 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     columns = FLUID | {column: name for column, name in OF_OTHERS.items() if name in flow.more}
     fluid = flow.owned_values(CHANNEL, list(columns.values()))
     new = np.setdiff1d(fluid["number"], joints["number"])
-    ends = mesh.points[face_points(mesh.cells, new)]
+    ends = mesh.points[mesh.face_points(new)]
     known = {"number": new, "state": np.ones(len(new)), "mode": np.zeros(len(new)),
              "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
     nothing = np.full(len(new), np.nan)
@@ -187,10 +189,12 @@ def frame(project: Project) -> MeshFrame:
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     corners = _corners(blocks)
     elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
-    joints = _with_cracks(
-        blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
-    )
-    joints = _with_channels(blocks, joints)
+    joints = {"number": np.empty(0, np.int64)}  # in space there are none yet
+    if mesh.dim == 2:
+        joints = _with_cracks(
+            blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
+        )
+        joints = _with_channels(blocks, joints)
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():
@@ -200,9 +204,8 @@ def frame(project: Project) -> MeshFrame:
             code[members] = k
         elements[column] = code[elements["number"]]
         names[column] = list(groups)
-    element, edge = np.divmod(joints["number"], 4)
-    count = np.where(mesh.cells[element, 3] >= 0, 4, 3)
-    joints["first"], joints["last"] = joints["number"], 4 * element + (edge + 1) % count
+    ends = mesh.face_corners(joints["number"])
+    joints["first"], joints["last"] = ends[:, 0], ends[:, 1]
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
     clock = blocks.clock
     there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]

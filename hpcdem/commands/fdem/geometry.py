@@ -1,4 +1,4 @@
-"""Geometry layers: the lines that meshes, cracks and ranges are made from."""
+"""Geometry layers: the lines, in space the solids, that meshes, cracks and ranges are made from."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.pre.mesh import dxf
+from hpcdem.pre.mesh import dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
 from hpcdem.pre.mesh.once import made_once
 
 if TYPE_CHECKING:  # brings kernels, and shapes are made when a script is read
     from hpcdem.commands.fdem.project import Project
 
-Vector = tuple[float, float]
+Vector = tuple[float, ...]
 
 
 SHAPES: dict[str, Callable[..., shapes.Curve]] = {
@@ -22,14 +22,19 @@ SHAPES: dict[str, Callable[..., shapes.Curve]] = {
 }  # fmt: skip
 
 
-def shape(kind: str, *values: Any) -> list[shapes.Curve]:
+def shape(kind: str, *values: Any) -> list[Any]:
     """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius), arc (the same
-    and two angles [degrees], counter-clockwise), or of single points (point)."""
+    and two angles [degrees], counter-clockwise), or of single points (point); in space the solid [m] of a box (two
+    corners), sphere (centre, radius) or cylinder (middles of its ends, radius)."""
+    if kind in solids.KINDS:
+        return [solids.made(kind, *values)]
     return [shapes.point(at) for at in values[0]] if kind == "point" else [SHAPES[kind](*values)]
 
 
 def create(project: Project, kind: str, layer: str, *values: Any) -> None:
     """Add a shape to a layer; see `shape`."""
+    if (kind in solids.KINDS) != (project.dim == 3):
+        raise CommandError(f"a {kind} is for a model in {2 if project.dim == 3 else 3} dimensions: model new dim")
     project.layers.add(layer, *shape(kind, *values))
 
 

@@ -13,11 +13,13 @@ from hpcdem.commands.fdem.values import history_name
 from hpcdem.core.errors import CommandError
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
-from hpcdem.physics.fdem import user_laws
-from hpcdem.physics.fdem.connectivity import nearest_element, nearest_point
-from hpcdem.physics.fdem.groups import ELEMENT, FLOW, NODE, SUPPORTS, Ids, Range
+from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
+from hpcdem.physics.fdem.connectivity import nearest_point
+from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
+IN_SPACE = ("time", "cycle", "ratio")
+"""What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""
 
@@ -28,7 +30,7 @@ def create(
     kind: str,
     value: str,
     ident: int | None = None,
-    nearest: tuple[float, float] | None = None,
+    nearest: tuple[float, ...] | None = None,
     how: str = "",
     every: int = 1,
     where: Range | None = None,
@@ -68,10 +70,16 @@ def create(
             found = everything(project, kind, None, null_too=True)  # those count that are there at the moment
         assert found is not None
         numbers = found.tolist()
-    project.histories[name] = History(kind, value, numbers, well or how, every)
+    if kind == MODEL and project.dim == 3 and value not in IN_SPACE:
+        raise CommandError(f"in three dimensions a history of the model can follow {', '.join(IN_SPACE)}, not {value}")
+    if kind in (ELEMENT, NODE, JOINT) and value in diagnostics.QUANTITIES:
+        diagnostics.quantity(project.ready(use=False), value)
+    project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
 
 
-def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
+def _nearest(project: Project, kind: str, at: tuple[float, ...]) -> int:
+    if len(at) != project.whole_mesh().dim:
+        raise CommandError(f"nearest needs a vector of {project.whole_mesh().dim} numbers, got {len(at)}")
     if kind in SUPPORTS or kind in FLOW:
         numbers, middles = everything(project, kind, None), places(project, kind)
         return int(numbers[nearest_point(middles, at)])
@@ -79,7 +87,8 @@ def _nearest(project: Project, kind: str, at: tuple[float, float]) -> int:
     if kind == NODE:
         return nearest_point(xy, at, np.flatnonzero(~np.isnan(xy[:, 0])))
     if kind == ELEMENT:
-        return nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
+        of = tetrahedra if mesh.dim == 3 else connectivity
+        return of.nearest_element(xy, mesh.cells, at, np.flatnonzero(project.alive))
     edges = project.edges()
     middles = xy[edges.points[edges.inner]].mean(axis=1)
     there = np.flatnonzero(~np.isnan(middles[:, 0]))

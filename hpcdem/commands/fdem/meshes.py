@@ -13,7 +13,7 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
-from hpcdem.pre.mesh import fractures, geometry, imported, quality, structured
+from hpcdem.pre.mesh import fill, fractures, geometry, imported, quality, structured, structured_space
 from hpcdem.pre.mesh import glue as glue_of
 from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.regions import polygon_of
@@ -48,6 +48,13 @@ def create(
     """
     for layer in (outline, *(name for name, *_ in refine), *holes, *(name for name, _ in regions), *embedded, *cracks):
         _ = project.layers[layer]
+    if project.dim == 3:
+        others = {"type": kind != "tri", "embed": embedded, "crack": cracks, "irregular": irregular, "smooth": smooth}
+        lost = [word for word, said in others.items() if said]
+        if lost:
+            raise CommandError(f"{lost[0]} of mesh create is for two dimensions")
+        _fill(project, outline, size, group, set_name, refine, holes, regions)
+        return
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
     wishes = Wishes(
         [Region(outline, group, set_name), *(Region(layer, name, set_name) for layer, name in regions)],
@@ -64,6 +71,43 @@ def create(
     for note in made.notes:
         _say(project, note)
     _add(project, made.mesh)
+
+
+def _fill(
+    project: Project,
+    outline: str,
+    size: float,
+    group: str,
+    set_name: str,
+    refine: Sequence[tuple[str, float, float | None]],
+    holes: Sequence[str],
+    regions: Sequence[tuple[str, str]],
+) -> None:
+    layers = project.layers
+    wishes = fill.Wishes(
+        layers[outline],
+        size,
+        [one for layer in holes for one in layers[layer]],
+        [(name, layers[layer]) for layer, name in regions],
+        [(layers[layer], fine, distance) for layer, fine, distance in refine],
+    )
+    points, cells, groups = made_once(project.comm, lambda: fill.filled(wishes, group))
+    _add(project, Mesh.of(points, cells, {set_name: groups}))
+
+
+def box(
+    project: Project,
+    first: tuple[float, ...],
+    second: tuple[float, ...],
+    cells: tuple[int, ...],
+    split: int = 6,
+    group: str = DEFAULT,
+    set_name: str = DEFAULT,
+    ratio: tuple[float, ...] = (1.0, 1.0, 1.0),
+) -> None:
+    """Regular tetrahedra in the box between two corners [m]; cells along x, y and z, each split into 5, 6 or 12; ratio:
+    each is so many times as large as the one before. Its sides are the layers left, right, front, back, bottom, top."""
+    _add(project, structured_space.box(values.grid_lines(first, second, cells, ratio), split, (set_name, group)))
 
 
 def rectangle(
@@ -108,7 +152,7 @@ def import_file(
     """A mesh file of another program. Collective. group: one that all elements are put into; merge: points nearer than
     this are one [m]; scale: metres in a unit of the file."""
     file = project.to_read(path)
-    mesh = made_once(project.comm, lambda: imported.import_mesh(file, merge, scale))
+    mesh = made_once(project.comm, lambda: imported.import_mesh(file, merge, scale, project.dim))
     first = 0 if project.mesh is None else len(project.mesh.cells)
     _add(project, mesh)
     if group is not None:
@@ -207,6 +251,9 @@ def fracture_network(
 def _add(project: Project, mesh: Mesh) -> None:
     check(mesh)
     project.add_mesh(mesh)
+    if mesh.dim == 3:
+        _say(project, f"mesh: {len(mesh.cells)} tetrahedra, {len(mesh.points)} points")
+        return
     triangles = int((mesh.cells[:, 3] < 0).sum())
     _say(project, f"mesh: {triangles} triangles, {len(mesh.cells) - triangles} quads, {len(mesh.points)} points")
 

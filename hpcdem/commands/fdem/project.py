@@ -28,9 +28,10 @@ class Project:
     """blocks: the simulation (its comm, log and stop are used); directory: where file names begin; outdir: folder of
     the results; job: what was started, for run.json; keep: numbered checkpoints that are kept, 0: all.
 
-    layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object; alive (ne,) bool: elements
-    that are not null; histories, charts and frames (steps between two by name) that are kept up; cracks_filed: broken
-    joints that are in their file, None: the file is not of this model yet; framed: step of the last frame by name;
+    dim: dimensions of space; layers: geometry; mesh: of all bodies, None before the first; groups: by kind of object;
+    alive (ne,) bool: elements that are not null; histories, charts and frames (steps between two by name) that are kept
+    up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
+    last frame by name;
     dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
     fractures made so far; solved: how the last `model solve` ended, reason, ratio and steps; line:
     of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
@@ -96,18 +97,20 @@ class Project:
                 f"{what} cannot be used by a function that is called in the middle of model {self.stepping}"
             )
 
-    def clear(self) -> None:
-        """A new model."""
+    def clear(self, dim: int = 2) -> None:
+        """A new model in so many dimensions."""
         self.refuse_inside("model new")
         if self.coupled is not None:
             self.coupled.release()
         self.coupled = self.continues = None
         self.blocks.clear()
         self._forget()
+        self.dim = dim
 
     def _forget(self) -> None:
         self.layers = Layers()
         self.mesh: Mesh | None = None
+        self.dim = 2
         self._edges: tuple[np.ndarray, Edges] | None = None
         self.alive = np.empty(0, bool)
         self.groups = {kind: Groups(kind) for kind in KINDS}
@@ -128,6 +131,10 @@ class Project:
     def add_mesh(self, mesh: Mesh) -> None:
         """One more body. CommandError if models or conditions were assigned to the mesh already."""
         self.refuse_in_use("all bodies are meshed")
+        if mesh.dim != self.dim:
+            raise CommandError(
+                f"the mesh has {mesh.dim} dimensions, the model {self.dim}: model new dim {mesh.dim} makes one for it"
+            )
         first = 0 if self.mesh is None else len(self.mesh.cells)
         self.mesh = mesh if self.mesh is None else joined(self.mesh, mesh)
         for set_name, of in mesh.groups.items():
@@ -185,17 +192,18 @@ class Project:
         return self.blocks
 
     def positions(self) -> np.ndarray:
-        """(np, 2) where the nodes are now [m]; NaN where there is none any more."""
+        """(np, dim) where the nodes are now [m]; NaN where there is none any more."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
             return mesh.points
-        return np.column_stack([diagnostics.values(self.blocks, f"position_{axis}") for axis in "xy"])
+        axes = "xyz"[: mesh.dim]
+        return np.column_stack([diagnostics.values(self.blocks, f"position_{axis}") for axis in axes])
 
     def corner_positions(self) -> np.ndarray:
-        """(4 ne, 2) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
+        """(4 ne, dim) where each corner (element * 4 + k) is now [m]; NaN where there is none. Collective."""
         mesh = self.whole_mesh()
         if not self.taken or self.step == 0:
-            return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, 2)
+            return np.where((mesh.cells >= 0)[:, :, None], mesh.points[mesh.cells], np.nan).reshape(-1, mesh.dim)
         return diagnostics.corner_values(self.blocks, "position")
 
     # ---- files ---------------------------------------------------------------------------------------------------
@@ -247,7 +255,7 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
             mine[name] = np.concatenate([mine.get(name, np.empty(0, np.int64)), numbers + n_cells])
     layers = dict(one.layers)
     for name, pairs in other.layers.items():
-        layers[name] = np.concatenate([layers.get(name, np.empty((0, 2), np.int64)), pairs + n_points])
+        layers[name] = np.concatenate([layers.get(name, np.empty((0, one.dim), np.int64)), pairs + n_points])
     sets = one.crack_sets.max(initial=-1) + 1
     return Mesh.of(
         np.concatenate([one.points, other.points]),

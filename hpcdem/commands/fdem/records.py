@@ -28,11 +28,13 @@ LAW_STATE = "law_state"
 """A state variable of laws of the user, see user_laws.py; a history has its name as quantity."""
 UNITS = {
     NODE: {
-        "position_x": "m", "position_y": "m", "displacement_x": "m", "displacement_y": "m", "velocity_x": "m/s",
-        "velocity_y": "m/s", "reaction_x": "N/m", "reaction_y": "N/m", "temperature": "K",
+        "position_x": "m", "position_y": "m", "position_z": "m", "displacement_x": "m", "displacement_y": "m",
+        "displacement_z": "m", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s", "reaction_x": "N/m",
+        "reaction_y": "N/m", "reaction_z": "N/m", "temperature": "K",
     },
     ELEMENT: {
-        "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "plastic_state": "1",
+        "stress_xx": "Pa", "stress_yy": "Pa", "stress_xy": "Pa", "stress_zz": "Pa", "stress_xz": "Pa",
+        "stress_yz": "Pa", "plastic_state": "1",
         "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
         "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
         "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", "mean_temperature": "K",
@@ -62,7 +64,7 @@ UNITS = {
     },
 }  # fmt: skip
 """What can be recorded of each kind of object, with its unit."""
-_FORCES = ("reaction_x", "reaction_y")
+_FORCES = ("reaction_x", "reaction_y", "reaction_z")
 
 
 def _of_joints(kind: int) -> Callable[[Any], float]:
@@ -148,7 +150,7 @@ ENERGIES = tuple(
 class History:
     """kind: of object, MODEL, or WELL, whose name is `how`; value: name of the quantity; numbers: of the objects; how:
     "", or sum, mean, minimum, maximum of several; every: steps between two records; rows: (step, time, value); filed:
-    rows that are in the file."""
+    rows that are in the file; dim: dimensions of space, for the unit."""
 
     kind: str
     value: str
@@ -157,6 +159,7 @@ class History:
     every: int = 1
     rows: list[tuple[int, float, float]] = field(default_factory=list)
     filed: int = 0
+    dim: int = 2
 
     def __post_init__(self) -> None:
         self._probe: Probe | None = None
@@ -164,7 +167,8 @@ class History:
 
     @property
     def unit(self) -> str:
-        return UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
+        unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
+        return diagnostics.PER_METRE.get(unit, unit) if self.dim == 3 else unit
 
     @property
     def waits(self) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hpcdem.commands.fdem import coupling
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
@@ -12,13 +14,17 @@ from hpcdem.physics.fdem import creep as of_elements
 from hpcdem.physics.fdem.groups import ELEMENT, JOINT, Range
 
 
-def new(project: Project) -> None:
-    """A new model: no geometry, no mesh, step 0, default options."""
-    project.clear()
+def new(project: Project, dim: int = 2) -> None:
+    """A new model in so many dimensions: no geometry, no mesh, step 0, default options."""
+    if dim not in (2, 3):
+        raise CommandError(f"a model has 2 or 3 dimensions, not {dim}")
+    project.clear(dim)
 
 
-def gravity(project: Project, g: tuple[float, float]) -> None:
-    """Gravity (2,) [m/s2] from now on."""
+def gravity(project: Project, g: tuple[float, ...]) -> None:
+    """Gravity (2,), in space (3,), [m/s2] from now on."""
+    if len(g) != project.dim:
+        raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(g)}")
     project.blocks.gravity(*g)
 
 
@@ -28,6 +34,7 @@ def option(
     collision: bool | None = None,
     large_strain: bool | None = None,
     overlap: str | None = None,
+    potential: str | None = None,
     energy: bool | None = None,
     mechanical: bool | None = None,
     hydraulic: bool | None = None,
@@ -35,8 +42,9 @@ def option(
     thermal: bool | None = None,
     proppant: bool | None = None,
 ) -> None:
-    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, see `Blocks.option`;
-    energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal, proppant: `Blocks.parts`."""
+    """Switches; None leaves one as it is. overlap: of bodies that overlap before the first step, potential: of contact
+    in space, see `Blocks.option`; energy: keep the energy budget from here on; mechanical, hydraulic, one_way, thermal,
+    proppant: `Blocks.parts`."""
     if mechanical is False:
         coupling.refuse(project, "model option mechanical off")
     parts = {
@@ -46,8 +54,13 @@ def option(
         project.blocks.parts(**parts)
     if dynamic is not None:
         project.dynamic = dynamic
-    if (dynamic, collision, large_strain, overlap) != (None, None, None, None):
-        project.blocks.option(dynamic=dynamic, collision=collision, large_strain=large_strain, overlap=overlap)
+    of_blocks: dict[str, Any] = {
+        "dynamic": dynamic, "collision": collision, "large_strain": large_strain, "overlap": overlap,
+        "potential": potential,
+    }  # fmt: skip
+    given = {name: value for name, value in of_blocks.items() if value is not None}
+    if given:
+        project.blocks.option(**given)
     if energy is not None:
         needed = [name for name, history in project.histories.items() if history.value in ENERGIES]
         if not energy and needed:

@@ -18,12 +18,13 @@ FIGURES = (".png", ".pdf", ".svg")
 
 
 def grid_lines(
-    first: tuple[float, float], second: tuple[float, float], cells: tuple[int, int], ratio: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates along x and along y [m] of a regular mesh between two corners [m], with so many cells along each;
-    ratio: see `spaced`."""
-    x, y = (spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
-    return x, y
+    first: tuple[float, ...], second: tuple[float, ...], cells: tuple[int, ...], ratio: tuple[float, ...]
+) -> tuple[np.ndarray, ...]:
+    """Coordinates along x, y and in space z [m] of a regular mesh between two corners [m], with so many cells along
+    each; ratio: see `spaced`."""
+    if not len(first) == len(second) == len(cells) == len(ratio):
+        raise CommandError("corners, cells and ratio need a number for each dimension of space")
+    return tuple(spaced(min(a, b), max(a, b), n, r) for a, b, n, r in zip(first, second, cells, ratio))
 
 
 def fracture_set(

@@ -95,6 +95,7 @@ _TERMS: dict[str, Callable[[Any], g.Term]] = {
     "id": lambda v: g.Ids(v[0], v[-1]),
     "x": lambda v: g.Span(0, *v),
     "y": lambda v: g.Span(1, *v),
+    "z": lambda v: g.Span(2, *v),
     "geometry": g.OnLayer,
     "boundary": lambda v: g.OnBoundary(),
     "face-of": lambda v: g.OfElements(v["value"], v.get("set", g.DEFAULT)),
@@ -142,6 +143,17 @@ def _mesh_create(call: Call) -> None:
 
 def _mesh_structured(call: Call) -> None:
     options = {"ratio": call["ratio"]} if "ratio" in call.arguments else {}
+    if len(call["first"]) == 3:
+        fdem.meshes.box(
+            call.project,
+            call["first"],
+            call["second"],
+            call["cells"],
+            call.get("split", 6),
+            **call.group(),
+            **options,
+        )
+        return
     fdem.meshes.rectangle(
         call.project, call["first"], call["second"], call["cells"], call.get("type", "tri"),
         call.get("diagonal", "alternate"), **call.group(), **options,
@@ -212,7 +224,7 @@ def _node_condition(call: Call) -> None:
             commands.force(call.project, **_short(given), where=call.where)
         case "mechanical-move-boundary-constraint":
             kind, *along = given["type"]
-            commands.move(call.project, kind, along[0] if along else (0.0, 0.0), call.where)
+            commands.move(call.project, kind, along[0] if along else (0.0,) * call.project.dim, call.where)
         case FLOW_CONDITION.keyword.name:
             fdem.flow.condition(call.project, **given, where=call.where)
         case PROPPANT_CONDITION.keyword.name:
@@ -364,7 +376,7 @@ def _image(call: Call) -> None:
 
 
 BINDINGS: dict[str, Callable[[Call], None]] = {
-    "model new": lambda c: fdem.settings.new(c.project),
+    "model new": lambda c: fdem.settings.new(c.project, **c.given()),
     "model save": lambda c: fdem.checkpoints.save(c.project, c["file"]),
     "model restore": _restore,
     "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
@@ -382,6 +394,9 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create arc": _shape("arc", "centre", "radius", "begin", "end"),
     "geometry create point": _shape("point", "points"),
     "geometry create fractures": _fractures,
+    "geometry create box": _shape("box", "first", "second"),
+    "geometry create sphere": _shape("sphere", "centre", "radius"),
+    "geometry create cylinder": _shape("cylinder", "first", "second", "radius"),
     "geometry import": lambda c: fdem.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
     "geometry transform": lambda c: fdem.geometry.transform(c.project, **c.given()),
     "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layer"]),

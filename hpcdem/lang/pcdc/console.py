@@ -61,7 +61,7 @@ class Console:
         if last.lstrip().startswith("pcdc") and last.endswith("\\"):
             return False
         try:
-            python = source.read(text, "console").python[:-1]  # as typed: an empty line ends a block
+            python = source.read(text, "console", dim=None).python[:-1]  # as typed: an empty line ends a block
         except ScriptError:
             return self._broken_is_whole(text)
         try:

@@ -60,7 +60,10 @@ class Interpreter:
 
     def read(self, text: str, file: str) -> Source:
         """Read a script; ScriptError at its first wrong line."""
-        return source.read(text, file, len(self.statements))
+        return source.read(text, file, len(self.statements), dim=self._dim())
+
+    def _dim(self) -> int:
+        return int(getattr(self.project, "dim", 2))
 
     def run(self, script: Source, past: Sequence[list[Any]] = ()) -> None:
         """Run a script that was read last, to its end. ScriptError names the line of a command, HpcdemError that of the
@@ -104,7 +107,7 @@ class Interpreter:
 
         file: as messages show it. ScriptError names the line of the text, and that of the script.
         """
-        script = source.read(text, file, len(self.statements))
+        script = source.read(text, file, len(self.statements), dim=self._dim())
         for name, value in self._own_names.items():
             names.setdefault(name, value)
         around = self._included_at
@@ -383,7 +386,7 @@ class Interpreter:
         scripts: list[Source] = []
         first = len(self.statements)
         for name, text in functions.items():
-            script = source.read(text, f"{file}:{name}", first)
+            script = source.read(text, f"{file}:{name}", first, dim=None)
             first += len(script.statements)
             names.plain_def(name, script)
             scripts.append(script)

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN
+from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE
 
 
 @dataclass(frozen=True)
@@ -55,20 +55,25 @@ class Kind:
     """``table 'name'`` or ``function 'file.py:name'`` may stand for it."""
     words: tuple[str, ...] = ()
     """Words that are values."""
+    dims: tuple[int, ...] = (2, 3)
+    """Dimensions of space in which it is there."""
     varied: bool = False
     """``table 'name' over x`` or ``field 'name'`` may stand for it: it differs from place to place."""
     softens: bool = False
     """``table 'name' over plastic-strain`` may, too."""
+    warms: bool = False
+    """So may ``table 'name' over temperature``."""
 
     @property
     def axes(self) -> tuple[str, ...]:
         """What a table that stands for it can be over."""
-        return AXES if self.softens else AXES[:PLASTIC_STRAIN]
+        there = {PLASTIC_STRAIN: self.softens, TEMPERATURE: self.warms}
+        return tuple(axis for k, axis in enumerate(AXES) if there.get(k, True))
 
 
-def varied(kind: Kind, softens: bool = False) -> Kind:
+def varied(kind: Kind, softens: bool = False, warms: bool = False) -> Kind:
     """The same for a property of elements, faces or joints."""
-    made = replace(kind, varied=True, softens=softens)
+    made = replace(kind, varied=True, softens=softens, warms=warms)
     return replace(made, pattern=f"{kind.pattern}|table <s> over {'|'.join(made.axes)}|field <s>")
 
 
@@ -103,6 +108,18 @@ def whole(low: float = -math.inf, high: float = 2**53) -> Callable[[Any], int]:
     return check
 
 
+def _one_of(*numbers_: int) -> Callable[[Any], int]:
+    """A check for one of these numbers."""
+
+    def check(value: Any) -> int:
+        found = whole()(value)
+        if found not in numbers_:
+            raise Unfit
+        return found
+
+    return check
+
+
 def _string(value: Any) -> str:
     if not isinstance(value, str) or not value.strip() or not value.isprintable():
         raise Unfit
@@ -127,16 +144,21 @@ def _boolean(value: Any) -> bool:
 _coordinate = number()
 
 
-def _vector(value: Any) -> tuple[float, float]:
-    if isinstance(value, str):
-        raise Unfit
-    try:
-        items = [_coordinate(v) for v in value]
-    except TypeError:
-        raise Unfit from None
-    if len(items) != 2:
-        raise Unfit
-    return items[0], items[1]
+def _vector(*sizes: int) -> Callable[[Any], tuple[float, ...]]:
+    """A check for a vector of one of so many components."""
+
+    def check(value: Any) -> tuple[float, ...]:
+        if isinstance(value, str):
+            raise Unfit
+        try:
+            items = tuple(_coordinate(v) for v in value)
+        except TypeError:
+            raise Unfit from None
+        if len(items) not in sizes:
+            raise Unfit
+        return items
+
+    return check
 
 
 def _listed(check: Callable[[Any], Any]) -> Callable[[Any], list]:
@@ -161,13 +183,32 @@ ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
 POINTS = Kind("3", "3, the points of a joint in two dimensions,", whole(3, 3))
 FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2))
 DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
+SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))
 LAST_ID = Kind("[<i>]", "a whole number, not negative", whole(0), optional=True)
 STRING = Kind("<s>", "a text in quotes", _string)
 FILE = Kind("<s>", "the name of a file in quotes", _file)
 BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"))
-VECTOR = Kind("<v>", "a vector (x,y)", _vector)
-OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector, optional=True)
-VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector, many=True)
+VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
+OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
+VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
+"""One more in three dimensions."""
+_FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
+_IN_SPACE = {FREEDOM.pattern: _FREEDOM} | {
+    kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
+    for kind in (VECTOR, OPTIONAL_VECTOR)
+}
+_IN_ANY = {FREEDOM.pattern: _FREEDOM} | {
+    kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
+    for kind in (VECTOR, OPTIONAL_VECTOR)
+}
+
+
+def fitting(kind: Kind, dim: int | None) -> Kind:
+    """The same in a model of so many dimensions; None: it is not known how many there are."""
+    return kind if dim == 2 else (_IN_ANY if dim is None else _IN_SPACE).get(kind.pattern, kind)
+
+
 STRINGS = Kind("<s> ...", "texts in quotes", _string, many=True)
 
 

@@ -16,10 +16,13 @@ from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
-def parse(words: str, file: str, line: int, text: str, table: Table, last_line: int = 0) -> Statement:
-    """The statement of a line; words: what follows ``pcdc``; text: the line as messages show it. ScriptError."""
+def parse(
+    words: str, file: str, line: int, text: str, table: Table, last_line: int = 0, dim: int | None = 2
+) -> Statement:
+    """The statement of a line; words: what follows ``pcdc``; text: the line as messages show it; dim: dimensions of the
+    model that it is for, None: not known. ScriptError."""
     try:
-        return _Line(words, table).statement(file, line, text, last_line or line)
+        return _Line(words, table, dim).statement(file, line, text, last_line or line)
     except ValueError as error:
         raise ScriptError(file, line, f"{shown(text)}: {error}") from None
 
@@ -29,7 +32,7 @@ def expected(words: str, table: Table) -> Sequence[Any]:
     error."""
     line: _Line | None = None
     try:
-        line = _Line(words, table)
+        line = _Line(words, table, None)
         line.statement("", 0, "", 0)
     except ValueError:
         pass
@@ -40,13 +43,16 @@ class _Line:
     """Reads one line, word by word, against the table. Errors are ValueErrors. wanted: the rows of keywords
     that may stand where the line ends."""
 
-    def __init__(self, words: str, table: Table) -> None:
+    def __init__(self, words: str, table: Table, dim: int | None) -> None:
         self.tokens = lexer.tokens(words)
         self.table = table
+        self.dim = dim
         self.at = 0
         self.expressions = kinds.Expressions()
         self.context = "pcdc"
         self.wanted: Sequence[Any] = ()
+        self.rows: Sequence[Option] = ()
+        """Keywords of the command."""
 
     # ---- words
 
@@ -140,9 +146,15 @@ class _Line:
                 return self._allowed(rows[0])
 
     def _allowed(self, command: Command) -> Command:
-        if command.later:
-            raise ValueError(f"'{command.name}' is not there yet: {command.later}")
+        self.refuse_elsewhere(command.name, command.dims)
         return command
+
+    def refuse_elsewhere(self, word: object, dims: Sequence[int]) -> None:
+        """ValueError for a word that is not there in the dimensions of this model."""
+        if self.dim is not None and self.dim not in dims:
+            numbers = {2: "two", 3: "three"}
+            advice = "; model new dim 3 makes a model of three" if self.dim == 2 else " in this version"
+            raise ValueError(f"'{word}' is for {numbers[dims[0]]} dimensions{advice}")
 
     def leading(self, option: Option, arguments: dict[str, Any]) -> None:
         if not option.required and self.peek() is None:
@@ -157,15 +169,14 @@ class _Line:
             token = self.next("the name of a model: " + _joined(m.keyword.name for m in command.models))
             self.unknown(token, command.models)
         self.context = f"{self.context} {found.keyword}"
-        if found.later:
-            raise ValueError(f"'{found.keyword}' is not there yet: {found.later}")
+        self.refuse_elsewhere(found.keyword, found.dims)
         return found
 
     def options(
         self, command: Command, options: Sequence[Option], arguments: dict[str, Any]
     ) -> tuple[tuple[str, Any], ...] | None:
         """Keywords in any order, then RANGE."""
-        rows = [*options, RANGE] if command.ranged else options
+        rows = self.rows = [*options, RANGE] if command.ranged else options
         while (token := self.peek()) is not None:
             option = self.take(rows)
             if option is RANGE:
@@ -203,14 +214,16 @@ class _Line:
     # ---- values
 
     def values(self, option: Option) -> Any:
-        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow."""
-        if option.later:
-            raise ValueError(f"'{option.keyword}' is not there yet: {option.later}")
+        """What follows a keyword: one value, a tuple of several, or a dict where keywords of its own may follow, each
+        once: the second is one of the command."""
+        self.refuse_elsewhere(option.keyword, option.dims)
         read = []
         for kind in option.values:
-            if kind.optional and not self._value_follows():
+            if self.dim not in (None, *kind.dims):
+                continue
+            if (kind.optional or (self.dim is None and len(kind.dims) == 1)) and not self._value_follows():
                 break
-            read.append(self.one(kind, option))
+            read.append(self.one(kinds.fitting(kind, self.dim), option))
         value = read[0] if len(option.values) == 1 and read else tuple(read) if option.values else True
         if not option.more:
             return value
@@ -218,6 +231,9 @@ class _Line:
         outer, self.context = self.context, f"{self.context} {option.keyword}"
         while (inner := self.take(option.more)) is not None:
             if inner.name in given:
+                if any(row.keyword == inner.keyword for row in self.rows):
+                    self.at -= 1
+                    break
                 raise ValueError(f"'{inner.keyword}' is given twice after '{option.keyword}'")
             given[inner.name] = self.values(inner)
         self.require(option.more, given)

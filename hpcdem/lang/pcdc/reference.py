@@ -73,17 +73,16 @@ centre of an element, a node, both ends of a face or joint.
 def page(table: Table = PCDC) -> str:
     """The whole page, in Markdown."""
     parts = [_TOP, _overview(table)]
-    parts += [_command(command) for command in table.commands if not command.later]
-    parts += [_RANGE, _options(table.range_terms), "", *_models(table), _recorded(), _later(table)]
+    parts += [_command(command) for command in table.commands]
+    parts += [_RANGE, _options(table.range_terms), "", *_models(table), _recorded(), _dimensions(table)]
     return "\n".join(parts).rstrip("\n") + "\n"
 
 
 def _overview(table: Table) -> str:
     rows = ["## Commands", "", "| command | what it does |", "|---|---|"]
     for command in table.commands:
-        if not command.later:
-            first = command.doc.split(". ")[0].rstrip(".")
-            rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {escaped(first)} |")
+        first = command.doc.split(". ")[0].rstrip(".")
+        rows.append(f"| [{command.name}](#{command.name.replace(' ', '-')}) | {escaped(first)} |")
     return "\n".join([*rows, ""])
 
 
@@ -94,7 +93,7 @@ def _command(command: Command) -> str:
     if command.leading or command.options:
         lines += [_options(command.options, command.leading), ""]
     if command.models:
-        names = ", ".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models if not m.later)
+        names = ", ".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models)
         lines += [f"Models: {names}.", ""]
     lines += ["Example:" if len(command.example) == 1 else "Examples:", "", "```", *command.example, "```", ""]
     return "\n".join(lines)
@@ -122,8 +121,6 @@ def _options(options: Sequence[Option], values: Sequence[Option] = ()) -> str:
     for option in values:
         rows.append(_row(option, "", named=True))
     for option in options:
-        if option.later:
-            continue
         rows.append(_row(option, f"`{option.notation}`"))
         rows += [_row(inner, f"... `{inner.notation}`") for inner in option.more]
     return "\n".join(rows)
@@ -147,8 +144,7 @@ def _models(table: Table) -> list[str]:
     lines = ["## Models and conditions", ""]
     for command in table.commands:
         for model in command.models:
-            if not model.later:
-                lines += _model(model, command)
+            lines += _model(model, command)
     return lines
 
 
@@ -168,16 +164,23 @@ def _recorded() -> str:
     return "\n".join([*rows, ""])
 
 
-def _later(table: Table) -> str:
-    """What is known and refused."""
-    rows = ["## Not there yet", "", "These are refused by name, before anything runs.", ""]
-    rows += ["| words | why |", "|---|---|"]
+def _dimensions(table: Table) -> str:
+    """What is there in three dimensions."""
+    rows = [
+        "## Three dimensions",
+        "",
+        "After `pcdc model new dim 3` vectors have three components, and these commands ",
+    ]
+    rows[-1] += "are there, with all of their words but those that are named; others are refused before anything runs."
+    rows += ["", "| command | models | not there | in three dimensions only |", "|---|---|---|---|"]
     for command in table.commands:
-        if command.later:
-            rows.append(f"| `{command.notation}` | {escaped(command.later)} |")
-        rows += [f"| `{command.notation} {m.notation}` | {escaped(m.later)} |" for m in command.models if m.later]
-        rows += [f"| `{command.notation} ... {o.notation}` | {escaped(o.later)} |" for o in command.options if o.later]
-    rows += [f"| `ran{{ge}} ... {term.notation}` | {escaped(term.later)} |" for term in table.range_terms if term.later]
+        if 3 not in command.dims:
+            continue
+        models = [model for model in command.models if 3 in model.dims]
+        options = [*command.options, *(option for model in models for option in model.options)]
+        of = [", ".join(f"`{option.name}`" for option in options if option.dims == dims) for dims in ((2,), (3,))]
+        here = ", ".join(f"`{model.keyword.name}`" for model in models)
+        rows.append(f"| `{command.name}` | {here} | {of[0]} | {'all' if 2 not in command.dims else of[1]} |")
     return "\n".join([*rows, ""])
 
 

@@ -77,11 +77,6 @@ def _curve(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
         raise ValueError("range goes with profile: it says along which joints")
 
 
-def _dimensions(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if arguments.get("dim", 2) == 3:
-        raise ValueError("dim 3 is not there yet: this version computes in two dimensions")
-
-
 def _time_step(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     ways = {"value": "value", "auto": "auto on", "mass-scaling": "mass-scaling"}
     said = [told for word, told in ways.items() if not isinstance(arguments.get(word), Pending) and arguments.get(word)]
@@ -148,7 +143,8 @@ LOOKS = ("limits", "log", "colours", "opacity", "edges", "size", "vectors", "arr
 
 
 def _image(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
-    if terms is not None and arguments.get("object") not in SHOWN:
+    shown = arguments.get("object")
+    if terms is not None and shown not in SHOWN and not isinstance(shown, Pending):
         raise ValueError(f"range goes with object, one of {', '.join(SHOWN)}: it says which of them are shown")
     if "field" not in arguments and "object" not in arguments:
         for word in LOOKS:
@@ -168,7 +164,6 @@ _RULES = {
     "bolt create polyline": _bolt,
     "field create": _field,
     "flow-node initial": _fluid,
-    "model new": _dimensions,
     "model time-step": _time_step,
     "model creep": _creep,
     "model rayleigh": _rayleigh,

@@ -64,10 +64,11 @@ def decode(source: bytes, file: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC) -> Source:
+def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC, dim: int | None = 2) -> Source:
     """Read all of a script and parse its commands; ScriptError at the first line that is wrong, command or Python.
 
-    first: number of the first statement, where several sources share one list of them.
+    first: number of the first statement, where several sources share one list of them; dim: dimensions of the model
+    that is there at the beginning, None: not known. Lines are read for the model of the last `model new` above them.
     """
     lines = text.split("\n")
     found = Source(file, lines, "", [], first)
@@ -84,7 +85,8 @@ def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC) -
         shown = " ".join(f"pcdc{words}".split())
         if words.lstrip().startswith("="):
             raise ScriptError(file, number + 1, f"{lines[number].strip()}: 'pcdc' is reserved, no name for a variable")
-        statement = parser.parse(words, file, number + 1, shown, table, last_line=last + 1)
+        statement = parser.parse(words, file, number + 1, shown, table, last + 1, dim)
+        dim = _dimensions(statement, dim)
         index = first + len(found.statements)
         found.statements.append(statement)
         values = "".join(f"({code}), " for code in statement.expressions)
@@ -94,6 +96,16 @@ def read(text: str, file: str = "script", first: int = 0, table: Table = PCDC) -
     found.python = "\n".join(python) + "\n"
     _check_python(found)
     return found
+
+
+def _dimensions(statement: Statement, before: int | None) -> int | None:
+    """Of the model after a command; None: not known."""
+    if statement.command.name == "model restore":
+        return None
+    if statement.command.name != "model new":
+        return before
+    given = statement.arguments.get("dim", 2)
+    return given if isinstance(given, int) else None
 
 
 def _logical(lines: list[str], number: int, words: str) -> tuple[int, str]:

@@ -3,7 +3,7 @@
 Parsing, abbreviations, candidates in messages, completion in the console and the page docs/pcdc_reference.md are all
 made from the rows below; a new keyword is one new row. Properties of elements, faces and joints are declared with the
 models of the simulation (physics/fdem/properties.py) and only get their spelling here. Words are in the manual's
-notation (`keywords`). A row with `later` is known, and refused with that sentence before anything runs.
+notation (`keywords`).
 
 `manual` marks what the manual itself prints; the other commands are hpcdem's, since the manual refers to an online
 help for them. Spellings of the manual that are slips stand first where scripts may use them, the right ones beside
@@ -31,9 +31,12 @@ from hpcdem.lang.pcdc.kinds import (
     PART,
     POINTS,
     POSITIVE,
+    SPLIT,
     STRING,
     STRINGS,
     TABLED,
+    THIRD_COUNT,
+    THIRD_POSITIVE,
     VECTOR,
     VECTORS,
     ZERO_OR_MORE,
@@ -51,7 +54,8 @@ from hpcdem.physics.liners.properties import LINER as LINER_PROPERTIES
 from hpcdem.physics.proppant.properties import MEDIUM as MEDIUM_PROPERTIES
 from hpcdem.physics.proppant.properties import PROPPANT as PROPPANT_PROPERTIES
 
-THREE_D = "this version computes in two dimensions"
+BOTH, PLANE, SPACE = (2, 3), (2,), (3,)
+"""Dimensions of space in which a word is there."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ class Option:
     """A keyword with its values.
 
     notation and also: see `Keyword`; values: their kinds, in order; more: keywords that may follow right after the
-    values and belong to this one; only: where a term of RANGE makes sense (objects), () for everywhere.
+    values and belong to this one; only: where a term of RANGE makes sense (objects), () for everywhere; dims:
+    dimensions of space in which it is there.
     """
 
     notation: str
@@ -70,9 +75,9 @@ class Option:
     required: bool = False
     repeated: bool = False
     more: tuple[Option, ...] = ()
-    later: str = ""
     also: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    dims: tuple[int, ...] = BOTH
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -88,7 +93,7 @@ class Option:
 class Model:
     """A constitutive model or boundary condition with its properties. number: of the manual's table; leading: values
     that come first; one_of: sets of properties of which one must be complete; any_of: at least one property must be
-    given; of: the model of the simulation."""
+    given; of: the model of the simulation; dims: dimensions of space in which it is there."""
 
     notation: str
     number: str
@@ -96,10 +101,10 @@ class Model:
     options: tuple[Option, ...] = ()
     one_of: tuple[tuple[str, ...], ...] = ()
     any_of: bool = False
-    later: str = ""
     also: tuple[str, ...] = ()
     of: properties.Model | None = None
     leading: tuple[Option, ...] = ()
+    dims: tuple[int, ...] = PLANE
 
     @cached_property
     def keyword(self) -> Keyword:
@@ -110,7 +115,8 @@ class Model:
 class Command:
     """notation: its words; leading: values (and words in the place of values) that come first; models: one of them is
     named after the words; ranged: the objects that RANGE chooses among, "" if it takes none; needs_option: at least one
-    option must be given; properties: the word ``property`` may stand before the options; manual: printed there."""
+    option must be given; properties: the word ``property`` may stand before the options; manual: printed there; dims:
+    as of models."""
 
     notation: str
     doc: str
@@ -122,7 +128,7 @@ class Command:
     needs_option: bool = False
     properties: bool = False
     manual: bool = False
-    later: str = ""
+    dims: tuple[int, ...] = PLANE
 
     @cached_property
     def words(self) -> tuple[Keyword, ...]:
@@ -180,7 +186,7 @@ def declared(
         one = model.property(name.replace("-", "_"))
         default = one.otherwise or ("" if one.default is None else f"{one.default:g}")
         kind = limited(one.low, one.high, one.low_itself, one.unit)
-        kind = kind if uniform else varied(kind, one.softens)
+        kind = kind if uniform else varied(kind, one.softens, one.warms)
         required = not (default or one.optional)
         options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
     return tuple(options)
@@ -195,14 +201,14 @@ _PAIRS = (("young", "poisson-ratio"), ("shear", "bulk"))
 
 ISO_ELASTIC = Model(
     "mech{anical}-iso-e{lastic}", "1", "Isotropic, linear elastic, for large rotations.",
-    _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC,
+    _ELASTIC, one_of=_PAIRS, of=properties.MECH_ISO_ELASTIC, dims=BOTH,
 )  # fmt: skip
 NULL = Model(
     "null", "", "The elements are taken out: excavated. Faces beside them become free. Another model in a range that "
     "names them brings them back, as new material where the void is then, free of stress; they hang together with what "
     "lies around them, without joints, until face-joint c-model gives them some.",
     (Option("relax", (POSITIVE,), "what they did to the others dies down over this time (static runs: so many steps)",
-            "s", "at once"),),
+            "s", "at once", dims=PLANE),), dims=BOTH,
 )  # fmt: skip
 MOHR_COULOMB = Model(
     "mech{anical}-m{ohr}-c{oulomb}", "2",
@@ -261,32 +267,37 @@ VELOCITY = Model(
     "velocity.",
     (Option("v{elocity}-x", (TABLED,), "velocity along x", "m/s"),
      Option("v{elocity}-y", (TABLED,), "velocity along y", "m/s"),
+     Option("v{elocity}-z", (TABLED,), "velocity along z", "m/s", dims=SPACE),
      Option("a{cceleration}-x", (TABLED,), "acceleration along x", "m/s2"),
-     Option("a{cceleration}-y", (TABLED,), "acceleration along y", "m/s2")),
-    any_of=True,
+     Option("a{cceleration}-y", (TABLED,), "acceleration along y", "m/s2"),
+     Option("a{cceleration}-z", (TABLED,), "acceleration along z", "m/s2", dims=SPACE)),
+    any_of=True, dims=BOTH,
 )  # fmt: skip
 FORCE = Model(
     "mech{anical}-f{orce}-b{oundary}-c{ondition}", "5", "Force on each node.",
-    (Option("f{orce}-x", (TABLED,), "force along x", "N"), Option("f{orce}-y", (TABLED,), "force along y", "N")),
-    any_of=True,
+    (Option("f{orce}-x", (TABLED,), "force along x", "N"), Option("f{orce}-y", (TABLED,), "force along y", "N"),
+     Option("f{orce}-z", (TABLED,), "force along z", "N", dims=SPACE)),
+    any_of=True, dims=BOTH,
 )  # fmt: skip
 MOVE = Model(
     "mech{anical}-m{ove}-b{oundary}-c{onstraint}", "7", "Freedom of nodes.",
     (Option("t{ype}", (FREEDOM, OPTIONAL_VECTOR),
-            "0 free, 1 held, 2 moves along the vector only (type 0 and 1 take a vector and do not use it)",
-            required=True),),
+            "0 free, 1 held, 2 moves along the vector only, 3 (in three dimensions) across it only (type 0 and 1 take "
+            "a vector and do not use it)", required=True),), dims=BOTH,
 )  # fmt: skip
 STRESS = Model(
     "m{echanical}-s{tress}-b{oundary}-c{ondition}", "6",
     "Traction on surfaces: stress times the present normal. Tension is positive.",
     (Option("s{tress}-x{x}", (TABLED,), "stress xx", "Pa"), Option("s{tress}-y{y}", (TABLED,), "stress yy", "Pa"),
+     Option("s{tress}-z{z}", (TABLED,), "stress zz", "Pa", dims=SPACE),
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa"),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
-            "given beside it enters as a wave of half its size"),
-     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
-     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s")),
-    any_of=True, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
+            "given beside it enters as a wave of half its size", dims=PLANE),
+     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s",
+            dims=PLANE),
+     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s", dims=PLANE)),
+    any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 FLOW_CONDITION = Model(
     "hydra{ulic}-c{onstant}-f{low}-b{oundary}", "11",
@@ -339,7 +350,7 @@ CONTACT = Model(
     "Contact of surfaces: potential of the overlap, Coulomb friction. Of two surfaces the smaller value counts.",
     declared(properties.CONTACT_MOHR_COULOMB, "f{riction}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}", "d{amping}-t",
              "d{amping}-b", "d{amping}-r{atio}"),
-    of=properties.CONTACT_MOHR_COULOMB,
+    of=properties.CONTACT_MOHR_COULOMB, dims=BOTH,
 )  # fmt: skip
 COHESIVE = Model(
     "c{lassic}-i{ntrinsic}-c{ohesive}-i{nterface}", "9",
@@ -465,9 +476,9 @@ RANGE_TERMS = (
     Option("id", (ZERO_OR_MORE, LAST_ID), "the number, or from first to last; numbers begin at 0, as in the output"),
     Option("x", (FLOAT, FLOAT), "x from ... to ..., in the mesh", "m"),
     Option("y", (FLOAT, FLOAT), "y from ... to ..., in the mesh", "m"),
-    Option("z", (FLOAT, FLOAT), "", later=THREE_D),
-    Option("geom{etry}", (STRING,), "lies on the lines of the geometry layer; elements: their centre is inside of it; "
-           "in the mesh", only=("element", *_FACES)),
+    Option("z", (FLOAT, FLOAT), "z from ... to ..., in the mesh", "m", dims=SPACE),
+    Option("geom{etry}", (STRING,), "lies on the lines, in three dimensions on the surfaces, of the geometry layer; "
+           "elements: their centre is inside of it; in the mesh", only=("element", *_FACES)),
     Option("pres{ent}", (), "x, y and geometry (of elements) look at where things are at this moment"),
     Option("boundary", (), "lies on a surface of the model", only=("element-face", "node")),
     Option("face-of", (STRING,), "faces, joints or nodes of the elements of the group; joints: both elements are in it",
@@ -484,11 +495,13 @@ _LAYER = Option("a{s}-l{ayer}", (STRING,), "name of the layer; a layer may hold 
 _NAME = Option("name", (STRING,), "name", required=True)
 RECORDED = {
     "node": {
-        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
-        "velocity-y": "m/s", "reaction-x": "N/m", "reaction-y": "N/m", "temperature": "K",
+        "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
+        "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "reaction-x": "N/m",
+        "reaction-y": "N/m", "reaction-z": "N/m", "temperature": "K",
     },
     "element": {
-        "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "plastic-state": "1",
+        "stress-xx": "Pa", "stress-yy": "Pa", "stress-xy": "Pa", "stress-zz": "Pa", "stress-xz": "Pa",
+        "stress-yz": "Pa", "plastic-state": "1",
         "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
         "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
         "kelvin-strain-xy": "1", "creep-work": "J/m", "mean-temperature": "K", "law-state": "that of the law",
@@ -546,6 +559,7 @@ def _group_command(kind: str, notation: str) -> Command:
         f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
         "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
+        dims=BOTH if kind in ("element", "element-face", "node") else PLANE,
     )  # fmt: skip
 
 
@@ -566,15 +580,16 @@ _OF_SOLIDS = (
 
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
-            ("pcdc model new", "pcdc model new dim 2"),
-            options=(Option("dim", (DIMENSIONS,), "dimensions of space: 2", "", "2"),), manual=True),
+            ("pcdc model new", "pcdc model new dim 3"),
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three this version computes elastic "
+                            "bodies", "", "2"),), manual=True, dims=BOTH),
     Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
             "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
-            (_leading("file", FILE, "name of the file, beside the script"),), manual=True),
+            (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),
     Command("mod{el} restore", "The state of a file, and its m_ variables and functions.",
-            ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True),
+            ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH),
     Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
-            (_leading("gravity", VECTOR, "acceleration", "m/s2"),)),
+            (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH),
     Command("mod{el} opt{ion}", "Switches of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
@@ -583,18 +598,23 @@ _MODEL = (
                 Option("over{lap}", (choice("refuse", "relax", "keep"),), "of bodies that overlap before the first "
                        "step: refuse it, with the places; let a static stage move them apart; or start as they are",
                        default="refuse"),
+                Option("pot{ential}", (choice("distance", "munjiza"),), "what contact presses with: the distance to "
+                       "the nearest side of an element over the usual altitude in its body, or four times the smallest "
+                       "of its barycentric coordinates", default="distance", dims=SPACE),
                 Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid or heat flows",
-                       default="on"),
+                       default="on", dims=PLANE),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
-                       "histories of the model, a table at the end", default="off"),
-                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
-                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
+                       "histories of the model, a table at the end", default="off", dims=PLANE),
+                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on",
+                       dims=PLANE),
+                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off",
+                       dims=PLANE),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
-                       "the stress that they bring, stay as they are", default="on"),
+                       "the stress that they bring, stay as they are", default="on", dims=PLANE),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
-                       "where they are", default="on")),
-            needs_option=True, manual=True),
+                       "where they are", default="on", dims=PLANE)),
+            needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
             "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
             "and auto on the one said last holds and ends the others.",
@@ -609,13 +629,13 @@ _MODEL = (
                        "and the step is estimated again", "s"),
                 Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
                        "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
-                       "s", "0"),
+                       "s", "0", dims=PLANE),
                 Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
-                       "0")),
-            needs_option=True, manual=True),
+                       "0", dims=PLANE)),
+            needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
-            (_leading("steps", ZERO_OR_MORE, "number of steps"),)),
+            (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH),
     Command("mod{el} sol{ve}", "Steps until the first of ratio, cycles and time is reached. Static runs without any "
             "stop at ratio 1e-5. With elastic: straight to static equilibrium by Newton's method, for blocks that are "
             "elastic or yield, whose joints stay before their peak and whose surfaces do not touch. A run towards a "
@@ -640,26 +660,27 @@ _MODEL = (
                             default="static runs 1 000 000, dynamic ones 10 000 000; beside time: 0"),
                      Option("on-f{ailure}", (choice("stop", "continue"),), "stop: with exit code 3; continue: with a "
                             "warning, the script looks at pcdc.solved", default="stop"),
-                     Option("ela{stic}", (), "at once, without steps"),
+                     Option("ela{stic}", (), "at once, without steps", dims=PLANE),
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
-                            "may pass their peak and break; with mechanical off, flow alone"),
+                            "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
-                            "and joints may pass their peak and break; with mechanical off, heat alone"),
+                            "and joints may pass their peak and break; with mechanical off, heat alone", dims=PLANE),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
-                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
+                            "shorter where joints break or no balance is found", "s", "a hundredth of the time",
+                            dims=PLANE),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
                             "where an estimate says that these cost less, or where implicit ones are refused; the log "
-                            "has both estimates"),
+                            "has both estimates", dims=PLANE),
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
-                            "passes"),
+                            "passes", dims=PLANE),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
                             "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
-                            "it is there, from 400 000 unknowns on", default="auto"),
+                            "it is there, from 400 000 unknowns on", default="auto", dims=PLANE),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
-                            "halved", "", "1"))),
+                            "halved", "", "1", dims=PLANE)), dims=BOTH),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
             ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
@@ -676,7 +697,8 @@ _MODEL = (
              "pcdc model rayleigh 0"),
             (_leading("ratio", NOT_NEGATIVE, "part of the critical damping at the frequency; 0: none any more", "1"),),
             (Option("freq{uency}", (POSITIVE,), "where the ratio is this; with both parts it is least there", "Hz"),
-             Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both"))),
+             Option("part", (choice("both", "mass", "stiffness"),), "both, or one of them alone", default="both")),
+                    dims=BOTH),
     Command("mod{el} creep", "Elements of mech-burgers creep from now on, or no more. In dynamic runs creep time "
             "passes with the time of the model. In static runs model solve time makes it pass, in creep steps, each of "
             "which ends in balance; `every` of histories and frames then counts creep steps.",
@@ -739,9 +761,17 @@ _GEOMETRY = (
                 Option("hole", (STRING,), "none inside of this layer", repeated=True),
                 Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0"),
                 Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER)),
-    Command("geom{etry} cr{eate} box", "", later=THREE_D),
-    Command("geom{etry} cr{eate} sph{ere}", "", later=THREE_D),
-    Command("geom{etry} cr{eate} cyl{inder}", "", later=THREE_D),
+    Command("geom{etry} cr{eate} box", "A box along the axes.",
+            ("pcdc geometry create box (0,0,0) (10,5,4) as-layer 'rock'",),
+            (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
+            (_LAYER,), dims=SPACE),
+    Command("geom{etry} cr{eate} sph{ere}", "A sphere.", ("pcdc geometry create sphere (0,0,0) 1 as-layer 'cavity'",),
+            (_leading("centre", VECTOR, "centre", "m"), _leading("radius", POSITIVE, "radius", "m")),
+            (_LAYER,), dims=SPACE),
+    Command("geom{etry} cr{eate} cyl{inder}", "A round cylinder.",
+            ("pcdc geometry create cylinder (0,0,0) (0,0,0.1) 0.025 as-layer 'core'",),
+            (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
+             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
     Command("geom{etry} imp{ort}", "Lines of a DXF file.", ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"))),
@@ -753,7 +783,7 @@ _GEOMETRY = (
              Option("about", (VECTOR,), "centre of both", "m", "(0,0)"), Option("move", (VECTOR,), "last", "m")),
             needs_option=True),
     Command("geom{etry} del{ete}", "Forgets a layer.", ("pcdc geometry delete 'hole'",),
-            (_leading("layer", STRING, "name of the layer"),)),
+            (_leading("layer", STRING, "name of the layer"),), dims=BOTH),
 )  # fmt: skip
 
 _MESH = (
@@ -771,21 +801,24 @@ _MESH = (
                 Option("hole", (STRING,), "what is inside of this layer stays empty", repeated=True),
                 Option("reg{ion}", (STRING,), "what is inside of this layer is a group of its own", repeated=True,
                        more=(Option("group", (STRING,), "its name", default="the name of the layer"),)),
-                Option("emb{ed}", (STRING,), "lines that become edges of the mesh", repeated=True),
-                Option("crack", (STRING,), "lines that become edges with a crack from the beginning", repeated=True),
-                Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri"),
-                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks"),
+                Option("emb{ed}", (STRING,), "lines that become edges of the mesh", repeated=True, dims=PLANE),
+                Option("crack", (STRING,), "lines that become edges with a crack from the beginning", repeated=True,
+                       dims=PLANE),
+                Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
+                Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks", dims=PLANE),
                 Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
-                       "edges share a uniform stress evenly; for triangles"), _GROUP)),
+                       "edges share a uniform stress evenly; for triangles", dims=PLANE), _GROUP), dims=BOTH),
     Command("mesh str{uctured}", "A regular mesh of a rectangle.",
             ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
-            (Option("cells", (COUNT, COUNT), "along x and y", required=True),
-             Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri"),
+            (Option("cells", (COUNT, COUNT, THIRD_COUNT), "along x and y, in three dimensions z", required=True),
+             Option("split", (SPLIT,), "tetrahedra of each box: 5, mirrored from box to box, 6 about "
+                    "a diagonal, or 12 about a point in the middle", default="6", dims=SPACE),
+             Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
              Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
-                    "both of each rectangle", default="alternate"),
-             Option("ratio", (POSITIVE, POSITIVE), "along x and y: each rectangle is so many times as large as the one "
-                    "before", "1", "1 1"), _GROUP)),
+                    "both of each rectangle", default="alternate", dims=PLANE),
+             Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): each rectangle or box is so "
+                    "many times as large as the one before", "1", "1 1"), _GROUP), dims=BOTH),
     Command("mesh equi{lateral}", "Nearly equilateral triangles in a rectangle.",
             ("pcdc mesh equilateral (0,0) (10,5) size 0.25 group 'base'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
@@ -795,7 +828,7 @@ _MESH = (
             (Option("group", (STRING,), "a group that all elements are put into, besides those of the file",
                     more=(SET,)),
              Option("merge", (NOT_NEGATIVE,), "points nearer than this are one", "m", "0"),
-             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1"))),
+             Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH),
     Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
             options=(Option("layer", (STRING,), "its lines are edges of the mesh", required=True),
@@ -817,10 +850,13 @@ _OBJECTS = (
              "pcdc element c-model null range group 'excav_1' set 'domain'",
              "pcdc element c-model mech-m-c property density 2500 young 50e9 poisson-ratio 0.25 friction 30 tensile "
              "1e5 cohesion table 'c_of_strain' over plastic-strain",
+             "pcdc element c-model mech-iso-elastic property density 2600 poisson-ratio 0.25 young table 'E_of_T' over "
+             "temperature",
              "pcdc element c-model therm-iso-h property conductivity 2.7 capacity 900 expansion-coeficient 1e-5",
              "pcdc element c-model user 'clay.py:clay' property density 2000 young 1e9 poisson-ratio 0.3 parameter "
              "'limit' 2e5"),
-            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True),
+            models=(ISO_ELASTIC, NULL, MOHR_COULOMB, USER, BURGERS, ISO_HEAT), ranged="element", manual=True,
+            dims=BOTH),
     Command("el{ement} law", "Reads, checks and compiles a law of a Python file without giving it to elements: for a "
             "script that begins with model restore. A checkpoint does not name files that are executed.",
             ("pcdc element law 'clay.py:clay'",), (_LAW,)),
@@ -828,7 +864,7 @@ _OBJECTS = (
             ("pcdc element property young 10e9 range group 'excav_1' set 'domain'",
              "pcdc element property conductivity 3.5 range group 'salt'",
              "pcdc element property young table 'E_of_depth' over y density field 'density'"),
-            options=_OF_SOLIDS, ranged="element", needs_option=True),
+            options=_OF_SOLIDS, ranged="element", needs_option=True, dims=BOTH),
     Command("el{ement} init{ial}", "Stress that is there from the beginning. Tension is positive. Components that are "
             "not given are zero. It is that of a strain, by the moduli of this moment: where these are lowered later, "
             "it goes down with them.",
@@ -837,7 +873,10 @@ _OBJECTS = (
             options=tuple(
                 Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa",
                        more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
-                for c in ("xx", "yy", "xy", "zz")), ranged="element", needs_option=True),
+                for c in ("xx", "yy", "xy", "zz")) + tuple(
+                Option(f"s{{tress}}-{c}", (FLOAT,), f"stress {c}", "Pa", dims=SPACE,
+                       more=(Option("grad{ient}", (VECTOR,), "is added: its product with the position", "Pa/m"),))
+                for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH),
     Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
             ("pcdc element reset state",), ranged="element", manual=True),
@@ -846,18 +885,18 @@ _OBJECTS = (
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),
-            models=(CONTACT,), ranged="element-face", manual=True),
+            models=(CONTACT,), ranged="element-face", manual=True, dims=BOTH),
     Command("element-f{ace} prop{erty}", "Changes properties of contact models; the others stay.",
             ("pcdc element-face property friction 20 range geometry 'fault'",), options=_properties(CONTACT),
-            ranged="element-face", needs_option=True),
+            ranged="element-face", needs_option=True, dims=BOTH),
     Command("element-f{ace} bou{ndary}", "A boundary condition of surfaces.",
             ("pcdc element-face boundary m-s-b-c stress-normal table 'blast' range geometry 'hole'",
              "pcdc element-face boundary m-s-b-c quiet on incoming-x table 'wave' range boundary y 0 0",
              "pcdc element-face boundary free-field range boundary x 0 0",
              "pcdc element-face boundary therm-c-h transfer-coeficient 25 environment-temperature 10 range boundary"),
-            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face"),
+            models=(STRESS, FREE_FIELD, CONST_HEAT), ranged="element-face", dims=BOTH),
     Command("element-f{ace} bou{ndary} rem{ove}", "Takes boundary conditions of surfaces back.",
-            ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face"),
+            ("pcdc element-face boundary remove range geometry 'hole'",), ranged="element-face", dims=BOTH),
     _group_command("face-joint", "face-j{oint}"),
     Command("face-j{oint} c-m{odel}", "The model of the joints between elements. Joints without one hold for ever.",
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
@@ -881,21 +920,23 @@ _OBJECTS = (
              "pcdc node boundary therm-s-b-c temperature table 'heating' range geometry 'hole'",
              "pcdc node boundary therm-f-b-c temperature 20 range group 'well'"),
             models=(VELOCITY, FORCE, MOVE, FLOW_CONDITION, PROPPANT_CONDITION, TEMPERATURE, FLUID_TEMPERATURE),
-            ranged="node"),
+            ranged="node", dims=BOTH),
     Command("node func{tion}", "Reads, checks and compiles a function of place and time in a Python file, without "
             "giving it to a condition: for a script that begins with model restore.",
             ("pcdc node function 'pump.py:wave'",), (_FUNCTION,)),
     Command("node bou{ndary} rem{ove}", "Takes boundary conditions of nodes back.",
-            ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node"),
+            ("pcdc node boundary remove range group 'platen' set 'bc'",), ranged="node", dims=BOTH),
     Command("node init{ial}", "The velocity or temperature of nodes now.",
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
-            needs_option=True),
-    Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True),
+                            "Elements around the nodes are free of thermal stress then", "K",
+                            dims=PLANE)), ranged="node",
+            needs_option=True, dims=BOTH),
+    Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
+    dims=BOTH),
     Command("node res{et} disp{lacement}", "Displacements are counted from here.", ("pcdc node reset displacement",),
-            manual=True),
+            manual=True, dims=BOTH),
     Command("flow-n{ode} init{ial}", "Fluid that the flow nodes (nodes at which a channel ends) among these nodes hold "
             "now; before, channels are dry.", ("pcdc flow-node initial saturation 1",
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
@@ -981,8 +1022,8 @@ _RECORDS = (
              "pcdc table create 'E_of_depth' values (-500,60e9) (0,20e9)",
              "pcdc table create 'c_of_strain' values (0,2e6) (0.01,2e5)"),
             (_NAME,), (Option("val{ues}", (VECTORS,), "(time or coordinate, value), the first ascending", "s or m",
-                              required=True),)),
-    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,)),
+                              required=True),), dims=BOTH),
+    Command("tab{le} del{ete}", "Forgets a table.", ("pcdc table delete 'blast'",), (_NAME,), dims=BOTH),
     Command("field cr{eate}", "A random field: properties that differ from element to element, face to face, joint to "
             "joint. Where several properties take the same field they are drawn together; another seed is another, "
             "independent field. What was drawn stays, whatever becomes of the field.",
@@ -1012,18 +1053,19 @@ _RECORDS = (
             (Option("id", (ZERO_OR_MORE,), "the object of this number"),
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
-             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user"),
-             Option("well", (STRING,), "with object well: its name"),
+             Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user", dims=PLANE),
+             Option("well", (STRING,), "with object well: its name", dims=PLANE),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
-            ranged="any"),
-    Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,)),
+            ranged="any", dims=BOTH),
+    Command("his{tory} del{ete}", "Stops a history; its file stays.", ("pcdc history delete 'load'",), (_NAME,),
+    dims=BOTH),
     Command("his{tory} exp{ort}", "Writes all histories, or some, side by side as CSV.",
             ("pcdc history export 'curves.csv'",), (_leading("file", FILE, "name of the file"),),
-            (Option("name{s}", (STRINGS,), "only these", default="all"),)),
+            (Option("name{s}", (STRINGS,), "only these", default="all"),), dims=BOTH),
     Command("chart cr{eate}", "A diagram.", ("pcdc chart create 'ucs' x-label 'strain' y-label 'stress [[MPa]]'",),
             (_NAME,), (Option("tit{le}", (STRING,), "over the diagram"), Option("x-l{abel}", (STRING,), "of the axis"),
-                       Option("y-l{abel}", (STRING,), "of the axis"))),
+                       Option("y-l{abel}", (STRING,), "of the axis")), dims=BOTH),
     Command("chart add", "A curve of two histories, or of points.",
             ("pcdc chart add 'ucs' x 'shortening' scale-x -0.01 y 'load' scale-y 2e-8 label 'sample'",
              "pcdc chart add 'ucs' values [curve] label 'exact' style points",
@@ -1036,23 +1078,27 @@ _RECORDS = (
                     (choice("pressure", "saturation", "aperture", "flow-rate", "velocity", "temperature",
                             "concentration"),),
                     "of the fluid as it is now, along the line that the joints of the range make, over the distance "
-                    "[m] from its left end"),
+                    "[m] from its left end", dims=PLANE),
              Option("lab{el}", (STRING,), "in the legend"),
-             Option("style", (choice("line", "points"),), "how it is drawn", default="line")), ranged="face-joint"),
+             Option("style", (choice("line", "points"),), "how it is drawn", default="line")), ranged="face-joint",
+                    dims=BOTH),
     Command("chart exp{ort}", "Writes a diagram as CSV and as a figure of the same name.",
             ("pcdc chart export 'ucs' 'ucs.png'", "pcdc chart export 'ucs' 'ucs.png' cracks",
             "pcdc chart export 'slope' 'slope.png' plastic", "pcdc chart export 'crack' 'crack.png' fluid aperture"),
             (_NAME, _leading("file", FILE, "name of the figure: .png, .pdf or .svg")),
-            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke"),
-             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain"),
-             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks"),
+            (Option("crack{s}", (), "beside it the model as it is now, with its cracks by the way they broke",
+                    dims=PLANE),
+             Option("plas{tic}", (), "beside it the model as it is now, with contours of plastic shear strain",
+                    dims=PLANE),
+             Option("temp{erature}", (), "beside it the model as it is now, with contours of temperature, and cracks",
+                    dims=PLANE),
              Option("fl{uid}", (choice("pressure", "saturation", "aperture", "velocity", "concentration"),),
-                    "beside it the model as it is now, its channels coloured by that"))),
+                    "beside it the model as it is now, its channels coloured by that", dims=PLANE)), dims=BOTH),
     Command("output vtk", "Frames for ParaView: now, and every so many steps.",
             ("pcdc output vtk 'blast' every 1000", "pcdc output vtk 'last'"),
             (_leading("file", FILE, "first part of the names of the files, in the folder of the results"),),
             (Option("ev{ery}", (COUNT,), "steps between two frames", "", "once, now"),
-             Option("off", (), "no more frames of this name"))),
+             Option("off", (), "no more frames of this name")), dims=BOTH),
     Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
             ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
              "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",

@@ -65,7 +65,7 @@ def check(command: Command, arguments: Mapping[str, Any], terms: Sequence[tuple[
     same."""
     try:
         for name, value in terms or ():
-            if name in ("id", "x", "y") and known(value):
+            if name in ("id", "x", "y", "z") and known(value):
                 _ascending(name, value)
         if isinstance(arguments.get("law", arguments.get("function")), Pending):
             raise CommandError("the file of a law or function is plain text: it is read before the script runs")
@@ -118,10 +118,10 @@ def _model(name: str, arguments: Mapping[str, Any]) -> None:
         _changes(MODELS[name], given)
     elif name == "mechanical-move-boundary-constraint" and "type" in given:
         kind, *way = given["type"]
-        if kind == 2 and not (way and any(way[0])):
+        if kind in (2, 3) and not (way and any(way[0])):
             raise CommandError("type 2 needs the vector along which the nodes may move, for example type 2 (1,0)")
     elif name in ("mechanical-velocity-boundary-condition", BOLT_VELOCITY.keyword.name):
-        for axis in "xy":
+        for axis in "xyz":
             if f"velocity-{axis}" in arguments and f"acceleration-{axis}" in arguments:
                 raise CommandError(f"velocity-{axis} and acceleration-{axis} exclude each other")
     elif name in (FLOW_CONDITION.keyword.name, PROPPANT_CONDITION.keyword.name) and len(arguments) > 1:
@@ -169,7 +169,8 @@ def _make_shape(command: str) -> Callable[[Mapping[str, Any]], None]:
 
 
 def _rectangle(arguments: Mapping[str, Any]) -> None:
-    values.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", (1.0, 1.0)))
+    even = (1.0,) * len(arguments["first"])
+    values.grid_lines(arguments["first"], arguments["second"], arguments["cells"], arguments.get("ratio", even))
 
 
 def _equilateral(arguments: Mapping[str, Any]) -> None:
@@ -216,7 +217,7 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     **{f"geometry create {name}": _make_shape(name) for name in
-       ("polyline", "polygon", "rectangle", "circle", "arc", "point")},
+       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder")},
     "geometry create fractures": _fractures,
     "bolt create polyline": _bolt,
     "mesh structured": _rectangle,

@@ -211,7 +211,11 @@ function listen(one) {
   canvas.addEventListener("dblclick", () => { if (!$("answer").hidden && $("mode").value === "query") copy(); });
 }
 
-const short = (value) => Number(value.toPrecision(6)).toString();
+function short(value, digits = 6) {
+  const size = Math.abs(value);
+  if (size >= 1e5 || (size && size < 1e-3)) return value.toExponential(digits - 1).replace(/\.?0*e\+?/, "e");
+  return Number(value.toPrecision(digits)).toString();
+}
 
 // ---- legend ----------------------------------------------------------------------------------------------------------
 
@@ -236,7 +240,7 @@ function legend(root, parts) {
     ends.className = "ends";
     for (const value of [part.low, part.high]) {
       const end = document.createElement("span");
-      end.textContent = Number(value.toPrecision(4)).toString();
+      end.textContent = short(value, 4);
       ends.append(end);
     }
     box.append(part.log ? `${part.title}, log` : part.title, bar, ends);
@@ -467,7 +471,7 @@ function controls() {
 
 function moment() {
   const { header } = current.shown;
-  $("moment").textContent = say("moment", { step: header.step, time: Number(header.time.toPrecision(6)) });
+  $("moment").textContent = say("moment", { step: header.step, time: short(header.time) });
   chart();
 }
 
@@ -582,10 +586,10 @@ function chart() {
   const [t0, t1] = [points[0][0], points.at(-1)[0]];
   const low = Math.min(...points.map((p) => p[1])), high = Math.max(...points.map((p) => p[1]));
   const x = (t) => 8 + 264 * (t - t0) / (t1 - t0 || 1), y = (v) => 132 - 112 * (v - low) / (high - low || 1);
-  pen.fillText(Number(high.toPrecision(4)), 4, 23);
-  pen.fillText(Number(low.toPrecision(4)), 4, 144);
+  pen.fillText(short(high, 4), 4, 23);
+  pen.fillText(short(low, 4), 4, 144);
   pen.textAlign = "right";
-  pen.fillText(`${Number(t1.toPrecision(4))} s`, 276, 144);
+  pen.fillText(`${short(t1, 4)} s`, 276, 144);
   pen.textAlign = "left";
   pen.strokeStyle = style.getPropertyValue("--accent");
   pen.lineWidth = 1.3;

@@ -27,7 +27,8 @@ class Budget:
     """The account of one model. accounts: work of each kind up to the last interruption [J/m]; commands: changes by
     commands of what is stored; start, left: what was stored at the beginning and at the interruption; discs: the part
     of the work from outside that discs did, this rank's share, as an integer of exact_sum.as_integer; heat: changes of
-    what is stored by thermal stress; by_heat: that is what interrupts the account now.
+    what is stored by temperatures, of_joints: those of them in joints; by_heat: that is what interrupts the account
+    now.
 
     running: steps are being booked; otherwise the account stands at a whole step.
     """
@@ -38,7 +39,7 @@ class Budget:
         self.start: dict[str, float] | None = None
         self.left = dict.fromkeys(STORED, 0.0)
         self.running = False
-        self.heat = 0.0
+        self.heat = self.of_joints = 0.0
         self.by_heat = False
         self.discs = 0
         self._before = np.empty((0, 0))
@@ -72,6 +73,7 @@ class Budget:
                 change = stored[name] - self.left[name]
                 if self.by_heat:
                     self.heat += change
+                    self.of_joints += change if name == "joints" else 0.0
                 else:
                     self.commands[name] += change
         for name in WORK:
@@ -106,7 +108,8 @@ class Budget:
         change = sum(stored.values()) - sum(start.values())
         by_commands = sum(self.commands.values())
         of_discs, of_loads = self._of_discs(sim), sim.surface_loads.work_done()
-        joints_lost = -work["joints"] - (stored["joints"] - start["joints"] - self.commands["joints"])
+        in_joints = stored["joints"] - start["joints"] - self.commands["joints"] - self.of_joints
+        joints_lost = -work["joints"] - in_joints
         found = {
             "kinetic": stored["kinetic"],
             "strain": stored["strain"],
@@ -189,7 +192,7 @@ class Budget:
         """As JSON values; the columns of the elements are saved with them. Collective."""
         return {
             "accounts": self.accounts, "commands": self.commands, "start": self.start, "left": self.left,
-            "running": self.running, "heat": self.heat, "by_heat": self.by_heat,
+            "running": self.running, "heat": self.heat, "of_joints": self.of_joints, "by_heat": self.by_heat,
             "discs": hex(sum(sim.comm.allgather(self.discs))),
         }  # fmt: skip
 
@@ -200,5 +203,6 @@ class Budget:
         made.discs = int(state.get("discs", "0x0"), 16) if first else 0
         made.accounts, made.commands = {**made.accounts, **state["accounts"]}, dict(state["commands"])
         made.heat, made.by_heat = state.get("heat", 0.0), state.get("by_heat", False)
+        made.of_joints = state.get("of_joints", 0.0)
         made.start, made.left, made.running = state["start"], state["left"], state["running"]
         return made

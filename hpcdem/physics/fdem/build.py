@@ -222,8 +222,11 @@ def special_nodes(number, n_left, n_own, corner_special, node, begin, local, cor
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_nodes(corner_of, start, one, member, where, cells, width, mass, begin, corner, place, again, out_mass):
-    """Where the corners of special nodes lie: in the forces (n, 8), in v (n, width), a second time in v, or -1.
+def place_nodes(
+    corner_of, start, one, member, where, cells, width, force_width, stride, mass, begin, corner, place, again, out_mass
+):
+    """Where the corners of special nodes lie: in the forces (n, force_width), in v (n, width), a second time in v, or
+    -1; stride: words from one corner of a row to the next.
 
     Returns a corner whose element is not held by this rank, or -1.
     """
@@ -241,7 +244,7 @@ def place_nodes(corner_of, start, one, member, where, cells, width, mass, begin,
                 again[at] = -1
                 continue
             n = 4 if cells[c // 4, 3] >= 0 else 3
-            corner[at], place[at], again[at] = 8 * r + 2 * k, width * r + 2 * k, -1
+            corner[at], place[at], again[at] = force_width * r + stride * k, width * r + stride * k, -1
             if width == 12 and k < 2:
                 again[at] = width * r + 2 * (n + k)
             total += mass[r, k]

@@ -43,6 +43,8 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     span = float(finite("relax", [relax])[0])
     if span < 0.0:
         raise CommandError(f"relax must not be negative, got {relax:g}")
+    if span > 0.0:
+        sim.refuse_in_space("relax of elements that are taken out")
     if len(at) == int(sim.alive.sum()):
         raise CommandError("all elements that are left would be taken out")
     dying = np.zeros(len(sim.alive), bool)
@@ -58,7 +60,7 @@ def null(sim: Blocks, elements: Numbers, relax: float = 0.0) -> None:
     stay = np.flatnonzero(~dying[sim.number])
     sim.number, sim.x, sim.v = sim.number[stay], sim.x[stay], sim.v[stay]
     sim.cold = {name: values[stay] for name, values in sim.cold.items()}
-    sim.histories = sim.histories.take(stay).without_partners(dying)
+    sim.histories = sim.histories.take(stay).without_partners(dying, sim.dim)
     if left is not None:
         begin = sim.clock.time if sim.options.dynamic else float(sim.clock.step)
         sim.relaxations.append(Relaxation(*left, begin, span, not sim.options.dynamic))
@@ -81,6 +83,7 @@ def element_model(sim: Blocks, elements: Numbers, name: str, given: Mapping[str,
         sim.complete(ELEMENT, asked, model(name, ELEMENT), {}, given)  # refused before anything is done
         back = asked[~sim.alive[asked]]
         if len(back):
+            sim.refuse_in_space("elements that come back after they were taken out")
             _bring_back(sim, back)
     sim.set_element_model(elements, name, given)
 
@@ -260,20 +263,24 @@ def _forces_left_behind(sim: Blocks, dying: np.ndarray) -> tuple[np.ndarray, np.
     return corners, sums
 
 
-def set_velocity(sim: Blocks, nodes: Numbers, vx: float | None = None, vy: float | None = None) -> None:
+def set_velocity(
+    sim: Blocks, nodes: Numbers, vx: float | None = None, vy: float | None = None, vz: float | None = None
+) -> None:
     """Velocities [m/s] as they are now; not a condition."""
-    values = [(c, float(finite("velocity", [v])[0])) for c, v in enumerate((vx, vy)) if v is not None]
+    if vz is not None and sim.dim == 2:
+        raise CommandError("in two dimensions there is no velocity in z")
+    values = [(c, float(finite("velocity", [v])[0])) for c, v in enumerate((vx, vy, vz)) if v is not None]
     chosen = _chosen_corners(sim, nodes)
     for c, value in values:
         for k in range(chosen.shape[1]):
-            sim.v[chosen[:, k], 2 * k + c] = value
+            sim.v[chosen[:, k], sim.stride * k + c] = value
     repeat(sim, sim.v)
     sim.changed(stiffness=False)
 
 
 def reset_velocity(sim: Blocks, nodes: Numbers = None) -> None:
     """Velocities become zero."""
-    set_velocity(sim, nodes, 0.0, 0.0)
+    set_velocity(sim, nodes, *[0.0] * sim.dim)
     if nodes is None:
         for load in sim.surface_loads:
             load.stop()
@@ -285,8 +292,8 @@ def reset_displacement(sim: Blocks, nodes: Numbers = None) -> None:
     if "home" not in sim.cold:
         sim.cold["home"] = diagnostics.homes(sim)
     for k in range(chosen.shape[1]):
-        at = chosen[:, k]
-        sim.cold["home"][at, 2 * k : 2 * k + 2] = sim.x[at, 2 * k : 2 * k + 2]
+        at, columns = chosen[:, k], slice(sim.stride * k, sim.stride * k + sim.dim)
+        sim.cold["home"][at, columns] = sim.x[at, columns]
     sim.changed(stiffness=False)
 
 
@@ -353,7 +360,7 @@ def _chosen_corners(sim: Blocks, nodes: Numbers) -> np.ndarray:
     mesh = sim.the_mesh()
     flags = np.zeros(len(mesh.points) + 1, bool)  # the last one is for the fourth corner of triangles
     flags[sim.numbers_of_nodes(nodes)] = True
-    return flags[mesh.cells[sim.number, : 4 if sim.wide else 3]]
+    return flags[mesh.cells[sim.number, : 4 if sim.wide or sim.dim == 3 else 3]]
 
 
 def repeat(sim: Blocks, rows: np.ndarray) -> None:

@@ -139,7 +139,8 @@ def find_edges(edges: Edges, pairs: np.ndarray, n_points: int) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _root(parent, i):
+def root_of(parent, i):
+    """The lowest member of the cluster of i."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -147,9 +148,10 @@ def _root(parent, i):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _join(parent, a, b):
+def join_corners(parent, a, b):
+    """Make one cluster of those of a and b."""
     # The lower number becomes the root, so a cluster is known by its lowest member.
-    a, b = _root(parent, a), _root(parent, b)
+    a, b = root_of(parent, a), root_of(parent, b)
     if a < b:
         parent[b] = a
     else:
@@ -167,10 +169,10 @@ def _corner_roots(cells, partner, jointed, parent):
         e, k, d, m = f // 4, f % 4, g // 4, g % 4
         e_next = e * 4 + (k + 1) % (4 if cells[e, 3] >= 0 else 3)
         d_next = d * 4 + (m + 1) % (4 if cells[d, 3] >= 0 else 3)
-        _join(parent, f, d_next)  # a face and its first corner have the same number
-        _join(parent, e_next, g)
+        join_corners(parent, f, d_next)  # a face and its first corner have the same number
+        join_corners(parent, e_next, g)
     for c in range(len(parent)):
-        parent[c] = _root(parent, c)
+        parent[c] = root_of(parent, c)
 
 
 def corner_clusters(cells: np.ndarray, partner: np.ndarray, jointed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -197,9 +199,9 @@ def _element_roots(partner, parent):
         parent[e] = e
     for f in range(len(partner)):
         if partner[f] > f:
-            _join(parent, f // 4, partner[f] // 4)
+            join_corners(parent, f // 4, partner[f] // 4)
     for e in range(len(parent)):
-        parent[e] = _root(parent, e)
+        parent[e] = root_of(parent, e)
 
 
 def bodies(partner: np.ndarray) -> np.ndarray:
@@ -270,7 +272,7 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
-def nearest_point(points: np.ndarray, at: tuple[float, float], among: np.ndarray | None = None) -> int:
+def nearest_point(points: np.ndarray, at: tuple[float, ...], among: np.ndarray | None = None) -> int:
     """Number of the point nearest to `at`, the lowest of equals; `among` restricts it to these numbers."""
     among = np.arange(len(points)) if among is None else np.sort(among)
     way = points[among] - np.asarray(at, np.float64)

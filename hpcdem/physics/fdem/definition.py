@@ -15,22 +15,26 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
-from hpcdem.physics.fdem import connectivity, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
+from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import (
+    COHESIVE,
     ELEMENT,
     FACE,
     JOINT,
     MECH_BURGERS,
+    MECH_ISO_ELASTIC,
     MECH_MOHR_COULOMB,
-    SOFTENS,
     Model,
     Rows,
+    softening_rows,
     softening_table,
+    temperature_table,
 )
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Drawn, Over, Table, Value
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Drawn, Over, Table, Value
 from hpcdem.physics.fdem.user_functions import FUNCTIONS
 
 Numbers = np.ndarray | Sequence[int] | None
@@ -43,14 +47,17 @@ SAFETY = 0.8
 """Part of the stability limit that is used as time step."""
 OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 """What becomes of bodies that overlap before the first step."""
+POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
+"""What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
+four times the smallest of its barycentric coordinates (Munjiza 2004)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
 
 
 @dataclass(frozen=True)
 class NodeCondition:
-    """What is prescribed at nodes. does_x, does_y: moving.FREE, VELOCITY, ACCELERATION; at_x, at_y: its value; force;
-    constraint (moving.UNBOUND, ...) and its unit vector."""
+    """What is prescribed at nodes. does_x, _y, _z: moving.FREE, VELOCITY, ACCELERATION; at_x, _y, _z: its value; force;
+    constraint (moving.UNBOUND, ..., in space space.ACROSS too) and its unit vector."""
 
     does_x: int = moving.FREE
     at_x: Number = 0.0
@@ -59,7 +66,10 @@ class NodeCondition:
     force_x: Number = 0.0
     force_y: Number = 0.0
     constraint: int = moving.UNBOUND
-    way: tuple[float, float] = (0.0, 0.0)
+    way: tuple[float, ...] = (0.0, 0.0)
+    does_z: int = moving.FREE
+    at_z: Number = 0.0
+    force_z: Number = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,19 +84,32 @@ class Traction:
     quiet: bool = False
     incoming_x: Number = 0.0
     incoming_y: Number = 0.0
+    zz: Number = 0.0
+    xz: Number = 0.0
+    yz: Number = 0.0
+
+
+COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
+"""Of stress, in the order of all tables, by dimensions of space."""
+TRACTIONS = {
+    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"), 3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz"),
+}  # fmt: skip
+"""Columns of the table of tractions."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most one
-    of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`. mechanical, hydraulic: blocks move, fluid flows;
-    one_way: fluid does not push; proppant: grains move in it; flow_every: steps of the blocks between two cycles of
-    flow, of flow_steps sub-steps (0: as many as are needed) of flow_dt [s] (0: the time of those steps, or a stable
-    one); thermal: heat flows, in cycles as often as those of flow, of heat_steps sub-steps of heat_dt [s] likewise.
-    mass_damping [1/s], stiffness_damping [s]: Rayleigh damping, of dynamic runs."""
+    """Switches and numbers of the whole model, see `Blocks`. dt: the user's time step [s], 0 if estimated. At most
+    one of dt, auto and mass_scaling is set. overlap: one of `OVERLAP`; potential: of `POTENTIAL`, in space.
+    mechanical, hydraulic: blocks move, fluid flows; one_way: fluid does not push; proppant: grains move in it;
+    flow_every: steps of the blocks between two cycles of flow, of flow_steps sub-steps (0: as many as are needed)
+    of flow_dt [s] (0: the time of those steps, or a stable one); thermal: heat flows, in cycles as often as those
+    of flow, of heat_steps sub-steps of heat_dt [s] likewise. mass_damping [1/s], stiffness_damping [s]: Rayleigh
+    damping, of dynamic runs."""
 
     gx: float = 0.0
     gy: float = 0.0
+    gz: float = 0.0
     dynamic: bool = True
     collision: bool = True
     large_strain: bool = True
@@ -95,6 +118,7 @@ class Options:
     safety: float = SAFETY
     mass_scaling: float = 0.0
     overlap: str = REFUSE
+    potential: str = DISTANCE
     mechanical: bool = True
     hydraulic: bool = True
     one_way: bool = False
@@ -143,8 +167,8 @@ class ModelDefinition:
         self.fields: dict[str, RandomField] = {}
         self.varied: list[list[str]] = []
         """Kinds of objects and properties of theirs that differ from object to object by a table or a field."""
-        self.softening: list[Table] = []
-        """Tables over plastic strain, as they were when elements got them: rows hold their numbers, from 1 on."""
+        self.followed: list[Table] = []
+        """Tables over plastic strain or temperature, as they were given: rows hold their numbers, from 1 on."""
         self.element_rows, self.face_rows, self.joint_rows = Rows(), Rows(), Rows()
         self.conditions: list[NodeCondition] = [NodeCondition()]
         self.loads: list[Traction] = [Traction()]
@@ -172,7 +196,7 @@ class ModelDefinition:
         self.point_row = np.zeros(points, np.int32)
         self.load_row = np.zeros(4 * elements, np.int32)
         self.stress0: np.ndarray | None = None
-        """(elements, 4) xx, yy, xy, zz [Pa] at zero strain, as it was said, if there is any."""
+        """(elements, 4), in space (elements, 6): `COMPONENTS` [Pa] at zero strain, as it was said, if there is any."""
         self.stress0_row = np.zeros(elements, np.int32)
         """Row of the element models for whose moduli it was said; 0: the element had no model yet."""
 
@@ -186,6 +210,16 @@ class ModelDefinition:
         step too."""
 
     # ---- numbers -------------------------------------------------------------------------------------------------
+
+    @property
+    def dim(self) -> int:
+        """Dimensions of space; without a mesh 2."""
+        return 2 if self.mesh is None else self.mesh.dim
+
+    def refuse_in_space(self, what: str) -> None:
+        """CommandError for what is there in the plane only."""
+        if self.dim == 3:
+            raise CommandError(f"{what}: this version has it in two dimensions only")
 
     def _mesh(self) -> Mesh:
         if self.mesh is None:
@@ -260,7 +294,7 @@ class ModelDefinition:
         self.options, self.tables, self.fields = kept
         self.mesh = mesh
         self._make_arrays(len(mesh.cells), len(mesh.points))
-        self.partner = connectivity.face_partners(mesh.cells, len(mesh.points))
+        self.partner = mesh.face_partners()
         if len(mesh.cracks):
             rows = meshes.crack_rows(mesh, mesh.edges())
             self.open_faces(mesh.edges().faces[rows, 0])
@@ -304,6 +338,8 @@ class ModelDefinition:
 
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
+        if name != MECH_ISO_ELASTIC.name:
+            self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
@@ -321,10 +357,16 @@ class ModelDefinition:
         return self.alive & np.array([name == model.name for name in names])[self.element_row]
 
     def softens(self) -> bool:
-        """Whether an element that is there has a property that follows a table over plastic strain."""
-        rows = self.element_rows
-        tables = np.any([rows.column(softening_table(name)) > 0.0 for name in SOFTENS], axis=0)
-        return bool(tables[self.element_row[self.alive]].any())
+        """Whether an element that is there can yield, and has a strength that follows a table."""
+        return bool(softening_rows(self.element_rows)[self.element_row[self.alive]].any())
+
+    def warms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Elements (ne,) and joints (4 ne,) bool with a property that follows a table over temperature."""
+        elements, joints = (
+            np.any([rows.column(temperature_table(p.name)) > 0.0 for p in of.properties if p.warms], axis=0)
+            for rows, of in ((self.element_rows, MECH_MOHR_COULOMB), (self.joint_rows, COHESIVE))
+        )
+        return self.alive & elements[self.element_row], self.joint_exists() & joints[self.joint_row]
 
     def _note_moduli(self, at: np.ndarray) -> None:
         """Initial stresses of elements that had no model belong to the moduli of the one that they have now."""
@@ -352,6 +394,7 @@ class ModelDefinition:
         """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
 
         Joints that are broken stay broken. None: all inner edges."""
+        self.refuse_in_space("joints between elements")
         at = self.numbers_of_joints(joints)
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 
@@ -424,7 +467,7 @@ class ModelDefinition:
     ) -> np.ndarray:  # fmt: skip
         """Complete, checked properties of objects `of` (n,): (n, properties), or (1, properties) if none of them
         differs from object to object. CommandError names the first object whose value cannot be."""
-        given = self._with_softening(model, given)
+        given = self._with_tables(model, given)
         each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
@@ -444,28 +487,48 @@ class ModelDefinition:
                 raise CommandError(f"{on} {number}: {error}") from None
         raise AssertionError("both ways to complete properties agree")
 
-    def _with_softening(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
-        """Properties of which those with a table over plastic strain have their value before any flow, and those that
-        can have one the number of their table."""
+    def _with_tables(self, model: Model, given: Mapping[str, Value]) -> dict[str, Value]:
+        """Properties of which those with a table over plastic strain have their value before any flow, those with one
+        over temperature the largest, and those that can have one the number of their table."""
         out = dict(given)
+        of_moduli = "young" in given or "shear" in given or "bulk" in given
+        if of_moduli and model.has(temperature_table("young")):
+            out[temperature_table("young")] = 0.0
         for name, value in given.items():
+            for table in (softening_table(name), temperature_table(name)):
+                if model.has(table):
+                    out[table] = 0.0
             if isinstance(value, Over) and value.axis == PLASTIC_STRAIN:
                 if not model.property(name).softens:
                     raise CommandError(f"{name} of {model.name} cannot follow a table over plastic strain")
-                self._value(name, value.table)
-                table = self.tables[value.table]
-                if table.times[0] < 0.0:
+                number = self._kept(model, name, value.table)
+                if self.followed[number - 1].times[0] < 0.0:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
-                for one in table.values.tolist():
-                    model.property(name).check(one)
-                known = [one.pairs() for one in self.softening]
-                if table.pairs() not in known:
-                    known.append(table.pairs())
-                    self.softening.append(table)
-                out[name], out[softening_table(name)] = table(0.0), 1.0 + known.index(table.pairs())
-            elif model.has(softening_table(name)):
-                out[softening_table(name)] = 0.0
+                out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
+            elif isinstance(value, Over) and value.axis == TEMPERATURE:
+                if not model.has(temperature_table(name)):
+                    raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
+                number = self._kept(model, name, value.table)
+                values = self.followed[number - 1].values
+                if name in ("gf1", "gf2") and values.min() == 0.0:
+                    raise CommandError(
+                        f"{name}: table '{value.table}' has a fracture energy of 0; it must be > 0 (N/m)"
+                    )
+                out[name], out[temperature_table(name)] = float(values.max()), float(number)
         return out
+
+    def _kept(self, model: Model, name: str, table: str) -> int:
+        """The number, from 1 on, of a table as it is now among those that rows follow; CommandError if a value of it is
+        none that this property can have."""
+        self._value(name, table)
+        found = self.tables[table]
+        for one in found.values.tolist():
+            model.property(name).check(one)
+        known = [one.pairs() for one in self.followed]
+        if found.pairs() not in known:
+            known.append(found.pairs())
+            self.followed.append(found)
+        return 1 + known.index(found.pairs())
 
     def _checked_softening(self, model: Model, values: np.ndarray) -> np.ndarray:
         """The complete sets of properties (n, k); CommandError if flow makes dilation larger than friction."""
@@ -473,7 +536,7 @@ class ModelDefinition:
             place = {p.name: k for k, p in enumerate(model.properties)}
             pair = [place[name] for one in ("dilation", "friction") for name in (one, softening_table(one))]
             for row in np.unique(values[:, pair], axis=0):
-                tables = [self.softening[int(number) - 1] if number else None for number in row[[1, 3]]]
+                tables = [self.followed[int(number) - 1] if number else None for number in row[[1, 3]]]
                 if any(tables):
                     at = np.unique(np.concatenate([one.times for one in tables if one]))
                     dilation, friction = (one.at(at) if one else value for one, value in zip(tables, row[[0, 2]]))
@@ -489,6 +552,7 @@ class ModelDefinition:
                 self._value(name, value.table)
             return self.tables[value.table].at(self._places(on, of)[:, value.axis])
         if isinstance(value, Drawn):
+            self.refuse_in_space("random fields")
             if value.field not in self.fields:
                 known = ", ".join(f"'{n}'" for n in self.fields) or "none"
                 raise CommandError(f"{name}: there is no field '{value.field}' (fields: {known})")
@@ -499,11 +563,9 @@ class ModelDefinition:
         return numbers
 
     def _places(self, on: str, of: np.ndarray) -> np.ndarray:
-        """(n, 2) [m] in the mesh: centres of elements, middles of faces and joints."""
+        """(n, 2), in space (n, 3) [m] in the mesh: centres of elements, middles of faces and joints."""
         mesh = self._mesh()
-        if on == ELEMENT:
-            return connectivity.centroids(mesh.points, mesh.cells[of])
-        return mesh.points[connectivity.face_points(mesh.cells, of)].mean(axis=1)
+        return mesh.centroids(of) if on == ELEMENT else mesh.points[mesh.face_points(of)].mean(axis=1)
 
     def initial_stress(
         self,
@@ -512,29 +574,33 @@ class ModelDefinition:
         yy: float = 0.0,
         xy: float = 0.0,
         zz: float = 0.0,
-        gradient: Mapping[str, tuple[float, float]] | None = None,
+        gradient: Mapping[str, tuple[float, ...]] | None = None,
+        xz: float = 0.0,
+        yz: float = 0.0,
     ) -> None:
-        """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y) at the centroid
-        as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes with them, see
-        `initial_stresses`."""
+        """Stress [Pa] at zero strain, tension positive; gradient: component -> (per m in x, per m in y, in space in z)
+        at the centroid as it lies in the mesh. It is the stress of a strain by the moduli of this moment, and changes
+        with them, see `initial_stresses`."""
         at = self.numbers_of_elements(elements)
         mesh = self._mesh()
-        names = ("xx", "yy", "xy", "zz")
-        values = np.tile(finite("initial stress", [xx, yy, xy, zz]), (len(at), 1))
+        names = COMPONENTS[mesh.dim]
+        if mesh.dim == 2 and (xz != 0.0 or yz != 0.0):
+            raise CommandError("in two dimensions there is no stress xz and yz")
+        given = {"xx": xx, "yy": yy, "xy": xy, "zz": zz, "xz": xz, "yz": yz}
+        values = np.tile(finite("initial stress", [given[name] for name in names]), (len(at), 1))
         for name, slope in (gradient or {}).items():
             if name not in names:
                 raise CommandError(f"a stress gradient is one of {', '.join(names)}, got {name}")
-            centre = connectivity.centroids(mesh.points, mesh.cells[at])
-            values[:, names.index(name)] += centre @ finite(f"gradient of {name}", list(slope))
+            values[:, names.index(name)] += mesh.centroids(at) @ self._vector(f"gradient of {name}", slope)
         self.before_change()
         if self.stress0 is None:
-            self.stress0 = np.zeros((len(mesh.cells), 4))
+            self.stress0 = np.zeros((len(mesh.cells), len(names)))
         self.stress0[at] = values
         self.stress0_row[at] = self.element_row[at]
         self.changed()
 
     def initial_stresses(self, elements: np.ndarray) -> np.ndarray:
-        """Stress [Pa] (n, 4) xx, yy, xy, zz of elements (n,) at zero strain, by their present moduli.
+        """Stress [Pa] (n, 4), in space (n, 6), of elements (n,) at zero strain, by their present moduli.
 
         What was said fixes a strain: mean stress over 3 K and deviator over 2 G with the moduli of that moment. So the
         mean follows the bulk modulus and the deviator the shear modulus."""
@@ -549,7 +615,7 @@ class ModelDefinition:
         other = (ratio != 1.0).any(axis=1)  # the rest keeps every bit
         normal = [0, 1, 3]
         mean = out[other][:, normal].mean(axis=1, keepdims=True)
-        scaled = ratio[other, 1:] * (out[other] - np.where(np.arange(4) == 2, 0.0, mean))
+        scaled = ratio[other, 1:] * (out[other] - np.where(np.isin(np.arange(out.shape[1]), normal), mean, 0.0))
         scaled[:, normal] += ratio[other, :1] * mean
         out[other] = scaled
         return out
@@ -607,12 +673,15 @@ class ModelDefinition:
         vy: Number | None = None,
         ax: Number | None = None,
         ay: Number | None = None,
+        vz: Number | None = None,
+        az: Number | None = None,
     ) -> None:
         """Prescribe velocity [m/s] or acceleration [m/s2] of components; the others stay as they are (free or not).
 
         Precedence at one node: move constraint, velocity, acceleration, force."""
         changes: dict[str, Any] = {}
-        for axis, speed, push in (("x", vx, ax), ("y", vy, ay)):
+        self._only_in_space("velocity or acceleration in z", vz, az)
+        for axis, speed, push in (("x", vx, ax), ("y", vy, ay), ("z", vz, az)):
             if speed is not None and push is not None:
                 raise CommandError(f"velocity and acceleration in {axis} cannot both be prescribed")
             if speed is not None:
@@ -624,28 +693,44 @@ class ModelDefinition:
             raise CommandError("a velocity condition needs a velocity or an acceleration")
         self._condition(nodes, changes)
 
-    def force_condition(self, nodes: Numbers, fx: Number | None = None, fy: Number | None = None) -> None:
-        """Nodal force [N per m of thickness] of a point, shared by the elements' corners there."""
-        given = {"force_x": fx, "force_y": fy}
+    def force_condition(
+        self, nodes: Numbers, fx: Number | None = None, fy: Number | None = None, fz: Number | None = None
+    ) -> None:
+        """Nodal force [N per m of thickness, in space N] of a point, shared by the elements' corners there."""
+        self._only_in_space("a force in z", fz)
+        given = {"force_x": fx, "force_y": fy, "force_z": fz}
         changes = {name: self._value(name, value) for name, value in given.items() if value is not None}
         if not changes:
             raise CommandError("a force condition needs a force")
         self._condition(nodes, changes)
 
-    def move_constraint(self, nodes: Numbers, kind: int, direction: tuple[float, float] = (0.0, 0.0)) -> None:
-        """0: free, 1: fixed, 2: moves along `direction` only."""
-        if kind not in (moving.UNBOUND, moving.FIXED, moving.ALONG):
-            raise CommandError(f"a move constraint is 0 (free), 1 (fixed) or 2 (along a vector), got {kind}")
-        way = (0.0, 0.0)
-        if kind == moving.ALONG:
-            x, y = finite("direction", list(direction)).tolist()
-            if x == 0.0 == y:
+    def move_constraint(self, nodes: Numbers, kind: int, direction: tuple[float, ...] = (0.0, 0.0)) -> None:
+        """0: free, 1: fixed, 2: moves along `direction` only, 3 (in space): only across it."""
+        if kind == space.ACROSS and self.dim == 2:
+            raise CommandError("a move constraint of type 3 (across a vector) is for three dimensions")
+        if kind not in (moving.UNBOUND, moving.FIXED, moving.ALONG, space.ACROSS):
+            raise CommandError(f"a move constraint is 0 (free), 1 (fixed), 2 or 3 (along, across a vector), got {kind}")
+        way: tuple[float, ...] = (0.0, 0.0)
+        if kind in (moving.ALONG, space.ACROSS):
+            vector = self._vector("direction", direction).tolist()
+            if not any(vector):
                 raise CommandError("a move constraint along a vector needs a vector that is not zero")
-            way = (x / math.hypot(x, y), y / math.hypot(x, y))
+            way = tuple(c / math.hypot(*vector) for c in vector)
         self._condition(nodes, {"constraint": kind, "way": way})
+
+    def _vector(self, what: str, given: Sequence[float]) -> np.ndarray:
+        """One number for each dimension of space. CommandError if there are others."""
+        if len(given) != self.dim:
+            raise CommandError(f"{what}: a vector of {self.dim} numbers is needed, got {len(given)}")
+        return finite(what, list(given))
+
+    def _only_in_space(self, what: str, *values: Any) -> None:
+        if self.dim == 2 and any(value is not None for value in values):
+            raise CommandError(f"in two dimensions there is no {what}")
 
     def _condition(self, nodes: Any, changes: dict[str, Any]) -> None:
         at = self.numbers_of_nodes(nodes)
+        self._refuse_functions(changes)
         for name, value in changes.items():
             user_functions.check(name, value, self._mesh().points[at], self.time_now())
         self.before_change()
@@ -662,6 +747,9 @@ class ModelDefinition:
         quiet: bool | None = None,
         incoming_x: Number | None = None,
         incoming_y: Number | None = None,
+        zz: Number | None = None,
+        xz: Number | None = None,
+        yz: Number | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
         pressure).
@@ -671,7 +759,10 @@ class ModelDefinition:
         its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give.
         incoming_x, incoming_y [m/s]: velocity of a plane wave along n that comes in through quiet faces: their dashpots
         see the velocity less twice this."""
-        given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal}
+        self._only_in_space("stress zz, xz and yz on faces", zz, xz, yz)
+        if self.dim == 3 and (quiet or incoming_x is not None or incoming_y is not None):
+            self.refuse_in_space("quiet faces")
+        given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
         waves = {"incoming_x": incoming_x, "incoming_y": incoming_y}
         changes |= {name: self._value(name, value) for name, value in waves.items() if value is not None}
@@ -680,6 +771,7 @@ class ModelDefinition:
         if not changes:
             raise CommandError("a stress condition needs a stress, or quiet")
         at = self.numbers_of_faces(faces)
+        self._refuse_functions(changes)
         for row in np.unique(self.load_row[at]).tolist():
             wanted = replace(self.loads[row], **changes)
             if not wanted.quiet and (wanted.incoming_x != 0.0 or wanted.incoming_y != 0.0):
@@ -691,6 +783,10 @@ class ModelDefinition:
         self.before_change()
         self._change_rows(self.loads, self.load_row, at, changes)
         self.changed(stiffness=quiet is not None)  # dashpots limit the time step
+
+    def _refuse_functions(self, changes: Mapping[str, Any]) -> None:
+        if any(isinstance(value, str) and value in FUNCTIONS for value in changes.values()):
+            self.refuse_in_space("conditions by functions of place and time")
 
     @staticmethod
     def _change_rows(rows: list, column: np.ndarray, at: np.ndarray, changes: dict[str, Any]) -> None:
@@ -719,10 +815,12 @@ class ModelDefinition:
 
     # ---- options -------------------------------------------------------------------------------------------------
 
-    def gravity(self, gx: float, gy: float) -> None:
+    def gravity(self, gx: float, gy: float, gz: float = 0.0) -> None:
         """Acceleration of gravity [m/s2]."""
-        x, y = finite("gravity", [gx, gy]).tolist()
-        self._set(gx=x, gy=y)
+        x, y, z = finite("gravity", [gx, gy, gz]).tolist()
+        if z != 0.0 and self.mesh is not None:
+            self._only_in_space("gravity in z", z)
+        self._set(gx=x, gy=y, gz=z)
 
     def option(
         self,
@@ -730,16 +828,24 @@ class ModelDefinition:
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. collision (on): contact.
         large_strain (on): rotations of any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap
-        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        before the first step: refuse it; "relax": a static stage moves them apart; "keep": they start as they are.
+        potential ("distance"): of contact in space, see `POTENTIAL`."""
         given = {"dynamic": dynamic, "collision": collision, "large_strain": large_strain}
         if overlap is not None and overlap not in OVERLAP:
             raise CommandError(f"overlap is one of {', '.join(OVERLAP)}, got {overlap}")
         changes: dict[str, Any] = {name: bool(value) for name, value in given.items() if value is not None}
         if overlap is not None:
             changes["overlap"] = overlap
+        if potential is not None:
+            if self.mesh is not None:
+                self._only_in_space("choice of the potential of contact", potential)
+            if potential not in POTENTIAL:
+                raise CommandError(f"the potential of contact is one of {', '.join(POTENTIAL)}, got {potential}")
+            changes["potential"] = potential
         self._set(**changes)
 
     def parts(
@@ -858,22 +964,26 @@ class ModelDefinition:
     # ---- tables of the kernels -----------------------------------------------------------------------------------
 
     def conditions_at(self, time: float, middle: float, dt: float) -> np.ndarray:
-        """The table of node conditions (rows, 9) at a moment: forces at `time`, velocities in the middle of the step;
-        accelerations as change of velocity over dt."""
-        out = np.zeros((len(self.conditions), moving.CONDITION))
+        """The table of node conditions (rows, 9), in space (rows, 13), at a moment: forces at `time`, velocities in the
+        middle of the step; accelerations as change of velocity over dt."""
+        plane = self.dim == 2
+        out = np.zeros((len(self.conditions), moving.CONDITION if plane else space.CONDITION))
+        does = (moving.DOES_X, moving.DOES_Y) if plane else range(space.DOES, space.DOES + 3)
+        at = (moving.AT_X, moving.AT_Y) if plane else range(space.AT, space.AT + 3)
+        force, constraint, way = (
+            (moving.FORCE_X, moving.CONSTRAINT, moving.WAY_X) if plane else (space.FORCE, space.CONSTRAINT, space.WAY)
+        )
         for row, one in enumerate(self.conditions):
-            for does, at, kind, value in (
-                (moving.DOES_X, moving.AT_X, one.does_x, one.at_x), (moving.DOES_Y, moving.AT_Y, one.does_y, one.at_y),
-            ):  # fmt: skip
-                out[row, does] = kind
+            for k, axis in enumerate("xyz"[: self.dim]):
+                kind, value = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
+                out[row, does[k]] = kind
                 if kind == moving.VELOCITY:
-                    out[row, at] = self._now(value, middle)
+                    out[row, at[k]] = self._now(value, middle)
                 elif kind == moving.ACCELERATION:
-                    out[row, at] = self._now(value, time) * dt
-            out[row, moving.FORCE_X] = self._now(one.force_x, time)
-            out[row, moving.FORCE_Y] = self._now(one.force_y, time)
-            out[row, moving.CONSTRAINT] = one.constraint
-            out[row, moving.WAY_X], out[row, moving.WAY_Y] = one.way
+                    out[row, at[k]] = self._now(value, time) * dt
+                out[row, force + k] = self._now(getattr(one, f"force_{axis}"), time)
+            out[row, constraint] = one.constraint
+            out[row, way : way + len(one.way)] = one.way
         return out
 
     def conditions_vary(self) -> bool:
@@ -881,11 +991,9 @@ class ModelDefinition:
         return any(isinstance(value, str) for one in self.conditions for value in asdict(one).values())
 
     def loads_at(self, time: float) -> np.ndarray:
-        """The table of tractions (rows, 6) of nodes.py at a moment."""
-        return np.array([
-            [self._now(v, time) for v in (one.xx, one.yy, one.xy, one.normal, one.incoming_x, one.incoming_y)]
-            for one in self.loads
-        ])  # fmt: skip
+        """The table of tractions at a moment, columns `TRACTIONS`."""
+        names = TRACTIONS[self.dim]
+        return np.array([[self._now(getattr(one, name), time) for name in names] for one in self.loads])
 
     def quiet_faces(self) -> np.ndarray:
         """(4 ne,) bool: faces with dashpots."""
@@ -905,7 +1013,7 @@ class ModelDefinition:
             "tables": {name: table.pairs() for name, table in self.tables.items()},
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
-            "softening": [table.pairs() for table in self.softening],
+            "softening": [table.pairs() for table in self.followed],
             "element_rows": self.element_rows.state(),
             "face_rows": self.face_rows.state(),
             "joint_rows": self.joint_rows.state(),
@@ -923,7 +1031,7 @@ class ModelDefinition:
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]
-        self.softening = [Table.of(pairs) for pairs in state.get("softening", [])]
+        self.followed = [Table.of(pairs) for pairs in state.get("softening", [])]
         self.element_rows = Rows.restored(state["element_rows"])
         self.face_rows = Rows.restored(state["face_rows"])
         self.joint_rows = Rows.restored(state["joint_rows"])
@@ -944,7 +1052,7 @@ def _is_number(value: Value) -> bool:
 
 def _differs(value: Value) -> bool:
     """From object to object."""
-    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis != PLASTIC_STRAIN)
+    return isinstance(value, Drawn) or (isinstance(value, Over) and value.axis < PLASTIC_STRAIN)
 
 
 def _can_be_number(value: Any) -> bool:

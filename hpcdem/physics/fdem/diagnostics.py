@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
-from hpcdem.physics.fdem.definition import Numbers
-from hpcdem.physics.fdem.kernels import elements, plasticity
+from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
+from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
@@ -24,27 +25,54 @@ from hpcdem.physics.fdem.state import Crack
 @dataclass(frozen=True)
 class Quantity:
     """One quantity that can be asked for by number: what it belongs to (element, node, joint), unit, meaning; framed:
-    it stands in frames."""
+    it stands in frames; dims: dimensions of space in which it is there. Units are those of the plane, see `unit_of`."""
 
     on: str
     unit: str
     doc: str
     framed: bool = True
+    dims: tuple[int, ...] = (2,)
 
 
-def _pair(name: str, on: str, unit: str, doc: str) -> dict[str, Quantity]:
-    return {f"{name}_{axis}": Quantity(on, unit, f"{doc} in {axis}") for axis in "xy"}
+BOTH = (2, 3)
+PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s"}
+"""Units in the plane, where everything is that of a metre of thickness, and in space."""
+
+
+def unit_of(sim: Blocks, name: str) -> str:
+    """The unit of a quantity in this model."""
+    unit = quantity(sim, name).unit
+    return PER_METRE.get(unit, unit) if sim.dim == 3 else unit
+
+
+def _vector(name: str, on: str, unit: str, doc: str) -> dict[str, Quantity]:
+    return {
+        f"{name}_{axis}": Quantity(on, unit, f"{doc} in {axis}", dims=(3,) if axis == "z" else BOTH) for axis in "xyz"
+    }
 
 
 QUANTITIES: dict[str, Quantity] = {
-    **{f"stress_{c}": Quantity("element", "Pa", f"stress {c}, tension positive") for c in ("xx", "yy", "xy", "zz")},
-    "stress_max": Quantity("element", "Pa", "larger principal stress in the plane (more tensile)"),
-    "stress_min": Quantity("element", "Pa", "smaller principal stress in the plane (more compressive)"),
-    "kinetic_energy": Quantity("element", "J/m", "kinetic energy"),
-    "strain_energy": Quantity("element", "J/m", "elastic energy"),
+    **{
+        f"stress_{c}": Quantity(
+            "element", "Pa", f"stress {c}, tension positive", dims=BOTH if c in COMPONENTS[2] else (3,)
+        )
+        for c in COMPONENTS[3]
+    },
+    "stress_max": Quantity(
+        "element", "Pa", "largest principal stress (most tensile), in the plane the larger of the two in it", dims=BOTH
+    ),
+    "stress_min": Quantity(
+        "element",
+        "Pa",
+        "smallest principal stress (most compressive), in the plane the smaller of the two in it",
+        dims=BOTH,
+    ),
+    "kinetic_energy": Quantity("element", "J/m", "kinetic energy", dims=BOTH),
+    "strain_energy": Quantity("element", "J/m", "elastic energy", dims=BOTH),
     "mean_temperature": Quantity("element", "K", "mean temperature of its corners; NaN without a thermal model"),
     "area": Quantity("element", "m2", "area in the mesh"),
-    "element_model": Quantity("element", "1", "row of the table of element models"),
+    "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
+    "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
     "plastic_state": Quantity(
         "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8"
     ),
@@ -56,11 +84,11 @@ QUANTITIES: dict[str, Quantity] = {
     **{f"creep_strain_{c}": Quantity("element", "1", f"creep strain {c}, without volume") for c in ("xx", "yy", "xy")},
     **{f"kelvin_strain_{c}": Quantity("element", "1", f"strain {c} of the Kelvin unit") for c in ("xx", "yy", "xy")},
     "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep"),
-    **_pair("position", "node", "m", "position"),
-    **_pair("displacement", "node", "m", "displacement"),
-    **_pair("velocity", "node", "m/s", "velocity"),
-    **_pair("reaction", "node", "N/m", "force by which conditions act on the node"),
-    **_pair("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
+    **_vector("position", "node", "m", "position"),
+    **_vector("displacement", "node", "m", "displacement"),
+    **_vector("velocity", "node", "m/s", "velocity"),
+    **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
+    **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model"),
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken"),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken"),
@@ -86,9 +114,10 @@ evaluated there."""
 
 for _on, _names in (("element", ("position", "displacement", "velocity")), ("joint", ("position",))):
     for _name in _names:
-        for _axis in "xy":
+        for _axis in "xyz" if _on == "element" else "xy":
+            _of = QUANTITIES[f"{_name}_{_axis}"]
             QUANTITIES[f"{_on}_{_name}_{_axis}"] = Quantity(
-                _on, QUANTITIES[f"{_name}_{_axis}"].unit, f"mean {_name}", False
+                _on, _of.unit, f"mean {_name}", False, _of.dims if _on == "element" else (2,)
             )
 
 _STRENGTH = {"cohesion": "element_cohesion", "tensile": "element_tensile", "dilation": "element_dilation"}
@@ -105,7 +134,10 @@ PROPERTIES = {
 for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)), ("joint", (COHESIVE,))):
     for _quantity, _name in PROPERTIES[_on].items():
         _model = next(m for m in _models if m.has(_name))
-        QUANTITIES[_quantity] = Quantity(_on, _model.property(_name).unit, _model.property(_name).doc, False)
+        QUANTITIES[_quantity] = Quantity(
+            _on, _model.property(_name).unit, _model.property(_name).doc, False,
+            BOTH if _on == "element" and MECH_ISO_ELASTIC.has(_name) else (2,),
+        )  # fmt: skip
 
 _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
 _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for point in ("first", "middle", "last"))
@@ -139,8 +171,10 @@ def quantity(sim: Blocks, name: str) -> Quantity:
     """The quantity of this name. CommandError if there is none. Not collective."""
     if name not in QUANTITIES and name in user_laws.quantities(sim):
         return Quantity("element", user_laws.unit(name), "state variable of a law of the user")
-    if name not in QUANTITIES:
-        raise CommandError(f"there is no quantity {name}; there are {', '.join(QUANTITIES)}")
+    there = [one for one, about in QUANTITIES.items() if sim.dim in about.dims]
+    if name not in there:
+        plane = f" in {'two' if sim.dim == 2 else 'three'} dimensions" if name in QUANTITIES else ""
+        raise CommandError(f"there is no quantity {name}{plane}; there are {', '.join(there)}")
     return QUANTITIES[name]
 
 
@@ -202,23 +236,21 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
     number = sim.number[own][some]
     columns: dict[str, np.ndarray] = {"number": number.copy()}
     wanted = set(names)
-    if wanted & {"stress_xx", "stress_yy", "stress_xy", "stress_zz", "stress_max", "stress_min", "strain_energy"}:
+    if any(name.startswith("stress_") for name in wanted) or "strain_energy" in wanted:
         stress, energy = local.stresses(at, "strain_energy" in wanted)
-        for k, c in enumerate(("xx", "yy", "xy", "zz")):
+        for k, c in enumerate(COMPONENTS[sim.dim]):
             columns[f"stress_{c}"] = stress[:, k].copy()
-        mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
-        radius = np.hypot(half, stress[:, 2])
-        columns["stress_max"], columns["stress_min"] = mean + radius, mean - radius
+        columns["stress_max"], columns["stress_min"] = _principal(stress)
         columns["strain_energy"] = energy
     if any(name.startswith(("element_", "kinetic")) for name in wanted):
         x, v, real = sim.x[own][some], sim.v[own][some], mesh.cells[number] >= 0
         n = real.sum(axis=1)
-        for axis, along in enumerate("xy"):
+        for axis, along in enumerate("xyz"[: sim.dim]):
             for name, rows in (("position", x), ("velocity", v)):
                 if f"element_{name}_{along}" in wanted:
                     columns[f"element_{name}_{along}"] = _mean(_corners(rows, real)[:, :, axis], real, n)
             if f"element_displacement_{along}" in wanted:
-                way = _corners(x, real)[:, :, axis] - homes(sim, at).reshape(-1, 4, 2)[:, :, axis]
+                way = _corners(x, real)[:, :, axis] - home_corners(sim, at)[:, :, axis]
                 columns[f"element_displacement_{along}"] = _mean(way, real, n)
         if "kinetic_energy" in wanted:
             v2 = (_corners(v, real) ** 2).sum(axis=2)
@@ -235,7 +267,7 @@ def _element_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = 
         columns |= {name: user_laws.values(sim, name, memory)[some] for name in of_laws}
     for name in wanted & PROPERTIES["element"].keys():
         columns[name] = sim.element_rows.column(PROPERTIES["element"][name])[sim.element_row[number]]
-    columns["area"] = sim.areas[number]
+    columns["area" if sim.dim == 2 else "volume"] = sim.areas[number]
     columns["element_model"] = sim.element_row[number].astype(float)
     return columns
 
@@ -277,19 +309,21 @@ def _node_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = Non
     row, k = sim.where[lead[points] // 4], lead[points] % 4
     columns: dict[str, np.ndarray] = {"number": points}
     home = sim.cold.get("home")
+    stride = sim.local.stride
     for name in names:
         kind, _, axis = name.rpartition("_")
-        c = 0 if axis == "x" else 1
+        c = "xyz".find(axis)
         if name.startswith(("reaction", "unbalanced")):
             columns[name] = _whole_point(sim, name, points)
         elif name == "temperature":
             columns[name] = corner_temperatures(sim)[row - own.start, k]
         elif kind == "velocity":
-            columns[name] = sim.v[row, 2 * k + c]
+            columns[name] = sim.v[row, stride * k + c]
         else:
-            columns[name] = sim.x[row, 2 * k + c]
+            columns[name] = sim.x[row, stride * k + c]
             if kind == "displacement":
-                columns[name] -= sim.the_mesh().points[points, c] if home is None else home[row - own.start, 2 * k + c]
+                before = sim.the_mesh().points[points, c] if home is None else home[row - own.start, stride * k + c]
+                columns[name] -= before
     return columns
 
 
@@ -299,8 +333,8 @@ def _corner_columns(sim: Blocks) -> dict[str, np.ndarray]:
     real = sim.the_mesh().cells[number] >= 0
     i, k = np.nonzero(real)
     columns: dict[str, np.ndarray] = {"number": 4 * number[i] + k}
-    place, speed, home = _corners(sim.x[own], real), _corners(sim.v[own], real), homes(sim).reshape(-1, 4, 2)
-    for c, axis in enumerate("xy"):
+    place, speed, home = _corners(sim.x[own], real), _corners(sim.v[own], real), home_corners(sim)
+    for c, axis in enumerate("xyz"[: sim.dim]):
         columns[f"position_{axis}"] = place[i, k, c]
         columns[f"displacement_{axis}"] = place[i, k, c] - home[i, k, c]
         columns[f"velocity_{axis}"] = speed[i, k, c]
@@ -317,13 +351,14 @@ def corner_temperatures(sim: Blocks) -> np.ndarray:
 
 
 def corner_values(sim: Blocks, name: str, corners: np.ndarray | None = None) -> np.ndarray:
-    """(4 ne, 2) position [m], displacement [m] or velocity [m/s] of every corner (element * 4 + k), on all ranks;
-    NaN where there is none. corners: only these, NaN for the others. Collective."""
-    columns = owned_values(sim, "corner", [f"{name}_x", f"{name}_y"])
-    rows = np.column_stack([columns["number"].astype(float), columns[f"{name}_x"], columns[f"{name}_y"]])
+    """(4 ne, 2), in space (4 ne, 3), position [m], displacement [m] or velocity [m/s] of every corner (element * 4 +
+    k), on all ranks; NaN where there is none. corners: only these, NaN for the others. Collective."""
+    names = [f"{name}_{axis}" for axis in "xyz"[: sim.dim]]
+    columns = owned_values(sim, "corner", names)
+    rows = np.column_stack([columns["number"].astype(float), *(columns[one] for one in names)])
     if corners is not None:
         rows = rows[np.isin(columns["number"], corners)]
-    out = np.full((len(sim.partner), 2), np.nan)
+    out = np.full((len(sim.partner), sim.dim), np.nan)
     for part in sim.comm.allgather(rows) if sim.comm.size > 1 else [rows]:
         out[part[:, 0].astype(np.int64)] = part[:, 1:]
     return out
@@ -385,14 +420,31 @@ def _last_events(sim: Blocks, lower: np.ndarray, broken: np.ndarray) -> dict[str
 
 
 def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
-    """Where displacement is zero: (n_own, 8) corners [m], in the order of the owned elements; or of some of them.
-    Not collective."""
+    """Where displacement is zero: (n_own, 8), in space (n_own, 16), corners [m], in the order of the owned elements; or
+    of some of them. Not collective."""
     some = slice(None) if at is None else at
     if "home" in sim.cold:
         return sim.cold["home"][some]
     mesh = sim.the_mesh()
     cells = mesh.cells[sim.number[sim.owned][some]]
-    return np.where((cells >= 0)[:, :, None], mesh.points[cells], 0.0).reshape(-1, 8)
+    found = np.where((cells >= 0)[:, :, None], mesh.points[cells], 0.0)
+    return np.pad(found, ((0, 0), (0, 0), (0, found.shape[2] - 2))).reshape(len(cells), -1)
+
+
+def home_corners(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
+    """The same by corners, (n_own, 4, 2) or (n_own, 4, 3)."""
+    found = homes(sim, at)
+    return found.reshape(len(found), 4, -1)[:, :, : sim.dim]
+
+
+def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest and smallest principal stress (n,) of stresses (n, 4): in the plane, or (n, 6)."""
+    if stress.shape[1] == 4:
+        mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+        radius = np.hypot(half, stress[:, 2])
+        return mean + radius, mean - radius
+    found = np.linalg.eigvalsh(stress[:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
+    return found[:, 2].copy(), found[:, 0].copy()
 
 
 # ---- contacts, events, balance ---------------------------------------------------------------------------------
@@ -400,8 +452,11 @@ def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
 
 def contacts(sim: Blocks) -> dict[str, np.ndarray]:
     """Touching pairs of this rank: element_1 < element_2, force_x, force_y [N/m] on element_1, x, y: middle of both
-    [m]. Every pair is on one rank, the owner of element_1. Collective."""
+    [m]. Every pair is on one rank, the owner of element_1. In space element_1 has the face that touches, `face`, with
+    force_z and z. Collective."""
     seen = sim.evaluate()
+    if sim.dim == 3:
+        return _contacts_in_space(sim, seen)
     pairs, own = sim.local.pairs, sim.owned
     out = seen.pair_force
     at = np.flatnonzero(seen.touching)
@@ -421,6 +476,23 @@ def contacts(sim: Blocks) -> dict[str, np.ndarray]:
     for c, axis in enumerate("xy"):
         ends = [flat[pairs.x_place[body] + 2 * k + c] for body in (first, second) for k in range(3)]
         columns[axis] = np.mean(ends, axis=0) if len(at) else np.empty(0)
+    return columns
+
+
+def _contacts_in_space(sim: Blocks, seen: Evaluation) -> dict[str, np.ndarray]:
+    pairs: Any = sim.local.pairs
+    own, at = sim.owned, np.flatnonzero(seen.touching)
+    row = pairs.face_row[pairs.first[at]]
+    at = at[(row >= own.start) & (row < own.stop)]
+    first, second = pairs.first[at], pairs.second[at]
+    force = seen.pair_force[at, :9].reshape(-1, 3, 3).sum(axis=1)
+    flat = sim.x.reshape(-1)
+    columns = {
+        "element_1": pairs.face[first] // 4, "element_2": pairs.element[second], "face": pairs.face[first],
+    }  # fmt: skip
+    for c, axis in enumerate("xyz"):
+        columns[f"force_{axis}"] = force[:, c].copy()
+        columns[axis] = flat[pairs.corner[first] + c].mean(axis=1)
     return columns
 
 
@@ -463,9 +535,9 @@ def unbalanced_ratio(sim: Blocks) -> float:
     """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions. Collective."""
     seen, local, own = sim.evaluate(), sim.local, sim.owned
     felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
-    alone = seen.force[own].reshape(-1, 4, 2)[local.alone()].reshape(-1)
+    alone = seen.force[own].reshape(sim.n_own, 4, -1)[local.alone()].reshape(-1)
     of_loads = sim.surface_loads.balance()[0]
-    unbalanced = np.concatenate([np.abs(felt[:, :2] + outside).reshape(-1), np.abs(alone), *of_loads])
+    unbalanced = np.concatenate([np.abs(felt[:, : sim.dim] + outside).reshape(-1), np.abs(alone), *of_loads])
     total = exact_sum(contributing(sim, seen), sim.comm)
     return exact_sum(unbalanced, sim.comm) / total if total != 0.0 else 0.0
 
@@ -476,15 +548,17 @@ def contributing(sim: Blocks, seen: Evaluation) -> np.ndarray:
     local, own = sim.local, sim.owned
     felt = seen.felt[local.my_nodes]
     stress = seen.force[own] - seen.of_joints[own]
-    parts = [stress, seen.of_joints[own], felt[:, 2:]]
+    parts = [stress, seen.of_joints[own], felt[:, sim.dim :]]
     if len(local.pairs.rows):
         pushed = seen.pushed[: len(local.pairs.rows)]
         stress[local.pairs.rows - sim.n_left] -= pushed
         parts.append(pushed)
-    if sim.options.gx or sim.options.gy:
-        pull = local.true_mass[own][:, :, None] * np.array([sim.options.gx, sim.options.gy])
+    o = sim.options
+    if o.gx or o.gy or o.gz:
+        way = np.array([o.gx, o.gy] if sim.dim == 2 else [o.gx, o.gy, o.gz, 0.0])
+        pull = local.true_mass[own][:, :, None] * way
         real = sim.the_mesh().cells[sim.number[own]][:, :, None] >= 0
-        pull = np.where(real, pull, 0.0).reshape(-1, elements.FORCE)
+        pull = np.where(real, pull, 0.0).reshape(-1, local.force_width)
         stress -= pull
         parts.append(pull)
     return np.concatenate([np.abs(part).reshape(-1) for part in (*parts, *sim.surface_loads.balance()[1])])
@@ -507,6 +581,8 @@ def added_mass(sim: Blocks) -> float:
 
 def account_energy(sim: Blocks, on: bool = True) -> None:
     """Keep the energy budget from now on. In dynamic mode only. Collective."""
+    if on:
+        sim.refuse_in_space("the energy budget")
     if on and not sim.options.dynamic:
         raise CommandError("the energy budget is kept in dynamic mode: masses of the static mode are fictitious")
     if on and (laws := user_laws.in_use(sim)):
@@ -552,7 +628,9 @@ class _ColumnProbe(Probe):
 
 
 def _corners(rows: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """(n, 4, 2) corners of rows of x or v, zero for the fourth of a triangle."""
+    """(n, 4, 2) corners of rows of x or v, zero for the fourth of a triangle; in space (n, 4, 3)."""
+    if rows.shape[1] == tets.ROW:
+        return rows.reshape(len(rows), 4, tets.STRIDE)[:, :, :3]
     out = np.zeros((len(rows), 4, 2))
     count = 3 if rows.shape[1] < 12 else 4
     out[:, :count] = rows[:, : 2 * count].reshape(len(rows), count, 2)

@@ -2,7 +2,8 @@
 travel with them, and are put back at the next rebuild.
 
 A row is 20 words: key, state, and up to eighteen numbers. Keys of joints are -1 - edge (0..3); keys of contacts are the
-other body's number * 2 + half of this element, bodies being element * 2 + half (quads have two, see `pairs.py`).
+other body's number * 2 + half of this element, bodies being element * 2 + half (quads have two, see `pairs.py`); in
+space the other element * 8 + local face, + 4 if the face is the other one's, see `pairs_space.py`.
 """
 
 from __future__ import annotations
@@ -75,10 +76,10 @@ class Histories:
         ptr = np.concatenate(([0], np.cumsum(np.bincount(owner, minlength=len(self.ptr) - 1))))
         return Histories(ptr.astype(np.int64), np.ascontiguousarray(self.rows[rows]))
 
-    def without_partners(self, gone: np.ndarray) -> Histories:
-        """Without contacts with elements flagged in `gone` (ne,)."""
+    def without_partners(self, gone: np.ndarray, dim: int) -> Histories:
+        """Without contacts with elements flagged in `gone` (ne,); dim: dimensions of space."""
         key = self.keys()
-        other = np.where(key >= 0, key // 4, 0)
+        other = np.where(key >= 0, key // (8 if dim == 3 else 4), 0)
         return self.keep((key < 0) | ~gone[other])
 
     def without_joints(self, number: np.ndarray, forget: np.ndarray) -> Histories:

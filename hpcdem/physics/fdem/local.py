@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ import numpy as np
 
 from hpcdem.core.errors import PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, connectivity, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, user_laws
+from hpcdem.physics.fdem.definition import TRACTIONS
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories, place_joints
 from hpcdem.physics.fdem.kernels import (
     creep,
@@ -27,7 +29,15 @@ from hpcdem.physics.fdem.kernels import (
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.pairs import ContactPairs, Kinds, Shapes, Surfaces
-from hpcdem.physics.fdem.properties import MECH_MOHR_COULOMB, SOFTENS, Rows, softening_table
+from hpcdem.physics.fdem.properties import (
+    COHESIVE,
+    MECH_MOHR_COULOMB,
+    SOFTENS,
+    Rows,
+    softening_rows,
+    softening_table,
+    temperature_table,
+)
 from hpcdem.physics.fdem.tables import Table
 from hpcdem.physics.fdem.user_functions import Placed
 
@@ -35,14 +45,18 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.definition import NodeCondition
     from hpcdem.physics.fdem.state import State
 
-_TRACTION = "xx", "yy", "xy", "normal", "incoming_x", "incoming_y"
-"""Columns of the table of tractions."""
 ALPHA = 0.8
 """Local damping of the static mode."""
 
 
-def joint_tables(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    """The tables of joint laws (rows, 8) and (rows, 4) of joints.py; row 0 is no joint."""
+_WARM_JOINT = tuple(one.name for one in COHESIVE.properties if one.warms)
+
+
+def joint_tables(rows: Rows, warm: Mapping[str, np.ndarray] | None = None, row: Any = slice(None)) -> tuple[
+    np.ndarray, np.ndarray
+]:  # fmt: skip
+    """The tables of joint laws (n, 8) and (n, 4) of joints.py; row 0 is no joint. warm: properties (n,) that take the
+    place of those of these rows (n,)."""
     names = (
         "tensile_strength",
         "cohesion",
@@ -53,8 +67,9 @@ def joint_tables(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
         "gf1",
         "gf2",
     )
-    tensile, cohesion, friction, opening, overlay, shear, gf1, gf2 = (np.array(rows.column(n)) for n in names)
-    law, beyond = np.zeros((len(rows), 8)), np.zeros((len(rows), 4))
+    said = {name: np.array(rows.column(name)[row]) for name in names} | dict(warm or {})
+    tensile, cohesion, friction, opening, overlay, shear, gf1, gf2 = (said[name] for name in names)
+    law, beyond = np.zeros((len(tensile), 8)), np.zeros((len(tensile), 4))
     area = laws.SOFTENING_AREA
     with np.errstate(divide="ignore", invalid="ignore"):
         law[:, joints.KOP] = np.where(tensile > 0.0, opening / (2.0 * tensile), 0.0)
@@ -102,12 +117,13 @@ def creep_table(rows: Rows) -> np.ndarray:
 
 
 def strength_tables(rows: Rows, of: np.ndarray, tables: list[Table], history: np.ndarray) -> strength.Strength:
-    """The arrays of strength.py; of (own rows,): the row of the model of each."""
+    """The arrays of strength.py; of (own rows,): the row of the model of each. Strengths are the largest that tables
+    over temperature have."""
     pieces = [np.column_stack([one.times, one.values]) for one in tables]
     return strength.Strength(
         len(rows),
         of.astype(np.int64),
-        np.column_stack([rows.column(name) for name in SOFTENS]),
+        np.column_stack([rows.column(name)[of] for name in SOFTENS]),
         np.column_stack([rows.column(softening_table(name)) for name in SOFTENS]).astype(np.int64),
         np.cumsum([0, *map(len, pieces)]),
         np.concatenate([np.empty((0, 2)), *pieces]),
@@ -157,10 +173,14 @@ class LawHere:
 
 
 class Local:
-    """Tables of one rank between two rebuilds. The model is in storage order, ghosts in place. Collective.
+    """Tables of one rank between two rebuilds, in the plane (in space: local_space.py). The model is in storage order,
+    ghosts in place. Collective.
 
-    passes: how often the forces of a step were computed.
+    passes: how often the forces of a step were computed. dim: of space; force_width: words of a row of forces; stride:
+    from one corner of a row to the next.
     """
+
+    dim, force_width, stride = 2, elements.FORCE, 2
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -210,6 +230,8 @@ class Local:
             self.triangle_rows[:count], self.quad_rows, self.true_mass, self.c, self.q,
         )  # fmt: skip
         self.c[count:] = self.c[count - 1] if count else 1.0
+        self.warms = any(bool(one.any()) for one in sim.warms())
+        self.stiff, self.stiff_q = (self.c.copy(), self.q.copy()) if self.warms else (self.c, self.q)
         self.plastic, self.creeps = "plastic" in sim.cold, "creep" in sim.cold
         self.yields = bool(sim.yielding().any())
         rows = self.triangle_rows[:count]
@@ -233,11 +255,61 @@ class Local:
         self._of_initial = np.zeros((count, 4)), np.zeros((quads, 4))
         if sim.stress0 is not None:
             self._of_initial = sim.initial_stresses(sim.number[rows]), sim.initial_stresses(sim.number[self.quad_rows])
-        self.heated = self.restress()
+        self.initial_part: np.ndarray | None = None
+        self._said_initial = self._of_initial
+        if self.warms:
+            self._follow_elements()
+        self.heated = self._find_stress_without_strain()
 
-    def restress(self) -> bool:
-        """Find the stress without strain of all elements again: what was said of it, and what heat brings, less the
-        part of plastic and creep strain. Returns whether heat brings any."""
+    def follow_heat(self) -> None:
+        """Temperatures have changed: moduli, strengths and stress without strain are those of now."""
+        if self.warms:
+            self._follow_elements()
+            self._follow_joints()
+        if self.warms or self.heated:
+            self._find_stress_without_strain()
+
+    def _follow_elements(self) -> None:
+        """Moduli, initial stress and strength of elements at their temperatures."""
+        sim, count = self.sim, self.count
+        part = by_temperature.part_of_young(sim)
+        triangles, quads = self.triangle_rows[:count] - sim.n_left, self.quad_rows - sim.n_left
+        if part is not None:
+            for table, full, columns, rows in (
+                (self.c, self.stiff, [elements.LAMBDA, elements.TWO_MU], triangles),
+                (self.q, self.stiff_q, [elements.Q_LAMBDA, elements.Q_TWO_MU], quads),
+            ):
+                table[: len(rows), columns] = full[: len(rows), columns] * part[rows, None]
+        if sim.stress0 is not None:
+            said = sim.stress0_row[sim.number[sim.owned]]
+            before = by_temperature.part_of_young(sim, said, sim.cold[by_temperature.UNSTRESSED][:, 0])
+            if part is not None or before is not None:
+                ratio = np.ones(sim.n_own) if part is None else part.copy()
+                if before is not None:
+                    ratio /= np.where(said > 0, before, 1.0)
+                self.initial_part = ratio
+                first, second = self._said_initial
+                self._of_initial = first * ratio[triangles, None], second * ratio[quads, None]
+        if self.plastic and len(self.strength.of):
+            t, of = by_temperature.means(sim)[self.strength_element], self.strength.of
+            for column, name in ((strength.COHESION, "cohesion"), (strength.TENSILE, "tensile")):
+                self.strength.values[:, column] = by_temperature.values(sim, sim.element_rows, name, of, t)
+            self._renew_strength()
+
+    def _follow_joints(self) -> None:
+        """The laws of joints at their temperatures."""
+        sim, slots = self.sim, self.warm_slots
+        face = self.slot_face[slots]
+        e, k = face // 4, face % 4
+        t, own = sim.cold[by_temperature.TEMPERATURE], sim.where[e] - sim.n_left
+        ends = t[own, k], t[own, (k + 1) % connectivity.corner_counts(sim.the_mesh().cells[e])]
+        mean, rows, of = 0.5 * (ends[0] + ends[1]), sim.joint_rows, self.warm_of
+        warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _WARM_JOINT}
+        self.joint_table[len(rows) :], self.joint_beyond[len(rows) :] = joint_tables(rows, warm, of)
+
+    def _find_stress_without_strain(self) -> bool:
+        """Of all elements: what was said of it, and what heat brings, less the part of plastic and creep strain.
+        Returns whether heat brings any."""
         sim, rows = self.sim, self.triangle_rows[: self.count]
         heat = sim.surface_loads.eigenstress(sim)
         build.stress_without_strain(
@@ -278,18 +350,24 @@ class Local:
         sim = self.sim
         of_models = yield_table(sim.element_rows)
         history = sim.cold.get("softening", np.zeros((0, strength.HISTORY)))
-        tables = [sim.element_rows.column(softening_table(name)) > 0.0 for name in SOFTENS]
-        softens = np.any(tables, axis=0) if len(history) else np.zeros(len(of_models), bool)
+        softens = softening_rows(sim.element_rows) if len(history) else np.zeros(len(of_models), bool)
         law = self.law[: self.count, None]
-        of, first = [], len(of_models)
-        for laws_ in (law, self.quad_law):
+        of, element, first = [], [], len(of_models)
+        for laws_, at in ((law, rows), (self.quad_law, self.quad_rows)):
             own = softens[laws_]
             of.append(laws_[own])
+            element.append(at[np.nonzero(own)[0]].astype(np.int64) - sim.n_left)
             laws_[own] = first + np.arange(int(own.sum()))
             first += int(own.sum())
-        self.strength = strength_tables(sim.element_rows, np.concatenate(of), sim.softening, history)
+        self.strength = strength_tables(sim.element_rows, np.concatenate(of), sim.followed, history)
         self.yield_table = np.concatenate([of_models, np.zeros((first - len(of_models), plasticity.YIELD))])
-        if len(history):
+        self.strength_element = np.concatenate(element)
+        self._renew_strength()
+
+    def _renew_strength(self) -> None:
+        """The yield surfaces of triangles that have one of their own."""
+        sim, law, rows = self.sim, self.law[: self.count, None], self.triangle_rows[: self.count]
+        if len(self.strength.history):
             strength.renew_all(rows, sim.n_left, 1, law, self.strength, self.yield_table)
             strength.renew_all(self.quad_rows, sim.n_left, 4, self.quad_law, self.strength, self.yield_table)
 
@@ -297,7 +375,6 @@ class Local:
         """Elements with a law of the user have no moduli in the tables of forces, see kernels/user_laws.py; stiff,
         stiff_q: the tables by which the time step is found, with moduli in the ratio of those of the element."""
         sim, rows = self.sim, self.sim.element_rows
-        self.stiff, self.stiff_q = self.c, self.q
         self.laws: list[LawHere] = []
         self.law_of_triangles: LawHere | None = None
         self.law_of_quads: LawHere | None = None
@@ -313,7 +390,7 @@ class Local:
         if sim.stress0 is not None:
             self.law_base[: self.count] = sim.initial_stresses(sim.number[owned[0]])
             self.quad_law_base[:] = np.tile(sim.initial_stresses(sim.number[owned[1]]), 4)
-        self.stiff, self.stiff_q = self.c.copy(), self.q.copy()
+        self.stiff, self.stiff_q = self.stiff.copy(), self.stiff_q.copy()
         models, bound = element_table(rows), np.array(rows.column(user_laws.BOUND))
         modulus = models[:, build.LAME] + models[:, build.MU2]
         for table, stiff, number, row, columns, s0, base in (
@@ -384,7 +461,21 @@ class Local:
         self.first_slot[self.quad_rows - sim.n_left] = 3 * count + 4 * np.arange(len(self.quad_rows))
         blocks = -(-count // elements.BLOCK)
         self.head, self.follow = np.full(blocks, -1, np.int32), np.full(padded, -1, np.int32)
-        self.joint_table, self.joint_beyond = joint_tables(sim.joint_rows)
+        self._make_joint_laws()
+
+    def _make_joint_laws(self) -> None:
+        """Their tables; joints that follow temperature have a row of their own on each side, behind those of the
+        properties."""
+        rows = self.sim.joint_rows
+        tables = [rows.column(temperature_table(name)) > 0.0 for name in _WARM_JOINT]
+        self.warm_slots = np.flatnonzero(np.any(tables, axis=0)[self.slot_kind])
+        self.warm_of = self.slot_kind[self.warm_slots].astype(np.int64)
+        own = len(rows) + np.arange(len(self.warm_slots))
+        self.slot_law[self.warm_slots] = self.slot_kind[self.warm_slots] = own
+        every = np.concatenate([np.arange(len(rows)), self.warm_of])
+        self.joint_table, self.joint_beyond = joint_tables(rows, row=every)
+        if self.warms:
+            self._follow_joints()
 
     def _agree_on_lost(self, lost: int, what: str) -> None:
         sim = self.sim
@@ -484,17 +575,21 @@ class Local:
         self.node_mass = np.empty(n)
         lost = self._place_nodes(self.true_mass)
         self._agree_on_lost(lost, "the node of corner")
-        rows = self.node_corner // 8
+        rows = self.node_corner // self.force_width
         self.shared = sim.comm.any(bool(((rows < own.start) | (rows >= own.stop)).any()))
         lead = mesh.cells[self.node_lead // 4, self.node_lead % 4]
         self.node_functions = Placed(sim.conditions, sim.point_row[lead].astype(np.int64), mesh.points[lead])
         self.node_condition = self.node_functions.of
         self.node_share = self._one / np.maximum(sim.point_corners[lead], 1)
-        self.outside, self.felt = np.zeros((n, 2)), np.zeros((n, 4))
+        self.outside, self.felt = np.zeros((n, self.dim)), np.zeros((n, 2 * self.dim))
         total = len(sim.number)
-        self.force = np.zeros((total if self.some_special or self.shared else 1, elements.FORCE))
-        self.applied = np.zeros((total if self.some_applied else 1, elements.FORCE))
-        self.triangle_special = self.special[self.triangle_rows[: self.count] - own.start].any(axis=1)
+        self.force = np.zeros((total if self.some_special or self.shared else 1, self.force_width))
+        self.applied = np.zeros((total if self.some_applied else 1, self.force_width))
+        self._mark_special()
+
+    def _mark_special(self) -> None:
+        """Elements with corners that nodes.py moves."""
+        self.triangle_special = self.special[self.triangle_rows[: self.count] - self.sim.n_left].any(axis=1)
         self.block_special = self._per_block(self.triangle_special)
 
     def _per_block(self, flags: np.ndarray) -> np.ndarray:
@@ -508,7 +603,8 @@ class Local:
         return int(
             build.place_nodes(
                 self.node_lead, self._start, self._one, sim.member, sim.where, sim.the_mesh().cells, sim.v.shape[1],
-                mass, self.node_begin, self.node_corner, self.node_place, self.node_again, self.node_mass,
+                self.force_width, self.stride, mass, self.node_begin, self.node_corner, self.node_place,
+                self.node_again, self.node_mass,
             )
         )  # fmt: skip
 
@@ -567,12 +663,22 @@ class Local:
         sim, o = self.sim, self.sim.options
         if not o.dynamic:
             return math.inf
-        least = limits.time_step(
-            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, sim.owned.start,
-            *self.springs(),
-            o.mass_damping, o.stiffness_damping, o.safety, target, self.true_mass.copy() if mass is None else mass,
-        )  # fmt: skip
+        least = self._stable_time_step(target, self.true_mass.copy() if mass is None else mass)
         return o.safety * float(sim.comm.min_into(np.array([least]))[0])
+
+    def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
+        """Of this rank's elements, see `limits.time_step`."""
+        o = self.sim.options
+        return limits.time_step(
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
+            *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
+        )  # fmt: skip
+
+    def _make_static_masses(self) -> None:
+        limits.static_masses(
+            self.stiff, self.stiff_q, self.triangle_rows[: self.count], self.quad_rows, self.sim.owned.start,
+            self.springs()[0], ALPHA, self.mass,
+        )  # fmt: skip
 
     def added_mass(self) -> float:
         """Mass that mass scaling has added, over the true mass. Collective."""
@@ -583,13 +689,9 @@ class Local:
     def _set_masses(self) -> None:
         """Masses of the corners that the motion sees, and the time step. Collective."""
         sim, o = self.sim, self.sim.options
-        triangles = self.triangle_rows[: self.count]
         self.mass = self.true_mass.copy()
-        own = sim.owned
         if not o.dynamic or not o.mechanical:
-            limits.static_masses(
-                self.stiff, self.stiff_q, triangles, self.quad_rows, own.start, self.springs()[0], ALPHA, self.mass
-            )  # fmt: skip
+            self._make_static_masses()
             sim.clock.dt = 1.0
         else:
             wanted = sim.rebuild_state.dt == 0.0
@@ -608,7 +710,12 @@ class Local:
         dt = sim.clock.dt
         self.node_kick = dt / self.node_mass
         self._conditions = None if sim.conditions_vary() else sim.conditions_at(sim.clock.time, sim.clock.time, dt)
-        alone = ~self.special[triangles - own.start][:, :3]
+        self._set_kicks(dt)
+
+    def _set_kicks(self, dt: float) -> None:
+        """What moves corners that are alone."""
+        triangles = self.triangle_rows[: self.count]
+        alone = ~self.special[triangles - self.sim.n_left][:, :3]
         with np.errstate(divide="ignore"):
             self.c[: self.count, elements.KICK : elements.KICK + 3] = np.where(
                 alone, dt / self.mass[triangles, :3], 0.0
@@ -887,7 +994,7 @@ class Local:
 
     def loads_now(self, placed: Placed, time: float) -> np.ndarray:
         """The table of tractions (rows, 6), with a row of its own for each face whose traction is a function."""
-        return placed.filled(self.sim.loads_at(time), lambda one, field: (_TRACTION.index(field), time, 1.0))
+        return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[2].index(field), time, 1.0))
 
     def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:
         """The table of node conditions, with a row of its own for each node whose condition is a function."""
@@ -1055,6 +1162,10 @@ class Local:
         stress = np.asarray(sim.surface_loads.eigenstress(sim))
         bulk = np.array(sim.element_rows.column("bulk"))[sim.element_row[number]]
         said = sim.initial_stresses(number) if sim.stress0 is not None else np.zeros((sim.n_own, 4))
+        if (part := by_temperature.part_of_young(sim)) is not None:
+            bulk = bulk * part
+        if self.initial_part is not None:
+            said = said * self.initial_part[:, None]
         mean = said[:, [0, 1, 3]].sum(axis=1) / 3.0
         return stress * (0.5 * stress + mean) / bulk * sim.areas[number]
 

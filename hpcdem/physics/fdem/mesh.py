@@ -1,7 +1,8 @@
-"""The mesh of the blocks: points, triangles and quads, and what is known about them before the first step.
+"""The mesh of the blocks: points, elements, and what is known about them before the first step.
 
-Points, elements (cells), faces and edges are numbered for the whole model, see `connectivity`; the numbers know no
-ranks. `hpcdem.pre.mesh` makes meshes.
+In the plane elements are triangles and quads, in space tetrahedra. Points, elements (cells), faces and edges are
+numbered for the whole model, see `connectivity` and `tetrahedra`; the numbers know no ranks. In space what the plane
+calls an edge is a face with three points. `hpcdem.pre.mesh` makes meshes.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.physics.fdem import connectivity
+from hpcdem.physics.fdem import connectivity, tetrahedra
 from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
 
 FLAT = 1e-9
@@ -27,16 +28,17 @@ def _no_pairs() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Points and elements in the plane, with names for parts of them. Arrays are not to be changed."""
+    """Points and elements, with names for parts of them. Arrays are not to be changed."""
 
     points: np.ndarray
-    """(np, 2) f8 [m]."""
+    """(np, 2) f8 [m], in space (np, 3)."""
     cells: np.ndarray
-    """(ne, 4) i8 point numbers, counter-clockwise; the fourth is -1 for triangles."""
+    """(ne, 4) i8 point numbers; of triangles and quads counter-clockwise, the fourth -1 for triangles; of tetrahedra
+    as `tetrahedra.canonical` has them."""
     groups: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
     """Set name -> group name -> ascending i8 element numbers; an element is in one group per set at most."""
     layers: dict[str, np.ndarray] = field(default_factory=dict)
-    """Geometry layer -> (k, 2) i8 end points of the edges that lie on it."""
+    """Geometry layer -> (k, 2) i8 end points of the edges that lie on it, (k, 3) in space."""
     cracks: np.ndarray = field(default_factory=_no_pairs)
     """(k, 2) i8 end points of the inner edges that carry a crack from the beginning."""
     crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
@@ -46,55 +48,106 @@ class Mesh:
     def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None) -> Mesh:
         """A mesh from anything array-like, in the form the fields are documented in.
 
-        Cells of three columns are triangles. Pairs get their lower point first, ascending and each once (of a crack
-        edge named twice the first set stays); element numbers of groups are sorted.
+        Points of three columns are in space. Cells of three columns are triangles. Pairs get their lower point first,
+        ascending and each once (of a crack edge named twice the first set stays); element numbers of groups are sorted.
         """
-        points = np.array(points, np.float64, order="C").reshape(-1, 2)
+        points = np.array(points, np.float64, order="C")
+        dim = 3 if points.ndim == 2 and points.shape[1] == 3 else 2
+        points = points.reshape(-1, dim)
         cells = np.array(cells, np.int64, order="C")
-        cells = cells.reshape(-1, 3 if cells.ndim == 2 and cells.shape[1] == 3 else 4)
+        cells = cells.reshape(-1, 3 if cells.ndim == 2 and cells.shape[1] == 3 and dim == 2 else 4)
         if cells.shape[1] == 3:
             cells = np.column_stack([cells, np.full(len(cells), -1, np.int64)])
+        if dim == 3:
+            cells = tetrahedra.canonical(cells)
         # Rows lie one after the other whatever was given: kernels are compiled for that.
         points, cells = np.ascontiguousarray(points), np.ascontiguousarray(cells)
-        pairs = np.sort(np.array(_no_pairs() if cracks is None else cracks, np.int64).reshape(-1, 2), axis=1)
+        pairs = np.sort(np.array(_no_pairs() if cracks is None else cracks, np.int64).reshape(-1, dim), axis=1)
         pairs, first = np.unique(pairs, axis=0, return_index=True)
         sets = np.zeros(len(first), np.int64) if crack_sets is None else np.array(crack_sets, np.int64)[first]
         return Mesh(
             points,
             cells,
             {s: {g: np.unique(np.array(rows, np.int64)) for g, rows in of.items()} for s, of in (groups or {}).items()},
-            {name: _sorted_pairs(given) for name, given in (layers or {}).items()},
+            {name: _sorted_pairs(given, dim) for name, given in (layers or {}).items()},
             pairs,
             sets,
         )
 
+    @property
+    def dim(self) -> int:
+        """Dimensions of space: 2 or 3."""
+        return int(self.points.shape[1])
+
+    def face_partners(self) -> np.ndarray:
+        """(4 ne,) i8, see `connectivity.face_partners`. Computed again at each call."""
+        if self.dim == 3:
+            return tetrahedra.face_partners(self.cells)
+        return connectivity.face_partners(self.cells, len(self.points))
+
+    def face_points(self, faces: np.ndarray) -> np.ndarray:
+        """(n, 2) i8 first and last point of each face; in space its three points (n, 3)."""
+        return (tetrahedra if self.dim == 3 else connectivity).face_points(self.cells, faces)
+
+    def face_corners(self, faces: np.ndarray) -> np.ndarray:
+        """The same by corners, element * 4 + k."""
+        if self.dim == 3:
+            return tetrahedra.face_corners(faces)
+        e, k = np.divmod(faces, 4)
+        return np.column_stack([faces, 4 * e + (k + 1) % connectivity.corner_counts(self.cells[e])])
+
     def edges(self) -> Edges:
-        """All edges, ascending by number. Computed again at each call."""
-        return edges_of(self.cells, len(self.points))
+        """All edges, in space all faces, ascending by number. Computed again at each call."""
+        return tetrahedra.faces_of(self.cells) if self.dim == 3 else edges_of(self.cells, len(self.points))
+
+    def find_edges(self, edges: Edges, points: np.ndarray) -> np.ndarray:
+        """(k,) i8 rows of `edges` with these points (k, 2), in space (k, 3); -1 where there is none."""
+        if self.dim == 3:
+            return tetrahedra.find_faces(edges, points)
+        return find_edges(edges, points, len(self.points))
+
+    def corner_clusters(self, partner: np.ndarray, apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes, see `connectivity.corner_clusters`."""
+        return (tetrahedra if self.dim == 3 else connectivity).corner_clusters(self.cells, partner, apart)
 
     def areas(self) -> np.ndarray:
-        """(ne,) [m2]."""
-        return areas(self.points, self.cells)
+        """(ne,) [m2], in space volumes [m3]."""
+        return (tetrahedra.volumes if self.dim == 3 else areas)(self.points, self.cells)
 
-    def centroids(self) -> np.ndarray:
-        """(ne, 2) [m]."""
-        return centroids(self.points, self.cells)
+    def centroids(self, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """(n, 2) [m], in space (n, 3), of these elements."""
+        return centres(self.points, self.cells[elements])
+
+    def mean_edge(self) -> float:
+        """Mean length of an edge [m]."""
+        if self.dim == 2:
+            ends = self.edges().points
+        else:
+            both = np.concatenate([self.cells[:, [a, b]] for a in range(3) for b in range(a + 1, 4)])
+            ends = np.unique(np.sort(both, axis=1), axis=0)
+        way = self.points[ends[:, 1]] - self.points[ends[:, 0]]
+        return float(np.sqrt((way * way).sum(axis=1)).mean())
 
 
-def _sorted_pairs(pairs: np.ndarray) -> np.ndarray:
-    return np.unique(np.sort(np.array(pairs, np.int64).reshape(-1, 2), axis=1), axis=0)
+def centres(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(n, 2), in space (n, 3), middles of elements [m]."""
+    return points[cells].mean(axis=1) if points.shape[1] == 3 else centroids(points, cells)
+
+
+def _sorted_pairs(pairs: np.ndarray, dim: int) -> np.ndarray:
+    return np.unique(np.sort(np.array(pairs, np.int64).reshape(-1, dim), axis=1), axis=0)
 
 
 def edge_rows(mesh: Mesh, edges: Edges, layer: str) -> np.ndarray:
     """Rows of `edges` that lie on a geometry layer; HpcdemError if the mesh knows no such layer."""
     if layer not in mesh.layers:
         raise HpcdemError(f"the mesh has no edges of a layer '{layer}' (layers: {_listed(mesh.layers)})")
-    return np.sort(find_edges(edges, mesh.layers[layer], len(mesh.points)))
+    return np.sort(mesh.find_edges(edges, mesh.layers[layer]))
 
 
 def crack_rows(mesh: Mesh, edges: Edges) -> np.ndarray:
     """Rows of `edges` for the rows of `mesh.cracks`, in their order."""
-    return find_edges(edges, mesh.cracks, len(mesh.points))
+    return mesh.find_edges(edges, mesh.cracks)
 
 
 def check(mesh: Mesh, source: str = "mesh") -> None:
@@ -113,8 +166,7 @@ def check(mesh: Mesh, source: str = "mesh") -> None:
 
 
 def _at(mesh: Mesh, point: int) -> str:
-    x, y = mesh.points[point]
-    return f"({x:g}, {y:g})"
+    return f"({', '.join(f'{c:g}' for c in mesh.points[point])})"
 
 
 def _element(mesh: Mesh, e: int) -> str:
@@ -132,7 +184,8 @@ def _bad_numbers(mesh: Mesh) -> str | None:
     if len(bad):
         return f"point {bad[0]} is not finite: {_at(mesh, int(bad[0]))}"
     n = len(mesh.points)
-    wrong = (mesh.cells[:, :3] < 0).any(axis=1) | (mesh.cells[:, 3] < -1) | (mesh.cells >= n).any(axis=1)
+    wrong = (mesh.cells[:, :3] < 0).any(axis=1) | (mesh.cells[:, 3] < (0 if mesh.dim == 3 else -1))
+    wrong |= (mesh.cells >= n).any(axis=1)
     bad = np.flatnonzero(wrong)
     if len(bad):
         return f"element {bad[0]} names points {mesh.cells[bad[0]].tolist()}, but points are numbered 0 to {n - 1}"
@@ -140,7 +193,16 @@ def _bad_numbers(mesh: Mesh) -> str | None:
 
 
 def _bad_shapes(mesh: Mesh) -> str | None:
-    """Each corner of a convex counter-clockwise element turns left."""
+    """Each corner of a convex counter-clockwise element turns left; a tetrahedron has a volume."""
+    if mesh.dim == 3:
+        side = tetrahedra.sides(mesh.points, mesh.cells)
+        longest = np.sqrt((side * side).sum(axis=2).max(axis=1))
+        volume = mesh.areas()
+        bad = np.flatnonzero(~(volume > FLAT * longest**3))
+        if not len(bad):
+            return None
+        inverted = volume[bad[0]] < -FLAT * longest[bad[0]] ** 3
+        return f"{_element(mesh, int(bad[0]))} {'is turned inside out (inverted)' if inverted else 'is flat'}"
     for n in (3, 4):
         rows = np.flatnonzero(connectivity.corner_counts(mesh.cells) == n)
         xy = mesh.points[mesh.cells[rows, :n]]
@@ -167,7 +229,8 @@ def _bad_points(mesh: Mesh) -> str | None:
     if not used.all():
         lost = int(np.flatnonzero(~used)[0])
         return f"point {lost} at {_at(mesh, lost)} belongs to no element"
-    a, b = mesh.points[mesh.cells[:, :3]], mesh.points[np.roll(mesh.cells[:, :3], -1, axis=1)]
+    corners = mesh.cells[:, : mesh.dim + 1]
+    a, b = mesh.points[corners], mesh.points[np.roll(corners, -1, axis=1)]
     shortest = float(np.sqrt(((b - a) ** 2).sum(axis=2)).min())
     twins = cKDTree(mesh.points).query_pairs(SAME * shortest, output_type="ndarray")
     if len(twins):
@@ -181,21 +244,29 @@ def _bad_points(mesh: Mesh) -> str | None:
 
 def _bad_edges(mesh: Mesh) -> str | None:
     partner = np.empty(4 * len(mesh.cells), np.int64)
-    face = connectivity._pair_faces(mesh.cells, len(mesh.points), partner)
+    if mesh.dim == 3:
+        face, what = tetrahedra.pair_faces(mesh.cells, partner), "face"
+    else:
+        face, what = connectivity._pair_faces(mesh.cells, len(mesh.points), partner), "edge"
     if face >= 0:
-        p, q = connectivity.face_points(mesh.cells, np.array([face]))[0]
-        both = np.flatnonzero((mesh.cells == p).any(axis=1) & (mesh.cells == q).any(axis=1))
+        points = mesh.face_points(np.array([face]))[0].tolist()
+        both = np.flatnonzero(np.all([(mesh.cells == p).any(axis=1) for p in points], axis=0))
         return _given_twice(mesh, face // 4) or (
-            f"the edge between points {p} and {q} at {_at(mesh, int(p))} is used by more than two elements: "
-            f"{', '.join(map(str, both[:5]))}"
+            f"the {what} between points {' and '.join(map(str, points))} at {_at(mesh, points[0])} is used by more "
+            f"than two elements: {', '.join(map(str, both[:5]))}"
         )
     lower = np.flatnonzero(partner > np.arange(len(partner)))
-    mine, other = (connectivity.face_points(mesh.cells, f) for f in (lower, partner[lower]))
-    bad = np.flatnonzero(mine[:, 0] == other[:, 0])
+    mine, other = (mesh.face_points(f) for f in (lower, partner[lower]))
+    # From outside of both elements the points of a common face run opposite ways.
+    if mesh.dim == 3:
+        after = (np.argmax(other == mine[:, :1], axis=1) + 1) % 3
+        bad = np.flatnonzero(other[np.arange(len(other)), after] == mine[:, 1])
+    else:
+        bad = np.flatnonzero(mine[:, 0] == other[:, 0])
     if len(bad):
         f = int(lower[bad[0]])
         return _given_twice(mesh, f // 4) or (
-            f"{_element(mesh, f // 4)} lies on the same side of a common edge as element {partner[f] // 4}"
+            f"{_element(mesh, f // 4)} lies on the same side of a common {what} as element {partner[f] // 4}"
         )
     return None
 
@@ -218,15 +289,18 @@ def _bad_names(mesh: Mesh) -> str | None:
             taken[rows] = True
     edges = mesh.edges()
     for name, pairs in mesh.layers.items():
-        rows = find_edges(edges, pairs, len(mesh.points))
+        rows = mesh.find_edges(edges, pairs)
         if (rows < 0).any():
-            p, q = pairs[np.flatnonzero(rows < 0)[0]]
-            return f"layer '{name}' has an edge between points {p} and {q}, but no element has"
+            lost = " and ".join(map(str, pairs[np.flatnonzero(rows < 0)[0]]))
+            return f"layer '{name}' has an edge between points {lost}, but no element has"
     if len(mesh.crack_sets) != len(mesh.cracks):
         return f"there are {len(mesh.cracks)} crack edges, but {len(mesh.crack_sets)} numbers of fracture sets"
-    rows = find_edges(edges, mesh.cracks, len(mesh.points))
+    rows = mesh.find_edges(edges, mesh.cracks)
     outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
     if len(outside):
-        p, q = mesh.cracks[outside[0]]
-        return f"a crack joins points {p} and {q} at {_at(mesh, int(p))}, but there is no edge inside a body"
+        points = mesh.cracks[outside[0]].tolist()
+        return (
+            f"a crack joins points {' and '.join(map(str, points))} at {_at(mesh, points[0])}, but there is no edge "
+            "inside a body"
+        )
     return None

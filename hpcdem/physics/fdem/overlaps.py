@@ -14,6 +14,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.definition import REFUSE, RELAX
 from hpcdem.physics.fdem.kernels import contact, detect
 from hpcdem.physics.fdem.pairs import Bodies
+from hpcdem.physics.fdem.pairs_space import AllPairs
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.local import Local
@@ -35,7 +36,8 @@ def check(sim: State, local: Local) -> None:
     if not len(found):
         return
     places = "; ".join(
-        f"elements {int(a)} and {int(b)} by {depth:.3g} m at ({x:g}, {y:g})" for depth, x, y, a, b in found[:NAMED]
+        f"elements {int(a)} and {int(b)} by {depth:.3g} m at ({', '.join(f'{c:g}' for c in place)})"
+        for depth, *place, a, b in found[:NAMED]
     )
     said = f"{len(found)} pairs of elements overlap before the first step, {places}"
     if o.overlap == REFUSE:
@@ -53,28 +55,47 @@ def check(sim: State, local: Local) -> None:
 
 
 def deepest(sim: State, local: Local) -> np.ndarray:
-    """Pairs of elements that overlap by more than rounding, on all ranks: (n, 5) depth [m], place [m], both numbers;
-    the deepest first. However deep they are: all elements count, not those at the surface alone. The model is closed.
-    Collective."""
+    """Pairs of elements that overlap by more than rounding, on all ranks: (n, 5), in space (n, 6), depth [m], place
+    [m], both numbers; the deepest first. However deep they are: all elements count, not those at the surface alone. The
+    model is closed. Collective."""
+    rows = _in_space(sim) if sim.dim == 3 else _in_the_plane(sim, local)
+    every = np.concatenate(sim.comm.allgather(rows))
+    every = every[np.lexsort((every[:, -1], every[:, -2], -every[:, 0]))]
+    _, once = np.unique(every[:, -2:], axis=0, return_index=True)  # of halves of quads, and of faces, the deepest one
+    return every[np.sort(once)]
+
+
+def _in_the_plane(sim: State, local: Local) -> np.ndarray:
+    """Those of this rank."""
     mesh, own = sim.the_mesh(), sim.owned
     bodies = Bodies(sim, local, np.arange(len(sim.number)), inner=True)
-    rows = np.empty((0, 5))
-    if len(bodies.row):
-        box, around = np.empty((len(bodies.row), 4)), np.empty((len(bodies.row), 4))
-        detect.boxes(bodies.x_place, bodies.free, sim.x, 0.0, box, around)
-        owned = (bodies.row >= own.start) & (bodies.row < own.stop)
-        first, second = detect.find(
-            box, around, bodies.element, bodies.number, owned, mesh.cells, sim.partner, sim.closed_faces()
-        )
-        depth = np.empty((len(first), 3))
-        if len(first):
-            contact.depths(first, second, bodies.free, bodies.x_place, sim.x, depth)
-        size = np.sqrt(sim.areas[bodies.element])
-        real = depth[:, 0] > ROUNDING * np.minimum(size[first], size[second])
-        real &= owned[first]  # a pair is told by the owner of its first element
-        one, other = bodies.element[first[real]], bodies.element[second[real]]
-        rows = np.column_stack([depth[real], np.minimum(one, other), np.maximum(one, other)])
-    every = np.concatenate(sim.comm.allgather(rows))
-    every = every[np.lexsort((every[:, 4], every[:, 3], -every[:, 0]))]
-    _, once = np.unique(every[:, 3:], axis=0, return_index=True)  # of halves of quads the deeper one
-    return every[np.sort(once)]
+    if not len(bodies.row):
+        return np.empty((0, 5))
+    box, around = np.empty((len(bodies.row), 4)), np.empty((len(bodies.row), 4))
+    detect.boxes(bodies.x_place, bodies.free, sim.x, 0.0, box, around)
+    owned = (bodies.row >= own.start) & (bodies.row < own.stop)
+    first, second = detect.find(
+        box, around, bodies.element, bodies.number, owned, mesh.cells, sim.partner, sim.closed_faces()
+    )
+    depth = np.empty((len(first), 3))
+    if len(first):
+        contact.depths(first, second, bodies.free, bodies.x_place, sim.x, depth)
+    real = owned[first]  # a pair is told by the owner of its first element
+    return _named(depth[real], bodies.element[first[real]], bodies.element[second[real]], np.sqrt(sim.areas))
+
+
+def _in_space(sim: State) -> np.ndarray:
+    """Those of this rank."""
+    pairs, own = AllPairs(sim), sim.owned
+    depth = pairs.depths(sim)
+    row = pairs.face_row[pairs.first]
+    real = (row >= own.start) & (row < own.stop)  # a pair is told by the owner of its face
+    first, second = pairs.first[real], pairs.second[real]
+    return _named(depth[real], pairs.face[first] // 4, pairs.element[second], np.cbrt(sim.areas))
+
+
+def _named(depth: np.ndarray, one: np.ndarray, other: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Rows of those that are more than rounding; depth (n, 3 or 4), and where; size: of all elements [m]."""
+    real = depth[:, 0] > ROUNDING * np.minimum(size[one], size[other])
+    one, other = one[real], other[real]
+    return np.column_stack([depth[real], np.minimum(one, other), np.maximum(one, other)])

@@ -19,6 +19,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import Rows
 
 if TYPE_CHECKING:
+    from hpcdem.physics.fdem.pairs_space import ShapesSpace
     from hpcdem.physics.fdem.state import State
 
 
@@ -35,8 +36,12 @@ class Shapes:
     """Geometry in the mesh of the elements `numbers` (n,), and what contact needs to know of their joints.
 
     length (n, 4) of the edges [m]; double_area: twice the area of a body [m2]; slender: mean edge squared over that;
-    overlay: smallest overlay penalty of the element's joints [Pa], NaN without joints.
+    overlay: smallest overlay penalty of the element's joints [Pa], NaN without joints. Where surfaces lie flat on each
+    other pressure is slope P d (1 / h_1 + 1 / h_2); an element has nodes corners; no element is less slender than
+    `least`.
     """
+
+    slope, nodes, least = 3.0, 3.0, 1.0
 
     def __init__(self, sim: State, numbers: np.ndarray) -> None:
         mesh = sim.mesh
@@ -53,10 +58,16 @@ class Shapes:
         self.double_area = 2.0 * sim.areas[numbers] / (n - 2)
         self.edge = self.length.sum(axis=1) / n
         self.slender = self.edge**2 / self.double_area
-        overlay = np.array(sim.joint_rows.column("penalty_overlay"))
-        overlay[0] = np.inf
-        self.overlay = overlay[sim.joint_row[4 * numbers[:, None] + np.arange(4)]].min(axis=1)
-        self.overlay[np.isinf(self.overlay)] = np.nan
+        self.overlay = smallest_overlay(sim, numbers)
+
+
+def smallest_overlay(sim: State, numbers: np.ndarray) -> np.ndarray:
+    """(n,) smallest overlay penalty of the joints of elements [Pa], NaN without joints."""
+    overlay = np.array(sim.joint_rows.column("penalty_overlay"))
+    overlay[0] = np.inf
+    out = overlay[sim.joint_row[4 * numbers[:, None] + np.arange(4)]].min(axis=1)
+    out[np.isinf(out)] = np.nan
+    return out
 
 
 class Kinds(NamedTuple):
@@ -99,7 +110,7 @@ class Surfaces:
     NaN without joints; young [Pa], density [kg/m3].
     """
 
-    def __init__(self, sim: State, shapes: Shapes, faces: np.ndarray, rows: np.ndarray) -> None:
+    def __init__(self, sim: State, shapes: Shapes | ShapesSpace, faces: np.ndarray, rows: np.ndarray) -> None:
         model, joint, element = sim.face_row[faces], sim.joint_row[faces], sim.element_row[faces // 4]
 
         def of_elements(name: str) -> np.ndarray:
@@ -120,13 +131,14 @@ class Surfaces:
         self.tan_phi = np.where(model > 0, tan_f[model], np.where(joint > 0, tan_j[joint], tan_e[element]))
         self.most, self.exponent = of_model("damping_t", np.inf), of_model("damping_b", 1.0)
         self.ratio = of_model("damping_ratio", 0.0)
+        self.slope, self.nodes, self.least = shapes.slope, shapes.nodes, shapes.least
         self.slender, self.double_area, self.edge = shapes.slender[rows], shapes.double_area[rows], shapes.edge[rows]
 
     def most_penalty(self, among: bool) -> np.ndarray:
         """Largest normal penalty (n,) [Pa] that any pair of a face can have; among: all elements of the model have
         joints and leave their contact to them."""
         usual = 10.0 * self.young
-        tied = self.overlay / (3.0 * (self.slender + 1.0))  # no element is less slender than a square
+        tied = self.overlay / (self.slope * (self.slender + self.least))
         silent = np.where(np.isnan(tied), usual, tied if among else np.fmax(usual, tied))
         return np.where(np.isnan(self.normal), silent, self.normal)
 
@@ -147,7 +159,7 @@ class Surfaces:
         """
         both = np.fmin(overlay, np.minimum(self.overlay[i], other.overlay[j]))
         exact = shared / self.double_area[i] + shared / other.double_area[j]
-        tied = both / (3.0 * np.where(shared > 0.0, exact, self.slender[i] + other.slender[j]))
+        tied = both / (self.slope * np.where(shared > 0.0, exact, self.slender[i] + other.slender[j]))
         usual_i, usual_j = 10.0 * self.young[i], 10.0 * other.young[j]
         silent = np.isnan(self.normal[i]) & np.isnan(other.normal[j])
         normal = np.fmin(np.where(np.isnan(self.normal[i]), usual_i, self.normal[i]),
@@ -165,8 +177,8 @@ class Surfaces:
         if not self.ratio.any() and not other.ratio.any():
             return out
         per_i, per_j = self.edge[i] / self.double_area[i], other.edge[j] / other.double_area[j]
-        mass = 1.0 / (3.0 * (per_i / self.density[i] + per_j / other.density[j]))
-        out[:, 5] = np.maximum(self.ratio[i], other.ratio[j]) * np.sqrt(3.0 * normal * (per_i + per_j) * mass)
+        mass = 1.0 / (self.nodes * (per_i / self.density[i] + per_j / other.density[j]))
+        out[:, 5] = np.maximum(self.ratio[i], other.ratio[j]) * np.sqrt(self.slope * normal * (per_i + per_j) * mass)
         return out
 
 

@@ -128,11 +128,12 @@ class ForceProbe(Probe):
     def _mine(self, seen: Evaluation | Local | None) -> np.ndarray:
         sim = self.sim
         seen = sim.evaluate() if seen is None else seen
-        axis = 0 if self.name.endswith("x") else 1
+        axis = "xyz".index(self.name[-1])
         found = seen.outside[self._nodes, axis]
         if self.name.startswith("unbalanced"):
             i, k = self._corners
-            found = np.concatenate([found + seen.felt[self._nodes, axis], seen.force[sim.owned][i, 2 * k + axis]])
+            alone = seen.force[sim.owned][i, sim.stride * k + axis]
+            found = np.concatenate([found + seen.felt[self._nodes, axis], alone])
         return found
 
     def values(self, seen: Evaluation | Local | None = None) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,8 @@ class Property:
     """May be left out without a default: it then follows from several others."""
     softens: bool = False
     """A table over plastic strain may stand for it."""
+    warms: bool = False
+    """A table over temperature may stand for it."""
     internal: bool = False
     """Given by the program, not by name."""
     otherwise: str = ""
@@ -186,6 +188,26 @@ def softening_table(name: str) -> str:
     return f"{name}_table"
 
 
+def temperature_table(name: str) -> str:
+    """The same of its table over temperature."""
+    return f"{name}_by_temperature"
+
+
+def softening_rows(rows: Rows) -> np.ndarray:
+    """(rows,) bool: models that yield with a strength that follows a table, over plastic strain or temperature."""
+    names = (*map(softening_table, SOFTENS), temperature_table("cohesion"), temperature_table("tensile"))
+    yields = np.array([rows.name(row) == MECH_MOHR_COULOMB.name for row in range(len(rows))])
+    return yields & np.any([rows.column(name) > 0.0 for name in names], axis=0)
+
+
+def _warming(*properties: Property) -> tuple[Property, ...]:
+    """The internal properties of those that can follow a table over temperature."""
+    return tuple(
+        Property(temperature_table(one.name), "", f"table of {one.name} over temperature", 0.0, internal=True)
+        for one in properties if one.warms
+    )  # fmt: skip
+
+
 def _strength(values: dict[str, Any]) -> None:
     """All four moduli; no more dilation than friction, or flow would give energy."""
     _elastic(values)
@@ -237,31 +259,39 @@ _SOLID = (
              "runs", 0.0),
 )  # fmt: skip
 
+_WARM_SOLID = tuple(replace(one, warms=one.name == "young") for one in _SOLID)
+_ELASTIC = (
+    _friction("friction angle of its surfaces where they have no contact model"),
+    Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
+             "joints, or 10 E", 0.0),
+)  # fmt: skip
+
 MECH_ISO_ELASTIC = Model(
     "mech_iso_elastic",
     ELEMENT,
     "isotropic, elastic, large rotations",
-    (
-        *_SOLID,
-        _friction("friction angle of its surfaces where they have no contact model"),
-        Property("penalty", "Pa", "contact penalty of its surfaces where they have no contact model; 0: that of its "
-                 "joints, or 10 E", 0.0),
-    ),
+    (*_WARM_SOLID, *_ELASTIC, *_warming(*_WARM_SOLID)),
     _elastic,
-)  # fmt: skip
+)
 
+_WARM_STRENGTH = (
+    Property("cohesion", "Pa", "cohesion", softens=True, warms=True),
+    Property(
+        "tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True, warms=True
+    ),
+)
 MECH_MOHR_COULOMB = Model(
     "mech_mohr_coulomb",
     ELEMENT,
     "elastic up to the strength of Mohr and Coulomb or in tension, then plastic",
     (
-        *_SOLID,
+        *_WARM_SOLID,
         _friction("internal friction angle; also that of its surfaces where they have no contact model", softens=True),
-        Property("cohesion", "Pa", "cohesion", softens=True),
-        Property("tensile", "Pa", "tensile strength; no more than cohesion / tan(friction) counts", softens=True),
+        *_WARM_STRENGTH,
         Property("dilation", "degrees", "dilation angle, at most the friction angle", 0.0, high=89.0, softens=True),
         *(Property(softening_table(name), "", f"table of {name} over plastic strain", 0.0, internal=True)
           for name in SOFTENS),
+        *_warming(*_WARM_SOLID, *_WARM_STRENGTH),
     ),
     _strength,
 )  # fmt: skip
@@ -270,7 +300,7 @@ USER = Model(
     "user",
     ELEMENT,
     "a law of the user, in a Python file: what its elements have beside what the law declares",
-    MECH_ISO_ELASTIC.properties,
+    (*_SOLID, *_ELASTIC),
     _elastic,
 )  # fmt: skip
 
@@ -322,21 +352,25 @@ CONTACT_MOHR_COULOMB = Model(
     ),
 )  # fmt: skip
 
+_WARM_JOINT = (
+    Property("cohesion", "Pa", "cohesion; 0: friction alone", warms=True),
+    Property("tensile_strength", "Pa", "tensile strength; 0: none", warms=True),
+    Property("gf1", "N/m", "fracture energy, mode I", warms=True),
+    Property("gf2", "N/m", "fracture energy, mode II", warms=True),
+)
 COHESIVE = Model(
     "classic_intrinsic_cohesive_interface",
     JOINT,
     "cohesive zone that breaks in tension, in shear, or both",
     (
         _friction("friction angle"),
-        Property("cohesion", "Pa", "cohesion; 0: friction alone"),
-        Property("tensile_strength", "Pa", "tensile strength; 0: none"),
-        Property("gf1", "N/m", "fracture energy, mode I"),
-        Property("gf2", "N/m", "fracture energy, mode II"),
+        *_WARM_JOINT,
         Property("penalty_normal", "Pa", "penalty of opening", otherwise="10 E", low_itself=False),
         Property("penalty_overlay", "Pa", "penalty of a closed joint", optional=True, follows="penalty_normal",
                  otherwise="that of opening", low_itself=False),
         Property("penalty_shear", "Pa", "penalty of shear", optional=True, follows="penalty_normal",
                  otherwise="that of opening", low_itself=False),
+        *_warming(*_WARM_JOINT),
     ),
     lambda values: _cohesive(values),
 )  # fmt: skip

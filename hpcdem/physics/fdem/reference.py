@@ -1,10 +1,11 @@
-"""What elements.py, plasticity.py, joints.py and nodes.py compute, written plainly for one element, joint or node, in
-small matrices. To be read beside them; tests hold the two against each other."""
+"""What elements.py, tets.py, plasticity.py, joints.py and nodes.py compute, written plainly for one element, joint or
+node, in small matrices. To be read beside them; tests hold the two against each other."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,8 @@ class Solid(NamedTuple):
 
 class Deformation(NamedTuple):
     """Of a triangle: strain U - 1 and its rate [1/s] in the turned frame, rotation R, all (2, 2), and gradients (3, 2)
-    [1/m] of the shape functions and area [m2], both of the present triangle, or of the mesh if strains are small."""
+    [1/m] of the shape functions and area [m2], both of the present triangle, or of the mesh if strains are small. Of a
+    tetrahedron (3, 3), (4, 3) and its volume [m3]."""
 
     strain: np.ndarray
     rate: np.ndarray
@@ -38,24 +40,26 @@ class Deformation(NamedTuple):
 
 
 def deformation(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, small: bool) -> Deformation:
-    """From the corners (3, 2) of a triangle in the mesh and now [m] and their velocities [m/s]: F = R U."""
+    """From the corners (3, 2) of a triangle, (4, 3) of a tetrahedron, in the mesh and now [m] and their velocities
+    [m/s]: F = R U."""
+    one = np.eye(mesh.shape[1])
     per_mesh = np.linalg.inv((mesh[1:] - mesh[0]).T)
     f, df = (x[1:] - x[0]).T @ per_mesh, (v[1:] - v[0]).T @ per_mesh
     left, _, right = np.linalg.svd(f)
-    r = ONE if small else left @ right
-    strain, rate = r.T @ f - ONE, r.T @ df
+    r = one if small else left @ right
+    strain, rate = r.T @ f - one, r.T @ df
     edges = ((mesh if small else x)[1:] - (mesh if small else x)[0]).T
-    gradients = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]) @ np.linalg.inv(edges)
-    return Deformation(
-        0.5 * (strain + strain.T), 0.5 * (rate + rate.T), r, gradients, 0.5 * float(np.linalg.det(edges))
-    )
+    gradients = np.vstack([-np.ones(len(one)), one]) @ np.linalg.inv(edges)
+    size = float(np.linalg.det(edges)) / factorial(len(one))
+    return Deformation(0.5 * (strain + strain.T), 0.5 * (rate + rate.T), r, gradients, size)
 
 
 def forces_of_strain(d: Deformation, strain: np.ndarray, rate: np.ndarray, solid: Solid) -> np.ndarray:
     """Forces (3, 2) [N/m] on the corners: f_l = -A sigma grad N_l, sigma = R (sigma_0 + lambda tr(e) + 2 mu e + eta
     de/dt) R^T, e the strain and beta times its rate."""
     strain = strain + solid.beta * rate
-    sigma = solid.stress0 + solid.lame * np.trace(strain) * ONE + solid.two_mu * strain + solid.eta * rate
+    sigma = solid.stress0 + solid.lame * np.trace(strain) * np.eye(len(strain))
+    sigma = sigma + solid.two_mu * strain + solid.eta * rate
     return -d.area * d.gradients @ (d.rotation @ sigma @ d.rotation.T)
 
 
@@ -63,6 +67,11 @@ def triangle_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid
     """Forces (3, 2) [N/m] of the stress of a constant-strain triangle on its corners; mesh, x, v (3, 2)."""
     d = deformation(mesh, x, v, solid.small)
     return forces_of_strain(d, d.strain, d.rate, solid)
+
+
+def tetrahedron_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
+    """The same (4, 3) [N] of a tetrahedron; mesh, x, v (4, 3)."""
+    return triangle_forces(mesh, x, v, solid)
 
 
 def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:

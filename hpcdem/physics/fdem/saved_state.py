@@ -76,13 +76,13 @@ def tables(sim: Blocks) -> dict[str, Table]:
         return {}
     root = sim.comm.rank == 0
     tables = {
-        "mesh_points": _whole({"x": sim.mesh.points[:, 0], "y": sim.mesh.points[:, 1]}, root),
+        "mesh_points": _whole(dict(zip("xyz", sim.mesh.points.T)), root),
         "mesh_cells": _whole({f"corner_{k}": sim.mesh.cells[:, k] for k in range(4)}, root),
     }
     for kind, names in ARRAYS.items():
         tables[kind] = _whole({name: getattr(sim, name).astype(np.int64) for name in names}, root)
     if sim.stress0 is not None:
-        stress0 = {f"s{k}": sim.stress0[:, k] for k in range(4)}
+        stress0 = {f"s{k}": sim.stress0[:, k] for k in range(sim.stress0.shape[1])}
         tables["stress0"] = _whole({**stress0, "row": sim.stress0_row.astype(np.int64)}, root)
     if len(sim.born):
         born_at = sim.birthplace.reshape(-1, 8)
@@ -166,15 +166,15 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     user_functions.check_restored(state["scene"])
     sim.clear()
     if state["mesh"] is not None:
-        points = np.column_stack([tables["mesh_points"][c] for c in "xy"])
+        points = np.column_stack([tables["mesh_points"][c] for c in "xyz" if c in tables["mesh_points"]])
         cells = np.column_stack([tables["mesh_cells"][f"corner_{k}"] for k in range(4)])
         about = state["mesh"]
         mesh = Mesh(
             points,
             cells,
             {s: {g: np.array(rows, np.int64) for g, rows in of.items()} for s, of in about["groups"].items()},
-            {name: np.array(pairs, np.int64).reshape(-1, 2) for name, pairs in about["layers"].items()},
-            np.array(about["cracks"], np.int64).reshape(-1, 2),
+            {name: np.array(rows, np.int64).reshape(-1, points.shape[1]) for name, rows in about["layers"].items()},
+            np.array(about["cracks"], np.int64).reshape(-1, points.shape[1]),
             np.array(about["crack_sets"], np.int64),
         )
         sim.place_mesh(mesh)
@@ -183,7 +183,8 @@ def put(sim: Blocks, state: dict[str, Any], tables: checkpoint.Tables) -> None:
                 array = getattr(sim, name)
                 array[:] = tables[kind][name].astype(array.dtype)
         if "stress0" in tables:
-            sim.stress0 = np.column_stack([tables["stress0"][f"s{k}"] for k in range(4)])
+            of = tables["stress0"]
+            sim.stress0 = np.column_stack([of[f"s{k}"] for k in range(6) if f"s{k}" in of])
             # In files without this column an initial stress did not follow the moduli: it is that of the present ones.
             sim.stress0_row[:] = tables["stress0"].get("row", sim.element_row)
         if "born" in tables:

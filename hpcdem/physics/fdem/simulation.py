@@ -28,18 +28,19 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, connectivity, overlaps, user_laws
-from hpcdem.physics.fdem.definition import Numbers
+from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, user_laws
+from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
-from hpcdem.physics.fdem.kernels import elements, plasticity
+from hpcdem.physics.fdem.kernels import elements, plasticity, space, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
 from hpcdem.physics.fdem.local import Evaluation, Local
+from hpcdem.physics.fdem.local_space import LocalSpace
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.pairs import cut_corner
-from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS
+from hpcdem.physics.fdem.properties import KELVIN_STRAIN, MECH_BURGERS, temperature_table
 from hpcdem.physics.fdem.state import NARROW, WIDE, Crack, ListState, State
 from hpcdem.physics.fdem.tables import Value
 
@@ -97,16 +98,20 @@ class Blocks(State):
         self._longest = 0.0
         self.untouched = True
         self.budget = None
-        self.areas, self.cut = mesh.areas(), cut_corner(mesh)
-        edges = mesh.edges().points
-        way = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-        self.mean_edge = float(np.sqrt((way * way).sum(axis=1)).mean())
+        if mesh.dim == 3:
+            self.prepare_kernels("space")
+        self.areas, self.mean_edge = mesh.areas(), mesh.mean_edge()
+        self.cut = cut_corner(mesh) if mesh.dim == 2 else np.empty(0, np.int64)
         n, size, rank = len(mesh.cells), self.comm.size, self.comm.rank
         self.number = np.arange(n * rank // size, n * (rank + 1) // size)
-        wide = bool((mesh.cells[:, 3] >= 0).any())
-        self.x = np.zeros((len(self.number), 12 if wide else 8))
-        self.v = np.zeros((len(self.number), 12 if wide else 6))
-        build.corners(mesh.points, mesh.cells, self.number, self.x)
+        if mesh.dim == 3:
+            self.x, self.v = (np.zeros((len(self.number), tets.ROW)) for _ in range(2))
+            space.corners(mesh.points, mesh.cells, self.number, self.x)
+        else:
+            wide = bool((mesh.cells[:, 3] >= 0).any())
+            self.x = np.zeros((len(self.number), 12 if wide else 8))
+            self.v = np.zeros((len(self.number), 12 if wide else 6))
+            build.corners(mesh.points, mesh.cells, self.number, self.x)
         self.cold = {}
         self.histories = Histories.empty(len(self.number))
 
@@ -186,15 +191,17 @@ class Blocks(State):
         collision: bool | None = None,
         large_strain: bool | None = None,
         overlap: str | None = None,
+        potential: str | None = None,
     ) -> None:
         """dynamic (on): motion in time; off: dynamic relaxation to the static state. Velocities become zero when it is
         changed, as those of the static mode are ways per step. collision (on): contact. large_strain (on): rotations of
         any size; off: geometry of the mesh. overlap ("refuse"): of bodies that overlap before the first step: refuse
-        it; "relax": a static stage moves them apart; "keep": they start as they are."""
+        it; "relax": a static stage moves them apart; "keep": they start as they are. potential ("distance"): of contact
+        in space, see `definition.POTENTIAL`."""
         before = self.options.dynamic
         if dynamic is not None and dynamic != before:
             self.drop_creep_step()
-        super().option(dynamic, collision, large_strain, overlap)
+        super().option(dynamic, collision, large_strain, overlap, potential)
         if self.options.dynamic != before:
             self.v[:] = 0.0
 
@@ -277,6 +284,8 @@ class Blocks(State):
     def _check_parts(self) -> None:
         """CommandError for what was said of parts of the calculation that are not there."""
         o = self.options
+        if self.dim == 2 and o.potential != DISTANCE:
+            raise CommandError("in two dimensions there is no choice of the potential of contact")
         flows = o.hydraulic and "fluid" in self.surface_loads
         heated = o.thermal and "heat" in self.surface_loads
         if not o.mechanical:
@@ -309,7 +318,8 @@ class Blocks(State):
 
     def _drift(self, first: int, last: int) -> None:
         """Move the owned elements first : last by dt."""
-        kernel = elements.drift if self.threads == 1 else elements.drift_threaded
+        of = tets if self.dim == 3 else elements
+        kernel = of.drift if self.threads == 1 else of.drift_threaded
         kernel(self.threads, self.n_left + first, self.n_left + last, self.x, self.v, self.clock.dt)
 
     def _check_rebuild(self) -> tuple[bool, bool, int]:
@@ -320,8 +330,11 @@ class Blocks(State):
         """
         rebuild_state, cells = self.rebuild_state, self.the_mesh().cells
         found, more = np.zeros(8), np.zeros(4)
-        build.survey(self.x, self.v, self.listed, self.n_left, self.n_own, cells, self.number, found)
-        build.survey(self.x, self.v, self.origin, self.n_left, self.n_own, cells, self.number, more)
+        for places, out in ((self.listed, found), (self.origin, more)):
+            if self.dim == 3:
+                space.survey(self.x, self.v, places, self.n_left, self.n_own, out)
+            else:
+                build.survey(self.x, self.v, places, self.n_left, self.n_own, cells, self.number, out)
         found[4] = float(self.local.tally[:, elements.NEW_BROKEN].sum())
         found[5] = float(self.local.tally[:, elements.NEW_YIELDED].sum())
         found[6] = self.stop.local_request() if self.stop is not None else 0
@@ -350,33 +363,43 @@ class Blocks(State):
 
     def _stop_on_runaway(self, broken: bool, inverted: bool) -> None:
         """Name the elements that cannot be right, and stop on all ranks: raises PhysicsError. Collective."""
-        cells = self.the_mesh().cells
         x, v, number = self.x[self.owned], self.v[self.owned], self.number[self.owned]
-        corners = connectivity.corner_counts(cells[number])
         with np.errstate(invalid="ignore", over="ignore"):
-            speed = np.hypot(v[:, 0:6:2], v[:, 1:6:2]).max(axis=1)
-            turn = _turn(x, 0, 2, 4)
-            bad = ~np.isfinite(x[:, :6]).all(axis=1) | ~(speed * self.clock.dt <= 0.5 * self.mean_edge) | ~(turn > 0.0)
-            if self.wide:
-                bad |= (corners == 4) & ~(_turn(x, 0, 4, 6) > 0.0)
+            bad = ~(self._whole_speed(v) * self.clock.dt <= 0.5 * self.mean_edge) | ~self._upright(x, number)
         rows = np.flatnonzero(bad)[np.argsort(number[bad])][:10]
-        mine = [(int(number[i]), float(x[i, 0]), float(x[i, 1]), float(v[i, 0]), float(v[i, 1])) for i in rows]
+        dim = self.dim
+        mine = [(int(number[i]), x[i, :dim].tolist(), v[i, :dim].tolist()) for i in rows]
         named = sorted(row for part in self.comm.allgather(mine) for row in part)[:10]
         total = int(self.comm.sum_into(np.array([bad.sum()], np.int64))[0])
         what = "a number is not finite" if broken else (
             "an element is turned inside out" if inverted else "an element moves over half an edge per step"
         )  # fmt: skip
-        text = "\n".join(f"  element {e} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g})" for e, x, y, vx, vy in named)
+        text = "\n".join(f"  element {e} at {_vector(at)}, velocity {_vector(speed)}" for e, at, speed in named)
         if not self.options.dynamic and not broken and not inverted:
-            e, x, y, vx, vy = named[0]
+            e, at, speed = named[0]
             raise EquilibriumError(
                 f"step {self.clock.step}: {total} elements move over half an edge per static step, such as element {e} "
-                f"at ({x:g}, {y:g}) by ({vx:g}, {vy:g})"
+                f"at {_vector(at)} by {_vector(speed)}"
             )
         raise PhysicsError(
             f"step {self.clock.step}: {what} ({total} elements); the time step {self.clock.dt:g} s is probably too "
             f"large, or loads are\n{text}"
         )
+
+    def _whole_speed(self, v: np.ndarray) -> np.ndarray:
+        """Largest speed of a corner of elements [m/s]; the fourth corner of quads is not asked for."""
+        corners = v[:, :6].reshape(len(v), 3, 2) if self.dim == 2 else v.reshape(len(v), 4, 4)
+        return np.sqrt((corners * corners).sum(axis=2)).max(axis=1)
+
+    def _upright(self, x: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """(n,) bool: elements whose corners are finite and run the right way."""
+        if self.dim == 3:
+            return np.array([space.volume(row) > 0.0 for row in x], bool)
+        good = np.isfinite(x[:, :6]).all(axis=1) & (_turn(x, 0, 2, 4) > 0.0)
+        if self.wide:
+            quads = connectivity.corner_counts(self.the_mesh().cells[number]) == 4
+            good &= ~quads | (_turn(x, 0, 4, 6) > 0.0)
+        return good
 
     # ---- forces without a step -------------------------------------------------------------------------------------
 
@@ -410,9 +433,7 @@ class Blocks(State):
         if not self.closed:
             return
         with self.timers("neighbour"):
-            mesh = self.the_mesh()
-            middle = np.empty((len(self.number), 2))
-            build.middles(self.x, mesh.cells, self.number, middle)
+            middle, _ = self._middles()
             local = self.local
             longest2 = build.longest_link(
                 middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state
@@ -502,7 +523,6 @@ class Blocks(State):
     def _close(self, frozen: bool = False) -> None:
         """From open to closed. frozen: keep the rebuild_state as it is (restart)."""
         self._check_ready()
-        mesh = self.the_mesh()
         if self.yielding().any():
             self._remember("plastic", plasticity.MEMORY)
             if self.softens():
@@ -525,18 +545,17 @@ class Blocks(State):
                 self.renew_topology()
             if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
-            middle = np.empty((len(self.number), 2))
-            radius = build.middles(self.x, mesh.cells, self.number, middle)
+            middle, radius = self._middles()
             self._choose_reach(radius, 0.0 if frozen else self.surface_loads.reach(self, middle), frozen)
         middle = self._share_out(middle)
         with self.timers("neighbour"):
-            cell = keys(middle, self.rebuild_state.side)
+            cell = self._keys(middle)
             order = strips.global_order(cell, self.number)
             cell = cell[order]
         with self.timers("halo"):
             self._store(order, cell)
         with self.timers("neighbour"):
-            self.local = Local(self)
+            self.local = LocalSpace(self) if self.dim == 3 else Local(self)
             if not frozen:
                 self.origin = self.x[self.owned].copy()
                 self.listed = self.origin.copy()
@@ -553,10 +572,30 @@ class Blocks(State):
             raise CommandError(f"element {bare[0]} has no model ({len(bare)} elements in all)")
         if not self.alive.any():
             raise CommandError("there are no elements left")
+        self._check_warmth()
         if self.options.stiffness_damping and user_laws.in_use(self):
             raise CommandError(
                 f"the stiffness of {user_laws.some(self)}, which has a law of the user, is not known: Rayleigh damping "
                 "can have its part mass only"
+            )
+
+    def _check_warmth(self) -> None:
+        """CommandError where properties follow temperatures that are not there, or surroundings that cannot follow."""
+        elements, joints = self.warms()
+        if by_temperature.TEMPERATURE not in self.cold:
+            for what, at in (("element", elements), ("joint", joints)):
+                if at.any():
+                    raise CommandError(
+                        f"a property of {what} {np.flatnonzero(at)[0]} follows a table over temperature, but there is "
+                        "no heat: element c-model thermal-iso-heat for all"
+                    )
+        soft = elements & (self.element_rows.column(temperature_table("young"))[self.element_row] > 0.0)
+        beside = np.flatnonzero(self.quiet_faces() & np.repeat(soft, 4))
+        if len(beside) or (soft.any() and "free_field" in self.surface_loads):
+            element = beside[0] // 4 if len(beside) else np.flatnonzero(soft)[0]
+            raise CommandError(
+                f"young of element {element} follows a table over temperature: quiet faces and free-field sides have "
+                "dashpots of one modulus, a number"
             )
 
     def renew_topology(self) -> None:
@@ -565,7 +604,7 @@ class Blocks(State):
         apart = (self.joint_row > 0) | self.open
         dead = np.repeat(~self.alive, 4)
         apart |= dead
-        node, lead = connectivity.corner_clusters(mesh.cells, self.partner, apart)
+        node, lead = mesh.corner_clusters(self.partner, apart)
         node[~self.alive] = -1
         self.node = node
         self.node_sizes = np.bincount(node[node >= 0], minlength=len(lead))
@@ -577,6 +616,18 @@ class Blocks(State):
         self.where = np.full(len(mesh.cells), -1, np.int64)
         self.unused = np.full(len(lead), -1, np.int64)
         self._topology_stale = False
+
+    def _middles(self) -> tuple[np.ndarray, float]:
+        """Means of the corners of the elements held here (n, 2), in space (n, 3) [m], and the largest distance of a
+        corner from it."""
+        middle = np.empty((len(self.number), self.dim))
+        if self.dim == 3:
+            return middle, space.middles(self.x, middle)
+        return middle, build.middles(self.x, self.the_mesh().cells, self.number, middle)
+
+    def _keys(self, middle: np.ndarray) -> np.ndarray:
+        """Cells of elements by their middles."""
+        return (space.keys if self.dim == 3 else keys)(middle, self.rebuild_state.side)
 
     def _choose_reach(self, radius: float, of_loads: float, frozen: bool) -> None:
         """Buffer and cell side for the next lists, from global values only; of_loads: see `SurfaceLoad.reach`."""
@@ -596,7 +647,7 @@ class Blocks(State):
         Returns the middles of the elements that are owned now (n, 2) [m].
         """
         side = self.rebuild_state.side
-        cell = keys(middle, side)
+        cell = self._keys(middle)
         with self.timers("balance"):
             self.ownership.renew(columns(cell), side, self.clock.step, self.timers.seconds(), None, self._costs())
         with self.timers("migrate"):
@@ -681,7 +732,11 @@ class Blocks(State):
 
 
 def _pascals(stress: np.ndarray) -> str:
-    return ", ".join(f"{name} {value:.4g}" for name, value in zip(("xx", "yy", "xy", "zz"), stress)) + " Pa"
+    return ", ".join(f"{name} {value:.4g}" for name, value in zip(COMPONENTS[3], stress)) + " Pa"
+
+
+def _vector(given: Sequence[float]) -> str:
+    return f"({', '.join(f'{c:g}' for c in given)})"
 
 
 def _turn(x: np.ndarray, a: int, b: int, c: int) -> np.ndarray:

@@ -134,6 +134,8 @@ class State(ModelDefinition, Model):
         self._topology_stale = True
         self._longest = 0.0
         self.mean_edge = 0.0
+        self.surface: Any = None
+        """In space: what contact knows of the surface, see `pairs_space.Surface`."""
         self.untouched = True
         """Nothing has moved since there is this mesh."""
         self._told_step = 0.0
@@ -149,6 +151,11 @@ class State(ModelDefinition, Model):
     def wide(self) -> bool:
         """There are quads: rows of positions and velocities have twelve columns."""
         return self.x.shape[1] == 12
+
+    @property
+    def stride(self) -> int:
+        """Words from one corner of a row of positions or velocities to the next."""
+        return 4 if self.dim == 3 else 2
 
     @property
     def element_parts(self) -> int:

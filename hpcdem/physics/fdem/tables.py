@@ -1,5 +1,5 @@
-"""Tables: piecewise linear functions of model time, of a coordinate or of plastic strain, constant beyond their ends;
-what may stand for the number of a property."""
+"""Tables: piecewise linear functions of model time, of a coordinate, of plastic strain or of temperature, constant
+beyond their ends; what may stand for the number of a property."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hpcdem.core.errors import CommandError
 
 @dataclass(frozen=True)
 class Table:
-    """times (n,) f8 [s], strictly ascending, or coordinates [m], or plastic strains; values (n,) f8."""
+    """times (n,) f8 [s], strictly ascending, or coordinates [m], plastic strains, temperatures [K]; values (n,) f8."""
 
     times: np.ndarray
     values: np.ndarray
@@ -49,14 +49,14 @@ class Table:
         return np.column_stack([self.times, self.values]).tolist()
 
 
-AXES = ("x", "y", "plastic-strain")
-"""What a property can follow a table over."""
-PLASTIC_STRAIN = 2
+AXES = ("x", "y", "plastic-strain", "temperature")
+"""What a property can follow a table over: from place to place, or with what an object goes through."""
+PLASTIC_STRAIN, TEMPERATURE = 2, 3
 
 
 @dataclass(frozen=True)
 class Over:
-    """A property that follows a table over one of `AXES` (its number): a coordinate in the mesh, or plastic strain."""
+    """A property that follows a table over one of `AXES` (its number), the first two coordinates in the mesh."""
 
     table: str
     axis: int

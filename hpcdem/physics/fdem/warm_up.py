@@ -137,6 +137,27 @@ def _creep(mesh: Mesh, threads: int) -> None:
     creep.finish(sim, 1.0)
 
 
+def in_space(threads: int = 1) -> None:
+    """Those of tetrahedra: in motion with conditions and loads, and at rest."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+    below = [(x, y, z - 1.001) for x, y, z in points[:4]]
+    mesh = Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.face_model([0], "contact_mohr_coulomb", {"penalty_normal": 1e10})
+    sim.initial_stress(None, yy=1e3)
+    sim.velocity_condition([0], vx=0.0, vz=0.0)
+    sim.stress_condition([0], normal=-1.0)
+    convergence.advance(sim, 20)
+    sim.rebuild()
+    for name in ("stress_xx", "strain_energy", "position_x", "reaction_x"):
+        diagnostics.values(sim, name)
+    sim.option(dynamic=False)
+    convergence.advance(sim, 2)
+    diagnostics.unbalanced_ratio(sim)
+
+
 def _rest(mesh: Mesh, threads: int) -> None:
     """One body at rest, of which an element is taken out slowly."""
     sim = Blocks(SerialComm(), threads)

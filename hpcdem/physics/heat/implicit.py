@@ -82,8 +82,7 @@ class Implicit:
         """Blocks come into equilibrium with their new thermal stress."""
         sim = self.sim
         self.steps += 1
-        if sim.local.heated:
-            sim.local.restress()
+        sim.local.follow_heat()
         if self.moves:
             joints = bool((sim.joint_row[sim.joint_exists()] > 0).any())
             try:

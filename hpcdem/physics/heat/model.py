@@ -18,7 +18,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, connectivity, said, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, said, user_laws
+from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.properties import ELEMENT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
@@ -326,7 +327,8 @@ class Heat(SurfaceLoad):
         kernels.thermal_stress(
             self._quad, blocks.cold[TEMPERATURE], self._stiffness, blocks.cold[UNSTRESSED].reshape(-1), out
         )  # fmt: skip
-        return out
+        part = by_temperature.part_of_young(blocks)
+        return out if part is None else out * part
 
     @property
     def expands(self) -> bool:
@@ -384,7 +386,7 @@ class Heat(SurfaceLoad):
         united = blocks.comm.any(not np.array_equal(was, cold[TEMPERATURE]))
         if united:
             halo.fill(self.t)
-            blocks.local.restress()
+            blocks.local.follow_heat()
         if blocks.comm.any(changed) or united:
             self.accounts["commands"] += self._content() - before
         if (fluid := self.flowing) is not None:
@@ -431,8 +433,8 @@ class Heat(SurfaceLoad):
         width, total = self.t.shape[1], int(one.sum())
         begin, corner, place, again = np.zeros(n + 1, np.int64), *(np.empty(total, np.int64) for _ in range(3))
         lost = build.place_nodes(
-            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], blocks.local.true_mass, begin,
-            corner, place, again, np.empty(n),
+            first, start, one, member, blocks.where, mesh.cells, blocks.v.shape[1], FORCE, 2, blocks.local.true_mass,
+            begin, corner, place, again, np.empty(n),
         )  # fmt: skip
         lost = int(blocks.comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:
@@ -732,15 +734,14 @@ class Heat(SurfaceLoad):
                 self.find_contacts()
             if self._found_for != self._given():
                 self._find_step()
-            if blocks.budget is not None and o.dynamic and self.expands:
+            if blocks.budget is not None and o.dynamic and (self.expands or blocks.local.warms):
                 blocks.budget.pause(blocks, by_heat=True)
             if fluid is not None:
                 fluid.begin_cycle(self.sub_steps * self.dt)
             for _ in range(self.sub_steps):
                 self._sub_step()
             self.cycles += 1
-            if blocks.local.heated:
-                blocks.local.restress()
+            blocks.local.follow_heat()
         if self.cycles % LOOK == 0:
             self._check_finite()
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from hpcdem.io import colours
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import View, view
+from hpcdem.io.axes import CM, View, view
 from hpcdem.post import plots
 from hpcdem.post.layers import Look
 from hpcdem.post.measure import cracks
@@ -20,7 +20,6 @@ from hpcdem.post.measure.kinds import drawn as last_drawn
 from hpcdem.post.measure.scene import Plan, Stamp
 from hpcdem.post.measure.walls import Curve
 
-CM = plots.CM
 LEFT, RIGHT, TOP, BOTTOM, GAP = 1.75, 0.45, 0.55, 1.1, 0.45
 """Margins of a page and space between panels with a common x axis [cm]."""
 PALE = 0.45

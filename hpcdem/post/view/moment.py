@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -31,15 +31,18 @@ UNITS = {
           "distance"),
     "m/s": ("velocity", "vx", "vy"), "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
     "N": ("force", "fx", "fy", "fn", "fs"), "N m": ("torque", "moment"), "K": ("temperature",), "kg": ("mass",),
-    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m2/s": ("flow_rate",),
+    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m3": ("volume",), "m2/s": ("flow_rate",),
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
+
+PARTS = {"x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "min", "largest", "first", "last", "shear"}
+"""Ends of the names of fields that change no unit."""
 
 
 def unit_of(name: str) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
     words = name.split("_")
-    while words and words[-1] in ("x", "y", "xx", "yy", "xy", "zz", "max", "min", "largest", "first", "last", "shear"):
+    while words and words[-1] in PARTS:
         words.pop()
     stem = "_".join(words)
     ends = ((unit, word) for unit, known in UNITS.items() for word in known)
@@ -52,7 +55,7 @@ class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
     in the fourth column of triangles) or lines (ends (n, 2, 2)), read when it is asked for; fields: (n,) by name;
     vectors: (n, 2) by name; names: of the values of an integer field; number: the field by which the program numbers
-    them."""
+    them; slow: fields that take a pass over other tables."""
 
     kind: str
     count: int
@@ -61,6 +64,7 @@ class Objects:
     vectors: Mapping[str, np.ndarray] = field(default_factory=dict)
     names: Mapping[str, list[str]] = field(default_factory=dict)
     number: str = "number"
+    slow: Collection[str] = ()
 
     def centres(self) -> np.ndarray:
         """(n, 2) [m]."""
@@ -98,6 +102,10 @@ class Objects:
     def known(self) -> list[str]:
         """Names of fields and vectors that have a value somewhere."""
         return [*(name for name in self.fields if self.filled(name)), *self.vectors]
+
+    def waiting(self) -> set[str]:
+        """Slow fields that nobody has asked for yet."""
+        return {name for name in self.slow if isinstance(self.fields, Columns) and not self.fields.was_read(name)}
 
 
 def there(values: np.ndarray) -> bool:
@@ -187,7 +195,7 @@ def of_particles(frame: Frame) -> Moment:
     objects = {
         "particles": Objects(
             DISCS, count, lambda: (centres(), p["radius"]), Columns(more), Columns(vectors),
-            {"group": frame.group_names}, "gid",
+            {"group": frame.group_names}, "gid", STRESSES,
         )
     }  # fmt: skip
     if len(frame.walls.get("id", ())):

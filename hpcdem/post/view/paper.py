@@ -13,14 +13,13 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import View
+from hpcdem.io.axes import CM, View
 from hpcdem.post import blocks
 from hpcdem.post.saved import FORMATS, SAVED, saving
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
 from hpcdem.post.view.scene import Painted, Scale, Scene, scene
 
-CM = 1.0 / 2.54
 TALLEST = 1.3
 """Largest height of the model over its width on paper; taller ones are narrower."""
 EDGE = "#5a5a5a"

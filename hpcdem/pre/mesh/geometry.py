@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -132,18 +133,18 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
 
 
 class Layers:
-    """Curves by layer name, in the order of making."""
+    """Curves, in space solids (solids.py), by layer name, in the order of making."""
 
     def __init__(self) -> None:
-        self.curves: dict[str, list[Curve]] = {}
+        self.curves: dict[str, list[Any]] = {}
 
-    def add(self, layer: str, *curves: Curve) -> None:
-        """Append curves to a layer, which is made if it is new."""
+    def add(self, layer: str, *curves: Any) -> None:
+        """Append curves or solids to a layer, which is made if it is new."""
         if not layer:
             raise CommandError("a geometry layer needs a name")
         self.curves.setdefault(layer, []).extend(curves)
 
-    def __getitem__(self, layer: str) -> list[Curve]:
+    def __getitem__(self, layer: str) -> list[Any]:
         if layer not in self.curves:
             known = ", ".join(f"'{n}'" for n in self.curves) or "none"
             raise CommandError(f"there is no geometry layer '{layer}' (layers so far: {known})")
@@ -172,8 +173,8 @@ class Layers:
         return layer
 
     def tables(self) -> dict[str, np.ndarray]:
-        """Everything as arrays, for a checkpoint: names, and curves one after the other."""
-        rows = [(k, c) for k, name in enumerate(self.curves) for c in self.curves[name]]
+        """Everything but solids as arrays, for a checkpoint: names, and curves one after the other."""
+        rows = [(k, c) for k, name in enumerate(self.curves) for c in self.curves[name] if isinstance(c, Curve)]
         return {
             "layer_names": np.array(list(self.curves), dtype=object),
             "curve_layer": np.array([k for k, _ in rows], np.int64),

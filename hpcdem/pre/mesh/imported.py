@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.physics.fdem.connectivity import areas, corner_counts, find_edges
 from hpcdem.physics.fdem.mesh import Mesh, check
+from hpcdem.physics.fdem.tetrahedra import volumes
 from hpcdem.pre.mesh import optional
 
 CORNERS = {"triangle": 3, "quad": 4}
@@ -24,8 +25,8 @@ FLATNESS = 1e-9
 """How far points may lie from a plane z = constant, in parts of the model's size."""
 
 
-def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0) -> Mesh:
-    """Read a mesh of triangles and quads in the x-y plane.
+def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Mesh:
+    """Read a mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra.
 
     Physical groups (gmsh) and element sets (Abaqus) become groups of the set SET; one that overlaps an earlier one gets
     a set of its own, of the same name. Physical lines become layers. Elements that run clockwise are turned over, and
@@ -38,6 +39,8 @@ def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0) -> Mes
     if not scale > 0.0 or not merge >= 0.0:
         raise CommandError(f"a scale must be positive and a merging distance not negative, not {scale:g} and {merge:g}")
     data = _read(path)
+    if dim == 3:
+        return _in_space(path, data, merge, scale)
     points = _plane(path, np.asarray(data.points, np.float64)) * scale
     cells, blocks, lines = _cells(path, data, len(points))
     _corners(path, points, cells)
@@ -63,6 +66,53 @@ def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0) -> Mes
         if (pairs < 0).any() or (find_edges(edges, pairs, len(mesh.points)) < 0).any():
             raise HpcdemError(f"{path}: lines of the group '{name}' are not edges of the elements")
     return Mesh.of(mesh.points, mesh.cells, mesh.groups, layers)
+
+
+def _in_space(path: Path, data: Any, merge: float, scale: float) -> Mesh:
+    """Tetrahedra, with physical volumes as groups and physical surfaces as layers. Those that are turned inside out are
+    turned back."""
+    points = np.asarray(data.points, np.float64) * scale
+    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+        raise HpcdemError(f"{path}: finite points with three coordinates were expected")
+    names = {(int(v[1]), int(v[0])): str(k) for k, v in getattr(data, "field_data", {}).items() if len(v) == 2}
+    physical = data.cell_data.get("gmsh:physical")
+    cells, seen = [np.empty((0, 4), np.int64)], 0
+    groups: dict[str, list] = {}
+    layers: dict[str, list] = {}
+    for k, block in enumerate(data.cells):
+        rows = np.asarray(block.data, np.int64)
+        tags = np.zeros(len(rows), np.int64) if physical is None else np.asarray(physical[k], np.int64)
+        if block.type not in ("tetra", "triangle", "line", "vertex"):
+            raise HpcdemError(
+                f"{path}: block {k + 1} holds {len(rows)} elements of type '{block.type}'; in three dimensions only "
+                "tetrahedra of four points can be used"
+            )
+        if ((rows < 0) | (rows >= len(points))).any():
+            raise HpcdemError(f"{path}: block {k + 1} names a point that is not in the file")
+        for tag in np.unique(tags[tags != 0]).tolist():
+            if block.type == "tetra":
+                groups.setdefault(names.get((3, tag), str(tag)), []).append(seen + np.flatnonzero(tags == tag))
+            elif block.type == "triangle":
+                layers.setdefault(names.get((2, tag), str(tag)), []).append(rows[tags == tag])
+        if block.type == "tetra":
+            cells.append(rows)
+            seen += len(rows)
+    if not seen:
+        raise HpcdemError(f"{path}: there are no tetrahedra")
+    found = np.concatenate(cells)
+    number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
+    found = number[found]
+    turned = volumes(points, found) < 0.0
+    found[turned] = found[turned][:, [0, 2, 1, 3]]
+    used = np.unique(found)
+    place = np.full(len(points), -1, np.int64)
+    place[used] = np.arange(len(used))
+    mesh = Mesh.of(
+        points[used], place[found], _in_sets({n: np.concatenate(r) for n, r in groups.items()}, seen),
+        {n: place[number[np.concatenate(p)]] for n, p in layers.items()},
+    )  # fmt: skip
+    check(mesh, f"{path} (elements and points counted from 0)")
+    return mesh
 
 
 def _read(path: Path) -> Any:

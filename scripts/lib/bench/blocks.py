@@ -13,6 +13,7 @@
 | wet-20k | intact-20k with a channel in every joint, half of them full, and one sub-step of flow per step |
 | sandy-20k | the same with proppant in the fluid, which settles |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
+| pairs-space-20k | 20 000 touching pairs of tetrahedra: two plates that lie on each other |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
 
@@ -31,19 +32,22 @@ from bench.launch import Layout
 from bench.runs import say
 from bench.tables import Lines, Spread
 from hpcdem.physics.fdem import changes, convergence, diagnostics, user_laws
+from hpcdem.physics.fdem.pairs_space import ContactSpace
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant.model import Proppant
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "wet": 6e6, "sandy": 5e6, "pairs": 3e6, "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
+    "flowing-quads": 3e6, "wet": 6e6, "sandy": 5e6, "pairs": 3e6, "pairs-space": 1.5e6, "shattered": 1e6, "own": 15e6,
+    "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
 
 @dataclass(frozen=True)
 class Workload:
-    """kind: one of `RATES`; side: squares along a side, two triangles each, or a quad."""
+    """kind: one of `RATES`; side: squares along a side, two triangles each, or a quad; in space two
+    boxes of six tetrahedra."""
 
     name: str
     kind: str
@@ -51,8 +55,8 @@ class Workload:
 
     @property
     def elements(self) -> int:
-        """Triangles, or quads."""
-        return self.side**2 * (1 if "quads" in self.kind else 2)
+        """Triangles, quads, or tetrahedra."""
+        return 12 * self.side**2 if self.kind == "pairs-space" else self.side**2 * (1 if "quads" in self.kind else 2)
 
 
 WORKLOADS = {
@@ -71,6 +75,7 @@ WORKLOADS = {
         Workload("wet-20k", "wet", 100),
         Workload("sandy-20k", "sandy", 100),
         Workload("pairs-20k", "pairs", 141),
+        Workload("pairs-space-20k", "pairs-space", 28),
         Workload("shattered-20k", "shattered", 100),
     )
 }
@@ -139,7 +144,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     own = {name: (watch.ns - before.get(name, 0)) * 1e-9 for name, watch in sim.timers.watches.items()}
     sim.close_model()
     local = sim.local.pairs
-    touching = sim.comm.allgather(int(local.touching.sum()))
+    touching = sim.comm.allgather(_touching(local))
     ranks = sim.comm.allgather((seconds, used, own, sim.n_own))
     wall, n = max(r[0] for r in ranks), sum(r[3] for r in ranks)
     contact = max(r[2].get("contact", 0.0) for r in ranks)
@@ -154,6 +159,15 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
         "joints": diagnostics.joint_counts(sim), "stages": stages, "rebuilds": sim.rebuilds - rebuilds,
         "cpu_use": sum(r[1] for r in ranks) / (wall * len(ranks) * job["threads"]), "digest": digest(sim),
     } | versions()  # fmt: skip
+
+
+def _touching(pairs: Any) -> int:
+    """Pairs of bodies that touch now; in space rows of the list are pairs of a face and an element."""
+    at = np.flatnonzero(pairs.touching)
+    if not isinstance(pairs, ContactSpace):
+        return len(at)
+    both = np.column_stack([pairs.face[pairs.first[at]] // 4, pairs.element[pairs.second[at]]])
+    return len(np.unique(np.sort(both, axis=1), axis=0))
 
 
 def digest(sim: Any) -> str:
@@ -307,6 +321,21 @@ def pairs(sim: Any, side: int) -> None:
     sim.close_model()
 
 
+def pairs_space(sim: Any, side: int) -> None:
+    """Two plates of side x side boxes of six tetrahedra, one askew on the other, pressed and sheared."""
+    from hpcdem.physics.fdem.mesh import Mesh
+    from hpcdem.pre.mesh import structured_space
+
+    h = 0.01
+    plate = structured_space.box((h * np.arange(side + 1), h * np.arange(side + 1), np.array([0.0, h])), 6)
+    points = np.concatenate([plate.points, plate.points + h * np.array([0.37, 0.23, 1.0 - 5e-4])])
+    sim.take_mesh(Mesh.of(points, np.concatenate([plate.cells, plate.cells + len(plate.points)])))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.option(overlap="keep")
+    sim.velocity_condition(None, vx=0.0, vy=0.0, vz=0.0)
+    sim.close_model()
+
+
 def shattered(sim: Any, side: int) -> None:
     """Every element a body of its own, all pressed together by a frame that does not give way."""
     mesh = square(side)
@@ -334,5 +363,5 @@ def _swell(sim: Any, factor: float) -> None:
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
     "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "sandy": sandy, "pairs": pairs,
-    "shattered": shattered, "own": own, "own-quads": own_quads,
+    "pairs-space": pairs_space, "shattered": shattered, "own": own, "own-quads": own_quads,
 }  # fmt: skip

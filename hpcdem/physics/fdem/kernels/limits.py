@@ -68,7 +68,7 @@ def _omega_quad(c):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _corner(omega_e2, true_mass, mass, spring, dashpot, drag, eta, modulus):
+def corner_step(omega_e2, true_mass, mass, spring, dashpot, drag, eta, modulus):
     """Stable time step of a corner; added mass lowers what the element and the drag on its mass give in proportion."""
     own = omega_e2 * true_mass / mass
     return _stable(own + 2.0 * spring / mass, own, eta, modulus, (dashpot + 0.5 * drag * true_mass) / mass)
@@ -93,10 +93,10 @@ def time_step(triangles, quads, triangle_rows, quad_rows, first, springs, dashpo
         eta += beta * modulus
         for k in range(n):
             true, spring, dashpot = mass[r, k], springs[r - first, k], dashpots[r - first, k]
-            dt = _corner(omega2, true, true, spring, dashpot, drag, eta, modulus)
+            dt = corner_step(omega2, true, true, spring, dashpot, drag, eta, modulus)
             while safety * dt < target:
                 mass[r, k] *= max((target / (safety * dt)) ** 2, 1.0 + 1e-6)
-                dt = _corner(omega2, true, mass[r, k], spring, dashpot, drag, eta, modulus)
+                dt = corner_step(omega2, true, mass[r, k], spring, dashpot, drag, eta, modulus)
             least = min(least, dt)
     return least
 

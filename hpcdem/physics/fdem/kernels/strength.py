@@ -31,7 +31,7 @@ DEGREE = math.pi / 180.0
 
 class Strength(NamedTuple):
     """What kernels need: first own row of the table of yield surfaces; of (own rows,): the row of the model; values
-    (rows, 4): cohesion, friction, dilation [degrees], tensile strength before any flow; number (rows, 4): of their
+    (own rows, 4): cohesion, friction, dilation [degrees], tensile strength before any flow; number (rows, 4): of their
     tables, from 1 on, 0: none; begin (tables + 1,), points (m, 2): the tables, one behind the other; history (n_own, 2
     or 8), see `HISTORY`."""
 
@@ -67,10 +67,11 @@ def renew(row, j, part, strength, table):
     of = strength.of[row - strength.first]
     shear, tension = strength.history[j, 2 * part], strength.history[j, 2 * part + 1]
     values, number, begin, points = strength.values, strength.number, strength.begin, strength.points
-    cohesion = _at(shear, number[of, COHESION], values[of, COHESION], begin, points)
-    friction = DEGREE * _at(shear, number[of, FRICTION], values[of, FRICTION], begin, points)
-    dilation = DEGREE * _at(shear, number[of, DILATION], values[of, DILATION], begin, points)
-    tensile = _at(tension, number[of, TENSILE], values[of, TENSILE], begin, points)
+    own = row - strength.first
+    cohesion = _at(shear, number[of, COHESION], values[own, COHESION], begin, points)
+    friction = DEGREE * _at(shear, number[of, FRICTION], values[own, FRICTION], begin, points)
+    dilation = DEGREE * _at(shear, number[of, DILATION], values[own, DILATION], begin, points)
+    tensile = _at(tension, number[of, TENSILE], values[own, TENSILE], begin, points)
     root = math.tan(0.25 * math.pi + 0.5 * friction)
     table[row, 0], table[row, 1] = root * root, math.tan(0.25 * math.pi + 0.5 * dilation) ** 2
     table[row, 2] = 2.0 * cohesion * root

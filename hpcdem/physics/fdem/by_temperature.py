@@ -1,0 +1,52 @@
+"""Moduli and strengths that follow tables over temperature: of elements by the mean of their corners, of joints by that
+of their two ends (which both sides have alike).
+
+A row of properties holds the largest value of such a table, and by it go masses, time steps and contact: they hold for
+all temperatures. Kernels read what is made of it here, each time temperatures have changed. Young's modulus is carried
+by both Lame constants alike (Poisson's ratio stays); stress is that of the strain by the present modulus, also the part
+that was said as initial stress, at the temperature at which the element is free of thermal stress.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hpcdem.physics.fdem.properties import Rows, temperature_table
+
+if TYPE_CHECKING:
+    from hpcdem.physics.fdem.state import State
+
+TEMPERATURE, UNSTRESSED = "temperature", "unstressed"
+"""Columns of elements, see physics/heat/model.py."""
+
+
+def means(sim: State) -> np.ndarray:
+    """(n_own,) mean temperatures [K] of the owned elements; the model is closed."""
+    t = sim.cold[TEMPERATURE]
+    total = (t[:, 0] + t[:, 1]) + t[:, 2]
+    if t.shape[1] == 3:
+        return total / 3.0
+    return np.where(sim.the_mesh().cells[sim.number[sim.owned], 3] >= 0, (total + t[:, 3]) / 4.0, total / 3.0)
+
+
+def values(sim: State, rows: Rows, name: str, row: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """A property (n,) of objects with these rows (n,) at temperatures (n,) [K]."""
+    found, number = rows.column(name)[row], rows.column(temperature_table(name))[row].astype(np.int64)
+    for one in np.unique(number[number > 0]).tolist():
+        at = number == one
+        found[at] = sim.followed[one - 1].at(t[at])
+    return found
+
+
+def part_of_young(sim: State, row: np.ndarray | None = None, t: np.ndarray | None = None) -> np.ndarray | None:
+    """Young's modulus (n_own,) of owned elements over the largest that their table has; None: no table. row (n_own,):
+    their rows if they had others; t (n_own,) [K]: their temperatures if not those of now."""
+    rows = sim.element_rows
+    row = sim.element_row[sim.number[sim.owned]] if row is None else row
+    if not rows.column(temperature_table("young"))[row].any():
+        return None
+    return values(sim, rows, "young", row, means(sim) if t is None else t) / np.maximum(
+        rows.column("young")[row], 1e-300
+    )

@@ -1,0 +1,95 @@
+"""Boxes of tetrahedra by rule. Points are numbered along x, then y, then z. The six sides are the layers `left` and
+`right` (x), `front` and `back` (y), `bottom` and `top` (z)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.tetrahedra import volumes
+from hpcdem.pre.mesh.sizes import not_too_many
+
+SPLITS = (5, 6, 12)
+"""Tetrahedra of a box: 5, mirrored from box to box; 6 about one diagonal (Kuhn); 12 about a point in the middle."""
+SIDES = (("left", 0, 0), ("right", 0, -1), ("front", 1, 0), ("back", 1, -1), ("bottom", 2, 0), ("top", 2, -1))
+
+
+def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | None = None) -> Mesh:
+    """Tetrahedra between the grid lines in x, y and z (ascending); group: (set, group) for all of them."""
+    if split not in SPLITS:
+        raise CommandError(f"a box is split into {', '.join(map(str, SPLITS))} tetrahedra, not into {split}")
+    n = np.array([len(line) - 1 for line in lines])
+    if (n < 1).any() or not all(np.isfinite(line).all() and (np.diff(line) > 0.0).all() for line in lines):
+        raise CommandError("grid lines must be finite and ascend")
+    not_too_many(float(np.prod(n)) * split, f"cells {' '.join(map(str, n))}")
+    z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    number = np.arange(len(points)).reshape(*(n + 1)[::-1])
+    corner: dict[tuple[int, ...], np.ndarray] = {
+        (i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)
+    }
+    if split == 12:
+        middle = len(points) + np.arange(int(np.prod(n)))
+        points = np.concatenate([points, sum(points[c] for c in corner.values()) / 8.0])
+        parts = [[*(corner[at] for at in face), middle] for face in _faces()]
+        cells = _upright(points, parts)
+    elif split == 6:
+        parts = []
+        for order in permutations(range(3)):
+            at, way = [0, 0, 0], [corner[0, 0, 0]]
+            for axis in order:
+                at[axis] = 1
+                way.append(corner[tuple(at)])
+            parts.append(way)
+        cells = _upright(points, parts)
+    else:
+        k, j, i = (v.ravel() for v in np.indices(tuple(n[::-1])))
+        odd = ((i + j + k) % 2 == 1)[:, None]
+        even: list[list[tuple[int, ...]]] = [[(0, 0, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)]]
+        even += [[a, *(_step(a, axis) for axis in range(3))] for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1))]
+        turned = [[(1 - a[0], a[1], a[2]) for a in part] for part in even]
+        ways = [np.column_stack([corner[a] for a in part]) for part in even]
+        others = [np.column_stack([corner[a] for a in part]) for part in turned]
+        cells = _upright(points, [list(np.where(odd, other, one).T) for one, other in zip(ways, others)])
+    layers = {name: _triangles_on(cells, _side(number, axis, end)) for name, axis, end in SIDES}
+    groups = {group[0]: {group[1]: np.arange(len(cells))}} if group else {}
+    return Mesh.of(points, cells, groups, layers)
+
+
+def _step(at: tuple[int, int, int], axis: int) -> tuple[int, ...]:
+    return tuple(1 - c if k == axis else c for k, c in enumerate(at))
+
+
+def _faces() -> list[list[tuple[int, ...]]]:
+    """Two triangles of each side of a box, cut alike on opposite sides, by their corners."""
+    found = []
+    for axis in range(3):
+        for end in (0, 1):
+            a, b, c, d = (
+                tuple(np.insert(at, axis, end).tolist()) for at in ((0, 0), (1, 0), (1, 1), (0, 1))
+            )  # fmt: skip
+            found += [[a, b, c], [a, c, d]]
+    return found
+
+
+def _upright(points: np.ndarray, parts: list[list[np.ndarray]]) -> np.ndarray:
+    """(n, 4) tetrahedra, box after box, all with a positive volume."""
+    cells = np.stack([np.column_stack(part) for part in parts], axis=1).reshape(-1, 4)
+    turned = volumes(points, cells) < 0.0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
+    return cells
+
+
+def _side(number: np.ndarray, axis: int, end: int) -> np.ndarray:
+    return np.take(number, end, axis=2 - axis).ravel()
+
+
+def _triangles_on(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k, 3) faces of tetrahedra whose points are all among these."""
+    on = np.isin(cells, points)
+    at = np.flatnonzero(on.sum(axis=1) == 3)
+    return cells[at][on[at]].reshape(-1, 3)

@@ -1,0 +1,144 @@
+"""Bodies in space that fly, swing and are dug out: models for tests/parallel/test_models.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hpcdem.physics.fdem import changes, diagnostics
+from hpcdem.physics.fdem.kernels import space
+from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.parallel.model import Found, Model
+from tests.space.support import ROCK, box
+
+
+def swinging(sim: Blocks) -> None:
+    """A bar with an initial stress that is held at one end, pressed and pulled by a table at the other, and another one
+    that flies over it through all strips while it tumbles."""
+    bar, flier = box((12, 2, 2), (2.4, 0.3, 0.3), 5, shaken=0.2), box((3, 2, 1), (0.4, 0.3, 0.2), 12)
+    away = np.array([-0.3, 0.0, 0.5])
+    mesh = Mesh.of(
+        np.concatenate([bar.points, flier.points + away]),
+        np.concatenate([bar.cells, flier.cells + len(bar.points)]),
+        layers=bar.layers,
+    )
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "damp_factor": 0.02})
+    sim.option(collision=False)
+    sim.initial_stress(None, xx=1e4, yz=-3e3, gradient={"zz": (1e3, 0.0, -2e3)})
+    edges = mesh.edges()
+    faces = {side: edges.faces[mesh.find_edges(edges, mesh.layers[side]), 0] for side in mesh.layers}
+    left, right = (np.unique(mesh.layers[side]) for side in ("left", "right"))
+    sim.move_constraint(left, 1)
+    sim.table("beat", [(0.0, 0.0), (0.01, 3e5), (0.02, 0.0), (0.04, 2e5)])
+    sim.stress_condition(faces["right"], normal="beat")
+    sim.stress_condition(faces["top"], normal=-2e4, xz=5e3)
+    sim.force_condition(right[:2], fy=300.0)
+    sim.move_constraint(np.unique(mesh.layers["front"])[6:9], space.ACROSS, (1.0, 1.0, 0.0))
+    sim.rayleigh(0.02, 60.0)
+    sim.gravity(0.5, 0.0, -9.81)
+    over = np.arange(len(bar.points), len(mesh.points))
+    changes.set_velocity(sim, over, 30.0, 1.0, 3.0)
+    changes.set_velocity(sim, over[:4], 30.0, 4.0, 0.0)
+
+
+def dig(sim: Blocks) -> None:
+    """A piece of the bar is taken out in the middle of the run."""
+    if sim.clock.step == 500:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 2.2))
+
+
+def settling(sim: Blocks) -> None:
+    """A slab that comes into static balance with its weight and what is prescribed, in small strains."""
+    sim.take_mesh(box((16, 3, 3), (8.0, 1.0, 1.0), shaken=0.15))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.option(collision=False, dynamic=False, large_strain=False)
+    mesh = sim.mesh
+    sim.velocity_condition(np.unique(mesh.layers["bottom"]), vx=0.0, vy=0.0, vz=0.0)
+    sim.velocity_condition(np.unique(mesh.layers["top"])[:5], vz=-1e-9)
+    sim.gravity(0.0, 1.0, -9.81)
+
+
+def crowding(sim: Blocks) -> None:
+    """Blocks of several kinds that hit a plate and each other, slide over it through all strips, stick and rub; faces
+    and elements differ, contacts are damped, and one block is dug out while others lie on it."""
+    plate = box((16, 3, 1), (3.2, 0.6, 0.2), shaken=0.15)
+    stone = box((2, 2, 1), (0.24, 0.22, 0.14), 5), box((2, 1, 2), (0.2, 0.13, 0.2), 12)
+    away = [(0.11 + 0.34 * k, 0.05 + 0.03 * (k % 4), 0.21 + 0.005 * k) for k in range(6)]
+    away += [(0.16 + 0.34 * k, 0.13, 0.45 + 0.003 * k) for k in range(5)]
+    parts = [(plate, (0.0, 0.0, 0.0)), *((stone[k % 2], at) for k, at in enumerate(away))]
+    begin = np.cumsum([0, *(len(mesh.points) for mesh, _ in parts)])
+    mesh = Mesh.of(
+        np.concatenate([mesh.points + np.array(at) for mesh, at in parts]),
+        np.concatenate([mesh.cells + k for (mesh, _), k in zip(parts, begin)]),
+    )
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 2e7, "damp_factor": 0.05, "friction": 25.0})
+    sim.velocity_condition(np.flatnonzero(mesh.points[: begin[1], 2] < 1e-9), vx=0.0, vy=0.0, vz=0.0)
+    edges = mesh.edges()
+    free = edges.faces[~edges.inner, 0]
+    top = free[(np.abs(mesh.points[mesh.face_points(free)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
+    sim.face_model(top, "contact_mohr_coulomb", {"penalty_normal": 4e8, "friction": 10.0, "damping_ratio": 0.2})
+    sim.face_model(free[::7], "contact_mohr_coulomb", {"penalty_normal": 2e8, "friction": 40.0, "damping_b": 1.5})
+    sim.gravity(4.0, 0.0, -9.81)
+    changes.set_velocity(sim, np.arange(begin[1], len(mesh.points)), 5.0, 0.2, -1.0)
+    changes.set_velocity(sim, np.arange(begin[-3], begin[-2]), -8.0, 0.0, -2.0)
+
+
+def dig_below(sim: Blocks) -> None:
+    """The first block is taken out."""
+    if sim.clock.step == 900:
+        changes.null(sim, np.arange(16 * 3 * 6, 16 * 3 * 6 + 20))
+
+
+VECTORS = "position", "velocity", "displacement", "reaction", "unbalanced"
+NAMES = (
+    *(f"{name}_{axis}" for name in VECTORS for axis in "xyz"),
+    *(f"stress_{c}" for c in ("xx", "yy", "xy", "zz", "xz", "yz")), "stress_max", "strain_energy", "kinetic_energy",
+)  # fmt: skip
+
+
+def result(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks, and in `about` rebuilds, late ones, elements that came from another rank."""
+    found = {name: diagnostics.values(sim, name) for name in NAMES}
+    found["time"] = np.array([sim.clock.time, sim.clock.dt, diagnostics.unbalanced_ratio(sim)])
+    came = sim.comm.allgather(len(set(sim.number[sim.owned].tolist()) - notes["first"]))
+    found["about"] = np.array([sim.rebuilds, sim.rebuild_state.late, 0, sum(came)])
+    return found
+
+
+def it_swings(found: Found) -> None:
+    assert np.nanmax(found["displacement_x"]) > 1.5  # flies from one end to the other
+    bar = found["displacement_z"][: 13 * 9]
+    assert np.nanmax(np.abs(bar)) > 1e-3
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+
+
+def touching(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with the contacts in the order of their pairs."""
+    found = result(sim, notes)
+    parts = sim.comm.allgather(diagnostics.contacts(sim))
+    every = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    order = np.lexsort((every["element_2"], every["face"]))
+    return found | {f"contact_{name}": values[order] for name, values in every.items()}
+
+
+def it_crowds(found: Found) -> None:
+    assert len(found["contact_face"]) > 50
+    assert np.nanmax(found["displacement_x"]) > 0.3
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+    assert found["about"][0] > 10
+
+
+def it_settles(found: Found) -> None:
+    assert found["time"][2] < 1e-2
+    assert np.abs(found["stress_zz"]).max() > 2e4
+
+
+MODELS = {
+    "swinging": Model(swinging, result, it_swings, dig, steps=1000, middle=401, come=10),
+    "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
+    "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
+}
