@@ -202,30 +202,32 @@ def test_normal_damping() -> None:
     assert bounce(damping_t=2e4) < 0.9 * free
 
 
-def test_whose_friction_it_is() -> None:
-    """A block in a corner between a floor and a wall, held against both: each face rubs with the friction of the side
-    that it touches, also where the elements of the corner have both."""
-    floor = box((4, 2, 1), (0.8, 0.4, 0.2))
-    block = box((2, 2, 2), (0.2, 0.2, 0.2))
+@pytest.mark.parametrize("lies", ["top", "right"])
+def test_whose_friction_it_is(lies: str) -> None:
+    """A block on the top of a slab, or pressed against its side: it rubs with the friction of the face that it touches,
+    though the elements along the edges have faces with another one."""
+    slab, block = box((4, 2, 1), (0.8, 0.4, 0.2)), box((2, 2, 2), (0.2, 0.2, 0.12))
+    away, gravity, along = {
+        "top": ((0.55, 0.1, 0.2), (2.0, 0.0, -9.81), 0), "right": ((0.8, 0.1, 0.04), (-9.81, 0.0, -2.0), 2),
+    }[lies]  # fmt: skip
     found = {}
-    for where, friction in itertools.product(("top", "sides"), (0.0, 40.0)):
-        mesh = joined((floor, (0.0, 0.0, 0.0)), (block, (0.55, 0.1, 0.2)))
+    for where, friction in itertools.product((lies, "others"), (0.0, 40.0)):
+        mesh = joined((slab, (0.0, 0.0, 0.0)), (block, away))
         sim = Blocks(SerialComm())
         sim.take_mesh(mesh)
         changes.element_model(sim, None, "mech_iso_elastic", SOFT)
-        sim.velocity_condition(np.arange(len(floor.points)), vx=0.0, vy=0.0, vz=0.0)
-        nodes = np.arange(len(floor.points), len(mesh.points))
+        sim.velocity_condition(np.arange(len(slab.points)), vx=0.0, vy=0.0, vz=0.0)
+        nodes = np.arange(len(slab.points), len(mesh.points))
         sim.face_model(None, "contact_mohr_coulomb", {"penalty_normal": 1e9, "friction": 89.0})
-        sides = [name for name in floor.layers if name != "top"]
-        faces = np.concatenate([faces_on(floor, name) for name in (["top"] if where == "top" else sides)])
-        sim.face_property(faces, {"friction": friction})
-        assert Surface.of(sim).several(sim_kinds(sim))[: len(floor.cells)].any()
-        sim.gravity(2.0, 0.0, -9.81)
+        names = [lies] if where == lies else [name for name in slab.layers if name != lies]
+        sim.face_property(np.concatenate([faces_on(slab, name) for name in names]), {"friction": friction})
+        assert Surface.of(sim).several(sim_kinds(sim))[: len(slab.cells)].any()
+        sim.gravity(*gravity)
         run_to(sim, 0.05)
-        found[where, friction] = way(sim, nodes)[0]
-    assert found["top", 0.0] == pytest.approx(0.5 * 2.0 * 0.05**2, rel=0.05)
-    assert found["top", 40.0] < 0.2 * found["top", 0.0]
-    assert found["sides", 0.0] == found["sides", 40.0]  # the block lies on the top alone
+        found[where, friction] = abs(way(sim, nodes)[along])
+    assert found[lies, 0.0] == pytest.approx(0.5 * 2.0 * 0.05**2, rel=0.05)
+    assert found[lies, 40.0] < 0.2 * found[lies, 0.0]
+    assert found["others", 0.0] == found["others", 40.0]
 
 
 def sim_kinds(sim: Blocks):

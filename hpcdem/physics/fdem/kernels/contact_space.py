@@ -41,8 +41,9 @@ CHOICE = 9 + LAW
 FORCES = 21
 """Words of a row of forces: corners of the face, then of the target, x, y, z each."""
 
-AGAINST = -0.1
-"""Cosine of the angle between two normals below which faces look against each other."""
+AGAINST = 0.1
+"""Cosine of the angle between two normals below which faces look against, or across, each other. (Sides of a block that
+stands on a face look across it, also when they lean a little.)"""
 
 # Scratch: four polygons of at most twelve corners (u, v), distances of their corners from a cut, lambda_k and
 # s_k lambda_k at the corners of the face (4, 3), inward normals of the sides of the target (4, 3), of length 6 V / H_k.
@@ -249,8 +250,8 @@ def _nearest(px, py, pz, a, b, c, near):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _choose(begin, end, choices, px, py, pz, nx, ny, nz, t, x, corner, near):
     """Which of the faces choices[begin:end] the pair touches: the one nearest to the centre of the force (px, py, pz)
-    among those that look against the contactor's normal if there are any. (Sides of a block that stands on a face look
-    neither way: by 6 degrees at least.) corner (3, 3), near (3,): scratch."""
+    among those that do not look the same way as the contactor, with the normal (nx, ny, nz), if there are any. corner
+    (3, 3), near (3,): scratch."""
     best, nearest, against = begin, math.inf, False
     for q in range(begin, end):
         for i in range(3):
