@@ -19,6 +19,8 @@ from tests.flow.models import more as burst_on
 from tests.flow.support import inner
 from tests.heat.support import GRANITE
 from tests.parallel.model import Found, Model
+from tests.proppant.models import result as of_sand
+from tests.proppant.models import sandy
 
 WATER = {"conductivity": 0.6, "capacity": 4200.0, "transfer_coeficient": 5e4, "second_order": 1.0}
 HOT = {**GRANITE, "expansion_coeficient": 2e-5, "transfer_coeficient": 50.0}
@@ -38,7 +40,7 @@ def cracking(sim: Blocks) -> None:
     for one in np.unique(np.round(x, 1)):
         changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
     heat = Heat.of(sim)
-    heat.assign(None, {**HOT, "conductivity_across": 1.0, "conductivity_angle": 20.0})
+    heat.assign(None, {**HOT, "conductivity_across": 1.0, "conductivity_angle": 20.0, "friction_heat": 0.8})
     heat.initial(None, 20.0)
     sim.table("oven", [(0.0, 20.0), (3e4, 320.0), (1e5, 120.0)])
     heat.prescribe(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.15), "oven")
@@ -118,6 +120,49 @@ def steaming_on(sim: Blocks) -> None:
         sim.heat_clock(dt=0.0)
 
 
+def hot_slurry(sim: Blocks) -> None:
+    """Everything at once: hot slurry tears a cold block apart, whose rock expands and gets softer and weaker, whose
+    cracks rub and fill with sand; all that is kept has an account."""
+    sandy(sim)
+    sim.table("weaker", [(20.0, 1.5e6), (320.0, 1e6)])
+    sim.table("softer", [(20.0, ROCK["young"]), (320.0, 0.8 * ROCK["young"])])
+    sim.element_property(None, {"young": Over("softer", TEMPERATURE)})
+    sim.joint_property(None, {"tensile_strength": Over("weaker", TEMPERATURE)})
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": 1e-5, "transfer_coeficient": 300.0, "friction_heat": 1.0})
+    heat.initial(None, 20.0)
+    fluid = heat.of_fluid()
+    fluid.assign(None, WATER)
+    heat.prescribe_fluid(np.flatnonzero(np.hypot(*(sim.mesh.points - (0.8, 0.3)).T) < 0.12), 220.0)
+    diagnostics.account_energy(sim)
+
+
+def slurry_on(sim: Blocks) -> None:
+    """What happens to it."""
+    burst_on(sim)
+    if sim.clock.step == 600:
+        Heat.of(sim).of_fluid().assign(None, WATER)
+
+
+def of_slurry(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """All that may not depend on ranks, with the budgets."""
+    found = of_water(sim, notes) | of_sand(sim, notes)
+    found.update({f"energy_{name}": np.array(value) for name, value in diagnostics.energies(sim).items()})
+    for of, account in (("heat", Heat.of(sim).account()), ("fluid", Flow.of(sim).account())):
+        found.update({f"{of}_{name}": np.array(value) for name, value in account.items()})
+    return found
+
+
+def it_bursts(found: Found) -> None:
+    for of in ("heat", "fluid", "sand"):
+        assert found[f"{of}_relative"] < 1e-12, of
+    assert found["energy_relative"] < 1e-9 and found["energy_contact"] > 0.0
+    assert found["energy_commands"] < -1e5  # of motion, with the elements that were taken out
+    assert 0.0 < abs(found["energy_work_heat"]) < found["energy_joints_lost"]
+    assert found["counts"][2] > 20 and found["water"].max() > 150.0 and np.nanmax(found["temperature"]) > 20.1
+    assert found["sand_stored"] > 0.0 and found["concentration"].max() > 0.2
+
+
 def of_water(sim: Blocks, notes: dict[str, Any]) -> Found:
     """All that may not depend on ranks, with the water."""
     flow = Flow.of(sim)
@@ -169,5 +214,6 @@ def it_flows(found: Found) -> None:
 MODELS = {
     "cracking by heat": Model(cracking, result, it_cracks, more, steps=1100, middle=703),
     "steaming": Model(steaming, of_water, it_steams, steaming_on, steps=1100, middle=703),
+    "hot slurry": Model(hot_slurry, of_slurry, it_bursts, slurry_on, steps=880, middle=503),
     "warm clay": Model(warming, result, it_flows, move, steps=900, middle=503),
 }

@@ -69,21 +69,29 @@ class Budget:
         if self.start is None:
             self.start = stored
         else:
-            for name in STORED:
-                change = stored[name] - self.left[name]
-                if self.by_heat:
-                    self.heat += change
-                    self.of_joints += change if name == "joints" else 0.0
-                else:
-                    self.commands[name] += change
+            self._book_change(stored)
         for name in WORK:
             self.accounts[name] -= half[name]
         sim.cold["work"] = np.zeros((sim.n_own, energy.WORK))
         self.running = True
 
+    def _book_change(self, stored: dict[str, float]) -> None:
+        """So much is stored after the interruption."""
+        for name in STORED:
+            change = stored[name] - self.left[name]
+            if self.by_heat:
+                self.heat += change
+                self.of_joints += change if name == "joints" else 0.0
+            else:
+                self.commands[name] += change
+
     def pause(self, sim: Blocks, by_heat: bool = False) -> None:
         """A command, or heat, is about to change the model: bring the account to the whole step. Collective."""
         if not self.running:
+            if self.by_heat and not by_heat:  # what heat did since then is its own
+                stored, _ = self._read(sim)
+                self._book_change(stored)
+                self.left, self.by_heat = stored, False
             return
         self.by_heat = by_heat
         self.left, half = self._read(sim)

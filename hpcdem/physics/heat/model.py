@@ -25,7 +25,7 @@ from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat import friction, kernels
 from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.properties import ISO_HEAT
 
@@ -43,8 +43,10 @@ NEAR, DEEP = 1e-3, 0.2
 SPREAD = 0.1
 """By how much of the mean edge corners of one node may be apart, in joints that open."""
 TEMPERATURE, GIVEN, CAPACITY, UNSTRESSED = "temperature", "heat_given", "heat_capacity", "unstressed"
+RUBBED = "heat_of_friction"
 """Columns of elements: of corners temperature [K], heat that conditions gave [J/m], heat capacity [J/(m K)]; mean
-temperature at which the element is free of thermal stress [K]."""
+temperature at which the element is free of thermal stress [K]; of corners heat of friction that waits for the next
+cycle [J/m]."""
 _NAMES = tuple(one.name for one in ISO_HEAT.properties)
 
 
@@ -95,6 +97,8 @@ class Heat(SurfaceLoad):
         self._found_for: tuple[float, ...] = ()
         self._passes = False
         self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
+        self._rubs = False
+        self._power: np.ndarray | None = None
         self._told = 0.0
         self._limit = math.inf
 
@@ -379,6 +383,10 @@ class Heat(SurfaceLoad):
         cold[CAPACITY] = self._corner_capacity[own].copy()
         cold[TEMPERATURE] = self.t[own]  # one place for both
         self._make_conductances()
+        parts = self.column("friction_heat")[self.row]
+        self._rubs = bool((parts[blocks.alive] > 0.0).any())
+        if self._rubs and RUBBED not in cold:
+            cold[RUBBED] = np.zeros_like(cold[GIVEN])
         if self.fluid is not None:
             self.fluid.bind()
         self._make_nodes()
@@ -408,6 +416,11 @@ class Heat(SurfaceLoad):
         k = np.column_stack([
             along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * c * s,
         ])  # fmt: skip
+        heat = (
+            self.column("capacity")[self.row[number]]
+            * blocks.element_rows.column("density")[blocks.element_row[number]]
+        )
+        self._effusivity = np.sqrt(np.sqrt(along * across) * heat)
         self._g = np.empty((len(number), 6 if blocks.wide else 3))
         mesh = blocks.reference
         kernels.conductances(number, mesh.points, mesh.cells, k, self._g)
@@ -672,11 +685,23 @@ class Heat(SurfaceLoad):
             )
         if self.fluid is not None:
             self.fluid.check()
+        self._check_friction()
         if self.expands and user_laws.in_use(blocks):
             raise CommandError(
                 f"{user_laws.some(blocks)} has a law of the user, which knows no temperature: expansion-coeficient "
                 "must be 0 with it"
             )
+
+    def _check_friction(self) -> None:
+        """CommandError if heat of friction is wanted where nothing can slide in time. Not collective."""
+        blocks, o = self.blocks, self.blocks.options
+        warm = np.flatnonzero((self.column("friction_heat")[self.row] > 0.0) & blocks.alive)
+        if len(warm) and self.on and o.mechanical and not (o.dynamic and o.collision):
+            raise CommandError(
+                f"element {warm[0]} has friction-heat, but "
+                + ("surfaces do not touch: model option collision on" if o.dynamic else
+                   "nothing slides in time in static runs: model option thermal off, or dynamic on")
+            )  # fmt: skip
 
     def check_start(self) -> None:
         o = self.blocks.options
@@ -721,6 +746,8 @@ class Heat(SurfaceLoad):
         if not self.on:
             return
         self.waited += 1
+        if self._rubs and o.mechanical:
+            self._rub()
         fluid = self.flowing
         if fluid is not None and o.hydraulic:
             if fluid.flow.waited > 0:  # heat goes with the fluid
@@ -736,14 +763,36 @@ class Heat(SurfaceLoad):
                 self._find_step()
             if blocks.budget is not None and o.dynamic and (self.expands or blocks.local.warms):
                 blocks.budget.pause(blocks, by_heat=True)
+            self._take_friction()
             if fluid is not None:
                 fluid.begin_cycle(self.sub_steps * self.dt)
             for _ in range(self.sub_steps):
                 self._sub_step()
+            self._power = None
             self.cycles += 1
             blocks.local.follow_heat()
         if self.cycles % LOOK == 0:
             self._check_finite()
+
+    def _rub(self) -> None:
+        """Surfaces have slid for a step."""
+        blocks, pairs = self.blocks, self.blocks.local.pairs
+        if len(pairs):
+            out = np.zeros(self.t.shape)
+            friction.rub(
+                pairs.first, pairs.second, pairs.start, pairs.row, pairs.quad, blocks.x, blocks.v,
+                pairs.history, self._effusivity, self.column("friction_heat")[self.row[blocks.number]], blocks.clock.dt,
+                out,
+            )  # fmt: skip
+            blocks.cold[RUBBED] += out[blocks.owned]
+
+    def _take_friction(self) -> None:
+        """What has come from friction flows in during this cycle, evenly."""
+        if self._rubs:
+            rubbed = self.blocks.cold[RUBBED]
+            self.blocks.cold[GIVEN] += rubbed
+            self._power = rubbed / (self.sub_steps * self.dt)
+            rubbed[:] = 0.0
 
     def _own_corners(self) -> tuple[int, int]:
         """From where to where this rank's corners lie in t, flat."""
@@ -766,7 +815,9 @@ class Heat(SurfaceLoad):
             kernels.through_contacts(*self._touch, self.t.reshape(-1), self._q.reshape(-1))
         if fluid is not None:
             fluid.add_wall_heat(self._q.reshape(-1))
-        if self._passes or fluid is not None:
+        if self._power is not None:
+            self._q[self.blocks.owned] += self._power
+        if self._passes or fluid is not None or self._rubs:
             self.blocks.halo.fill(self._q)  # elements of other ranks touch more than is held here
         return self._q
 
@@ -822,7 +873,8 @@ class Heat(SurfaceLoad):
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these: the blocks have this heat."""
         made = Heat.of(blocks)
-        made.rows = [tuple(row) for row in state["rows"]]
+        new = tuple(one.default or 0.0 for one in ISO_HEAT.properties)
+        made.rows = [(*row, *new[len(row) :]) for row in state["rows"]]
         made.prescribed = list(state["prescribed"])
         made.faces = [FaceCondition(**one) for one in state["faces"]]
         made.accounts, made.time = dict(state["accounts"]), state["time"]

@@ -22,6 +22,8 @@ ISO_HEAT = Model(
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
         Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise; it turns with "
                  "the element", 0.0, low=-math.inf),
+        Property("friction_heat", "1", "how much of its share of the work of friction an element takes as heat where "
+                 "its faces slide on others", 0.0, high=1.0),
     ),
 )  # fmt: skip
 FLUID_HEAT = Model(

@@ -9,7 +9,7 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
-from hpcdem.physics.heat import kernels
+from hpcdem.physics.heat import friction, kernels
 from hpcdem.physics.heat.model import Heat
 
 GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5, "transfer_coeficient": 5.0}
@@ -26,6 +26,11 @@ def warm_up(threads: int = 1) -> None:
     heat.expose(None, flux=1.0)
     changes.crack(sim, np.flatnonzero(sim.joint_exists()))
     sim.step()
+    pairs, one = np.array([0]), np.ones(2)
+    friction.rub(
+        pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
+        np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
+    )  # fmt: skip
     _fluid()
 
 

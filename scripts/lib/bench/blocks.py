@@ -14,6 +14,7 @@
 | sandy-20k | the same with proppant in the fluid, which settles |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | pairs-space-20k | 20 000 touching pairs of tetrahedra: two plates that lie on each other |
+| tets-20k, tets-200k | tetrahedra as one body in vibration, 6 of a box |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
 
@@ -38,16 +39,16 @@ from hpcdem.physics.proppant.model import Proppant
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "wet": 6e6, "sandy": 5e6, "pairs": 3e6, "pairs-space": 1.5e6, "shattered": 1e6, "own": 15e6,
-    "own-quads": 10e6,
+    "flowing-quads": 3e6, "wet": 6e6, "sandy": 5e6, "pairs": 3e6, "pairs-space": 1.5e6, "tets": 8e6,
+    "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
 
 
 @dataclass(frozen=True)
 class Workload:
-    """kind: one of `RATES`; side: squares along a side, two triangles each, or a quad; in space two
-    boxes of six tetrahedra."""
+    """kind: one of `RATES`; side: squares along a side, two triangles each, or a quad; in space boxes of six
+    tetrahedra, two layers of them or a cube."""
 
     name: str
     kind: str
@@ -56,6 +57,8 @@ class Workload:
     @property
     def elements(self) -> int:
         """Triangles, quads, or tetrahedra."""
+        if self.kind == "tets":
+            return 6 * self.side**3
         return 12 * self.side**2 if self.kind == "pairs-space" else self.side**2 * (1 if "quads" in self.kind else 2)
 
 
@@ -76,6 +79,8 @@ WORKLOADS = {
         Workload("sandy-20k", "sandy", 100),
         Workload("pairs-20k", "pairs", 141),
         Workload("pairs-space-20k", "pairs-space", 28),
+        Workload("tets-20k", "tets", 15),
+        Workload("tets-200k", "tets", 32),
         Workload("shattered-20k", "shattered", 100),
     )
 }
@@ -336,6 +341,19 @@ def pairs_space(sim: Any, side: int) -> None:
     sim.close_model()
 
 
+def tets(sim: Any, side: int) -> None:
+    """A cube of side x side x side boxes of six tetrahedra without joints, in vibration."""
+    from hpcdem.pre.mesh import structured_space
+
+    line = 0.01 * np.arange(side + 1)
+    sim.take_mesh(structured_space.box((line, line, line), 6))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.option(collision=False)
+    sim.close_model()
+    corners = (slice(None), slice(None), slice(0, 3))
+    sim.v.reshape(-1, 4, 4)[corners] = 0.02 * np.sin(300.0 * sim.x.reshape(-1, 4, 4)[corners] + 1.0)
+
+
 def shattered(sim: Any, side: int) -> None:
     """Every element a body of its own, all pressed together by a frame that does not give way."""
     mesh = square(side)
@@ -363,5 +381,5 @@ def _swell(sim: Any, factor: float) -> None:
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
     "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "sandy": sandy, "pairs": pairs,
-    "pairs-space": pairs_space, "shattered": shattered, "own": own, "own-quads": own_quads,
+    "pairs-space": pairs_space, "tets": tets, "shattered": shattered, "own": own, "own-quads": own_quads,
 }  # fmt: skip
