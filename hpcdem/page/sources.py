@@ -49,6 +49,19 @@ class Sources:
         for path in self.paths:
             if path.is_dir() and run_folder.running(path) is None and not any(s.folder == path for s in self.found):
                 raise HpcdemError(f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {path}")
+        self._see_one()
+
+    def _see_one(self) -> None:
+        """HpcdemError if there are frames, and none of their first ones can be shown, as those in three dimensions."""
+        said: HpcdemError | None = None
+        for source in self.found:
+            try:
+                self.moment(source.frames[0])
+                return
+            except HpcdemError as problem:
+                said = said or problem
+        if said is not None:
+            raise said
 
     def look(self) -> None:
         """See which frames there are now."""

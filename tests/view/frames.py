@@ -105,3 +105,16 @@ def write_discs(folder: Path, step: int = 3, **values: int) -> Path:
     path = folder / f"all_{step:010d}.vtkhdf"
     write_vtkhdf(path, discs(step, **values), SerialComm())
     return path
+
+
+def write_tetrahedra(folder: Path) -> Path:
+    """One tetrahedron: a frame in three dimensions."""
+    at = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    none = {name: np.zeros(0, np.int64) for name in ("number", "first", "last")} | {"state": np.zeros(0)}
+    frame = MeshFrame(
+        5, 1e-3, 1e-6, Table({"number": np.arange(4), "x": at[:, 0], "y": at[:, 1], "z": at[:, 2]}, 0, 4),
+        Table({"number": np.arange(1), "corners": np.array([4]), "stress_yy": np.ones(1)}, 0, 1), Table(none, 0, 0), {},
+    )  # fmt: skip
+    path = folder / "body_0000000005.vtkhdf"
+    write_mesh_frame(path, frame, SerialComm())
+    return path
