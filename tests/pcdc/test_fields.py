@@ -99,7 +99,7 @@ def test_ranks_and_a_restart_do_not_change_a_bit(resident, alone, tmp_path, rank
     [("field create 'a' seed 1", "a field has one distribution, weibull, normal or lognormal, not none"),
      ("field create 'a' weibull 1 2 normal 1 2 seed 1", "not weibull and normal"),
      ("field create 'a' weibull 1 2", "lacks seed"), ("field create 'a' weibull 1 -2 seed 1", "above 0"),
-     ("element property young table 'E'", "where 'over x' or 'over y' is expected"),
+     ("element property young table 'E'", "where 'over x' or 'over y' or 'over temperature' is expected"),
      ("element property young table 'E' along y", "read 'along', expected 'over x' or 'over y'"),
      ("element property young table 'E' over z", "expected one of x, y"),
      ("element property young table 'none' over y", "young: there is no table 'none'"),

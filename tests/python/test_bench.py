@@ -261,4 +261,4 @@ def test_help():
     from bench.cli import ABOUT, bench
 
     assert all(name in ABOUT for name in workloads())
-    assert set(bench.commands) == {"blocks", "coupled", "push", "start", "memory", "strain-stress", "scaling"}
+    assert set(bench.commands) == {"blocks", "coupled", "push", "start", "memory", "strain-stress", "scaling", "view"}

@@ -101,7 +101,7 @@ def test_a_block_moved_over_a_plate_with_other_elements(potential: str, ripple: 
     sim.close_model()
     moved, start = sim.number >= len(plate.cells), sim.x.copy()
     sim.rebuild_state.skin = 2.5
-    pairs = ContactSpace(sim, sim.local, *ContactSpace.remembered(sim))
+    pairs = ContactSpace(sim, sim.local.shapes, sim.local.kinds, *ContactSpace.remembered(sim))
 
     def force(way: np.ndarray) -> np.ndarray:
         sim.x[:] = start

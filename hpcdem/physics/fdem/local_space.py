@@ -39,7 +39,7 @@ class LocalSpace(Local):
         self.laws: list = []
         self._make_constants()
         self._make_joints()
-        self.pairs: Any = ContactSpace(sim, self, *ContactSpace.remembered(sim))
+        self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
         self._make_loads()
         self._make_nodes()
         self._set_masses()
@@ -242,6 +242,6 @@ class LocalSpace(Local):
 
     def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
         """New contact lists. Collective."""
-        self.pairs = ContactSpace(self.sim, self, *self.pairs.known())
+        self.pairs = ContactSpace(self.sim, self.shapes, self.kinds, *self.pairs.known())
         if self.sim.masses_change():
             self._set_masses()

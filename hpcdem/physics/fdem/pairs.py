@@ -19,7 +19,6 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.properties import Rows
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.pairs_space import ShapesSpace
     from hpcdem.physics.fdem.state import State
 
 
@@ -32,14 +31,26 @@ def cut_corner(mesh: Mesh) -> np.ndarray:
     return out
 
 
-class Shapes:
-    """Geometry in the mesh of the elements `numbers` (n,), and what contact needs to know of their joints.
+class Measures(Protocol):
+    """What contact needs to know of the shapes of elements (n,), in the plane and in space.
 
-    length (n, 4) of the edges [m]; double_area: twice the area of a body [m2]; slender: mean edge squared over that;
-    overlay: smallest overlay penalty of the element's joints [Pa], NaN without joints. Where surfaces lie flat on each
-    other pressure is slope P d (1 / h_1 + 1 / h_2); an element has nodes corners; no element is less slender than
-    `least`.
+    double_area: twice the area of a body [m2], in space the length h of the potential [m]; edge: mean edge [m], in
+    space 1; slender: mean edge squared over double_area, in space the root of a face's area over it; overlay: smallest
+    overlay penalty of the element's joints [Pa], NaN without joints. Where surfaces lie flat on each other pressure is
+    slope P d (1 / h_1 + 1 / h_2); an element has nodes corners; no element is less slender than `least`.
     """
+
+    slope: float
+    nodes: float
+    least: float
+    double_area: np.ndarray
+    edge: np.ndarray
+    slender: np.ndarray
+    overlay: np.ndarray
+
+
+class Shapes:
+    """`Measures` of the elements `numbers` (n,), as they are in the mesh; length (n, 4) of their edges [m]."""
 
     slope, nodes, least = 3.0, 3.0, 1.0
 
@@ -110,7 +121,7 @@ class Surfaces:
     NaN without joints; young [Pa], density [kg/m3].
     """
 
-    def __init__(self, sim: State, shapes: Shapes | ShapesSpace, faces: np.ndarray, rows: np.ndarray) -> None:
+    def __init__(self, sim: State, shapes: Measures, faces: np.ndarray, rows: np.ndarray) -> None:
         model, joint, element = sim.face_row[faces], sim.joint_row[faces], sim.element_row[faces // 4]
 
         def of_elements(name: str) -> np.ndarray:

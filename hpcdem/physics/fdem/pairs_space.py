@@ -19,7 +19,6 @@ from hpcdem.physics.fdem.pairs import Kinds, Surfaces, smallest_overlay
 from hpcdem.physics.fdem.tetrahedra import FACES
 
 if TYPE_CHECKING:
-    from hpcdem.physics.fdem.local_space import LocalSpace
     from hpcdem.physics.fdem.state import State
 
 
@@ -109,8 +108,7 @@ def lengths(sim: State) -> np.ndarray:
 
 
 class ShapesSpace:
-    """What `pairs.Shapes` is in the plane: length squared over double_area becomes the square root of the area of a
-    face over the length h of the potential, and pressure is slope P d / h. Munjiza's has h the mean altitude of an
+    """`pairs.Measures` of tetrahedra: pressure is slope P d / h. Munjiza's potential has h the mean altitude of an
     element, and slope 4."""
 
     nodes, least = 4.0, 0.0
@@ -136,7 +134,7 @@ class ContactSpace:
     """
 
     def __init__(
-        self, sim: State, tables: LocalSpace, face: np.ndarray, target: np.ndarray, values: np.ndarray
+        self, sim: State, shapes: ShapesSpace, kinds: Kinds, face: np.ndarray, target: np.ndarray, values: np.ndarray
     ) -> None:
         """face, target (k,), values (k, 5): what pairs remember."""
         self.threads = sim.threads
@@ -146,7 +144,7 @@ class ContactSpace:
             self.face = surface.faces[sim.where[surface.faces // 4] >= 0]
             rows = np.flatnonzero(surface.first[sim.number] >= 0)
         self._place(sim, rows)
-        self._make_list(sim, tables)
+        self._make_list(sim, shapes, kinds)
         self._put_histories(len(sim.alive), face, target, values)
         self._make_entries(sim)
 
@@ -167,7 +165,7 @@ class ContactSpace:
             sim.x, skin, Surface.of(sim).clusters, sim.partner, sim.closed_faces(),
         )  # fmt: skip
 
-    def _make_list(self, sim: State, tables: LocalSpace) -> None:
+    def _make_list(self, sim: State, shapes: ShapesSpace, kinds: Kinds) -> None:
         """Pairs that may touch, and their properties."""
         self.first, self.second = first, second = self._near(sim, sim.rebuild_state.skin)
         m = len(first)
@@ -181,12 +179,12 @@ class ContactSpace:
         surface = Surface.of(sim)
         if sim.options.potential != MUNJIZA:
             self.length = surface.length[self.element]
-        shapes, dynamic = tables.shapes, sim.options.dynamic
+        dynamic = sim.options.dynamic
         faces = Surfaces(sim, shapes, self.face, self.face_row)
         targets = Surfaces(sim, shapes, surface.first[self.element], self.row)
         shared, overlay = shared_faces(sim, self.face[first] // 4, self.element[second])
         self.law = faces.of_pairs(first, targets, second, shared, overlay)
-        varied = np.flatnonzero(surface.several(tables.kinds)[self.element[second]])
+        varied = np.flatnonzero(surface.several(kinds)[self.element[second]])
         if len(varied):
             self._vary(sim, surface, shapes, faces, varied, shared, overlay)
         if not dynamic:
