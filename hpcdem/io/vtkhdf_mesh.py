@@ -2,8 +2,8 @@
 
 Points are the corners of the elements, element by element (in the plane z = 0): where joints open, corners that began
 as one point part. Cells are the elements in the order of their numbers (VTK_TRIANGLE, VTK_QUAD, in space VTK_TETRA),
-then the joints (VTK_LINE, along the edge of their lower face). The cell data `cell` tells them apart; what one of them
-does not have is NaN, or -1 for whole numbers.
+then the joints: their lower face, VTK_LINE, in space VTK_TRIANGLE. The cell data `cell` tells them apart; what one of
+them does not have is NaN, or -1 for whole numbers.
 
 Format: VTK File Formats, section VTKHDF, https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html
 """
@@ -25,6 +25,8 @@ from hpcdem.io.slabs import find_rows
 
 ELEMENT, JOINT = 0, 1
 """Values of the cell data `cell`."""
+CORNERS = {2: ("first", "last"), 3: ("first", "second", "last")}
+"""Columns of joints with their corners, by dimensions of space."""
 _LINE, _TRIANGLE, _QUAD, _TETRA = 3, 5, 9, 10
 SUPPORTS = ("bolts", "liners")
 """Groups of a file with tables of their nodes and elements."""
@@ -36,7 +38,7 @@ class MeshFrame:
     """One output time of a model of blocks, as slabs in ascending order of "number".
 
     corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
-    columns; joints: number, first, last (corners at their ends) and further columns. group_names: by name of an integer
+    columns; joints: number, their `CORNERS` and further columns. group_names: by name of an integer
     column of the elements what its values stand for. supports: by name ("bolts", "liners") columns of their "nodes"
     and "elements", equal on all ranks.
     """
@@ -56,7 +58,8 @@ class MeshState:
     """A whole frame, to be drawn or measured.
 
     points (n, 2), in space (n, 3): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles;
-    joints (nj, 2): rows of points at their ends; of_points, of_elements, of_joints: columns by name, vectors as points;
+    joints (nj, 2), in space (nj, 3): rows of points of their corners; of_points, of_elements, of_joints: columns by
+    name, vectors as points;
     group_names and supports as in `MeshFrame`.
     """
 
@@ -80,12 +83,14 @@ def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
         return None
     corners, elements, joints = ({c: np.concatenate([p[k][c] for p in parts]) for c in parts[0][k]} for k in range(3))
     number = corners["number"]
-    ends = np.stack([np.searchsorted(number, joints[k]) for k in ("first", "last")], axis=1)
+    points = np.stack([corners[c] for c in "xyz" if c in corners], axis=1)
+    of_joints = CORNERS[points.shape[1]]
+    ends = np.stack([np.searchsorted(number, joints[k]) for k in of_joints], axis=1)
     return MeshState(
-        frame.step, frame.time, frame.dt, np.stack([corners[c] for c in "xyz" if c in corners], axis=1),
+        frame.step, frame.time, frame.dt, points,
         _cells(elements["corners"]), ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y", "z")}),
         {k: v for k, v in elements.items() if k != "corners"},
-        {k: v for k, v in joints.items() if k not in ("first", "last")}, frame.group_names, frame.supports,
+        {k: v for k, v in joints.items() if k not in of_joints}, frame.group_names, frame.supports,
     )  # fmt: skip
 
 
@@ -126,7 +131,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
             if dim == 3 and not solid:
                 raise NotImplementedError
             points = top["Points"][:, :dim]
-            ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, 2)
+            ends = top["Connectivity"][int(sizes.sum()) :].reshape(-1, dim)
             whole = elements[:n].all() and len(ends) == joints.sum() and int(sizes.sum()) == len(points)
             if not whole or (len(ends) and not 0 <= ends.min() <= ends.max() < len(points)):
                 raise ValueError("cells and points do not belong together")
@@ -160,8 +165,8 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
     """Collective: write the frame to `path` (usually ``*.vtkhdf``). The content does not depend on the number of ranks.
     Raises HpcdemError on all ranks; `later`: see `h5.writing`."""
     corners, elements, joints = frame.corners, frame.elements, frame.joints
-    keys = [corners.columns["number"]]
-    ends = np.stack([find_rows(comm, keys, [joints.columns[k]]) for k in ("first", "last")], axis=1)
+    keys, dim = [corners.columns["number"]], 3 if "z" in corners.columns else 2
+    ends = np.stack([find_rows(comm, keys, [joints.columns[k]]) for k in CORNERS[dim]], axis=1)
     lost = "a joint names a corner that is not there" if len(ends) and ends.min() < 0 else None
     comm.agree(f"cannot write {os.fspath(path)}: {lost}" if lost else None)
     sizes = elements.columns["corners"]
@@ -172,7 +177,7 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
         for name, number in (
             ("NumberOfPoints", n_corners),
             ("NumberOfCells", n + n_joints),
-            ("NumberOfConnectivityIds", n_corners + 2 * n_joints),
+            ("NumberOfConnectivityIds", n_corners + dim * n_joints),
         ):
             out.whole(f"VTKHDF/{name}", np.array([number], np.int64))
         columns = corners.columns
@@ -181,19 +186,19 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
         counted = np.arange(first, first + int(sizes.sum()), dtype=np.int64)
         out.parts(
             "VTKHDF/Connectivity",
-            [(counted, first), (ends.reshape(-1), n_corners + 2 * joints.offset)],
-            n_corners + 2 * n_joints,
+            [(counted, first), (ends.reshape(-1), n_corners + dim * joints.offset)],
+            n_corners + dim * n_joints,
         )
         zero = np.zeros(int(comm.rank == 0), np.int64)
-        lines = n_corners + 2 * np.arange(joints.offset + 1, joints.offset + 1 + len(joints), dtype=np.int64)
+        lines = n_corners + dim * np.arange(joints.offset + 1, joints.offset + 1 + len(joints), dtype=np.int64)
         out.parts(
             "VTKHDF/Offsets",
             [(zero, 0), (first + np.cumsum(sizes), 1 + elements.offset), (lines, 1 + n + joints.offset)],
             1 + n + n_joints,
         )
         starts = elements.offset, n + joints.offset
-        four = _TETRA if "z" in columns else _QUAD
-        types = np.where(sizes == 4, four, _TRIANGLE).astype(np.uint8), np.full(len(joints), _LINE, np.uint8)
+        four, of_joints = (_TETRA, _TRIANGLE) if dim == 3 else (_QUAD, _LINE)
+        types = np.where(sizes == 4, four, _TRIANGLE).astype(np.uint8), np.full(len(joints), of_joints, np.uint8)
         out.parts("VTKHDF/Types", list(zip(types, starts, strict=True)), n + n_joints)
         out.group("VTKHDF/PointData")
         for name, values in _packed({k: v for k, v in columns.items() if k not in ("x", "y", "z")}).items():
@@ -237,7 +242,7 @@ def _cell_data(elements: Table, joints: Table) -> dict[str, list[np.ndarray]]:
     """Name -> this rank's values on elements and joints."""
     tables = [
         {k: v for k, v in elements.columns.items() if k != "corners"},
-        {k: v for k, v in joints.columns.items() if k not in ("first", "last")},
+        {k: v for k, v in joints.columns.items() if k not in CORNERS[3]},
     ]
     sizes = len(elements), len(joints)
     data: dict[str, list[np.ndarray]] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.commands.fdem.cracks import COLUMNS
+from hpcdem.commands.fdem.cracks import columns
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from tests.pcdc.test_whole import SCRIPTS, tables
 from tests.property.workers import Resident
@@ -47,7 +47,7 @@ def alone(resident: Resident, tmp_path_factory) -> Path:
 def rows(folder: Path) -> dict[str, np.ndarray]:
     with open(folder / "data" / "cracks.csv", newline="", encoding="utf-8") as file:
         head, *lines = list(csv.reader(file))
-    assert head == list(COLUMNS.values())
+    assert head == list(columns(2).values())
     return dict(zip(head, np.array(lines, float).T))
 
 

@@ -10,12 +10,16 @@ from hpcdem.physics.fdem import diagnostics
 from hpcdem.physics.fdem.state import Crack
 
 NAME = "cracks.csv"
-COLUMNS = {
-    "step": "step", "time": "time [s]", "joint": "joint", "x": "x [m]", "y": "y [m]", "mode": "mode",
-    "length": "length [m]", "kinetic": "kinetic_energy [J/m]", "peak_step": "peak_step",
-    "peak_kinetic": "peak_kinetic_energy [J/m]",
-}  # fmt: skip
-"""Names of `diagnostics.events` and of the columns, in their order."""
+
+
+def columns(dim: int) -> dict[str, str]:
+    """Names of `diagnostics.events` and of the columns, in their order, by dimensions of space."""
+    joule, size = ("J", {"joint_area": "joint_area [m2]"}) if dim == 3 else ("J/m", {"length": "length [m]"})
+    return {
+        "step": "step", "time": "time [s]", "joint": "joint", **{axis: f"{axis} [m]" for axis in "xyz"[:dim]},
+        "mode": "mode", **size, "kinetic": f"kinetic_energy [{joule}]", "peak_step": "peak_step",
+        "peak_kinetic": f"peak_kinetic_energy [{joule}]",
+    }  # fmt: skip
 
 
 def record(project: Project) -> None:
@@ -39,7 +43,8 @@ def _write(project: Project, cracks: Sequence[Crack]) -> None:
     with project.blocks.timers.around("output"):
         path = project.folder() / NAME
         new = diagnostics.described(project.blocks, cracks[done or 0 :])
-        table = zip(*(new[name].tolist() for name in COLUMNS), strict=True)
+        named = columns(project.dim)
+        table = zip(*(new[name].tolist() for name in named), strict=True)
         rows = [",".join(map(repr, row)) for row in table]
-        append_rows(path, ",".join(COLUMNS.values()), rows, 0 if done is None else None, project.comm)
+        append_rows(path, ",".join(named.values()), rows, 0 if done is None else None, project.comm)
     project.cracks_filed = len(cracks)

@@ -21,7 +21,7 @@ from hpcdem.io.slabs import to_slabs
 from hpcdem.io.vtkhdf_mesh import MeshFrame, MeshState, write_mesh_frame
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.diagnostics import PROPERTIES, QUANTITIES
+from hpcdem.physics.fdem.diagnostics import JOINT_SIZE, PROPERTIES, QUANTITIES
 from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.model import Flow
@@ -141,9 +141,8 @@ def _with_cracks(blocks: Blocks, elements: np.ndarray, joints: dict[str, np.ndar
     faces = (4 * elements[:, None] + np.arange(4)).reshape(-1)
     beside = blocks.partner[faces]
     cracks = faces[(beside > faces) & blocks.open[faces] & (blocks.joint_row[faces] == 0) & blocks.alive[beside // 4]]
-    ends = mesh.points[mesh.face_points(cracks)]
     known = {"number": cracks, "state": np.zeros(len(cracks)), "mode": np.zeros(len(cracks)),
-             "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
+             JOINT_SIZE[mesh.dim]: mesh.face_sizes(cracks)}  # fmt: skip
     nothing = np.full(len(cracks), np.nan)
     return {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
 
@@ -171,9 +170,8 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     columns = FLUID | {column: name for column, name in OF_OTHERS.items() if name in flow.more}
     fluid = flow.owned_values(CHANNEL, list(columns.values()))
     new = np.setdiff1d(fluid["number"], joints["number"])
-    ends = mesh.points[mesh.face_points(new)]
     known = {"number": new, "state": np.ones(len(new)), "mode": np.zeros(len(new)),
-             "length": np.hypot(*(ends[:, 1] - ends[:, 0]).T)}  # fmt: skip
+             JOINT_SIZE[mesh.dim]: mesh.face_sizes(new)}  # fmt: skip
     nothing = np.full(len(new), np.nan)
     found = {name: np.concatenate([values, known.get(name, nothing)]) for name, values in joints.items()}
     order = np.argsort(found["number"])
@@ -189,12 +187,10 @@ def frame(project: Project) -> MeshFrame:
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     corners = _corners(blocks)
     elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
-    joints = {"number": np.empty(0, np.int64)}  # in space there are none yet
-    if mesh.dim == 2:
-        joints = _with_cracks(
-            blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
-        )
-        joints = _with_channels(blocks, joints)
+    joints = _with_cracks(
+        blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
+    )
+    joints = _with_channels(blocks, joints)
     elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
     names: dict[str, list[str]] = {}
     for set_name, groups in project.groups[ELEMENT].sets.items():
@@ -204,8 +200,7 @@ def frame(project: Project) -> MeshFrame:
             code[members] = k
         elements[column] = code[elements["number"]]
         names[column] = list(groups)
-    ends = mesh.face_corners(joints["number"])
-    joints["first"], joints["last"] = ends[:, 0], ends[:, 1]
+    joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
     of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
     clock = blocks.clock
     there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]

@@ -180,7 +180,7 @@ ANGLE = Kind("<f>", "an angle from 0 to below 90 [degrees]", number(0.0, 90.0 - 
 TABLED = Kind("<f>|table <s>|function <s>", "a number, table 'name' or function 'file.py:name'", number(), tabled=True)
 COUNT = Kind("<i>", "a whole number above 0", whole(1))
 ZERO_OR_MORE = Kind("<i>", "a whole number, not negative", whole(0))
-POINTS = Kind("3", "3, the points of a joint in two dimensions,", whole(3, 3))
+POINTS = Kind("3", "3, the points of a joint,", whole(3, 3))
 FREEDOM = Kind("0|1|2", "0 free, 1 held or 2 along a vector (3 is for 3-D)", whole(0, 2))
 DIMENSIONS = Kind("2|3", "2 or 3", whole(2, 3))
 SPLIT = Kind("5|6|12", "5, 6 or 12", _one_of(5, 6, 12))

@@ -359,7 +359,7 @@ COHESIVE = Model(
                "p{enalty}-o{verlay}", "p{enalty}-n{ormal}", "p{enalty}-s{hear}",
                also={"penalty-overlay": ("p{enalty}-o{verlap}",)}),
      Option("np", (POINTS,), "integration points", "1", "3")),
-    of=properties.COHESIVE,
+    of=properties.COHESIVE, dims=BOTH,
 )  # fmt: skip
 _APERTURES = {
     "aperature-initial": ("a{perture}-i{nitial}",), "aperature-maximum": ("a{perture}-max{imum}",),
@@ -559,7 +559,7 @@ def _group_command(kind: str, notation: str) -> Command:
         f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
         "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
-        dims=BOTH if kind in ("element", "element-face", "node") else PLANE,
+        dims=BOTH if kind in ("element", "element-face", "face-joint", "node") else PLANE,
     )  # fmt: skip
 
 
@@ -581,8 +581,8 @@ _OF_SOLIDS = (
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 3"),
-            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three this version computes elastic "
-                            "bodies", "", "2"),), manual=True, dims=BOTH),
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three this version computes bodies of "
+                            "tetrahedra, whole or with joints", "", "2"),), manual=True, dims=BOTH),
     Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
             "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
             (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),
@@ -902,15 +902,15 @@ _OBJECTS = (
             ("pcdc face-joint c-model c-i-c-i property friction 30 cohesion 10e6 tensile-strength 2e6 gf1 20 gf2 200",
              "pcdc face-joint c-model hydr-p-m property fluid-density 1000 fluid-bulk 2.2e9 viscosity 1e-6 "
              "aperature-initial 1e-5 aperature-minumum 1e-6 aperature-maximum 1e-3"),
-            models=(COHESIVE, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint"),
+            models=(COHESIVE, POROUS, PROPPANT, FLUID_HEAT), ranged="face-joint", dims=BOTH),
     Command("face-j{oint} prop{erty}", "Changes properties of joints that have a model; the others stay.",
             ("pcdc face-joint property tensile-strength 1e6 range geometry 'fault'",
              "pcdc face-joint property tensile-strength field 'strength' cohesion field 'strength'",
              "pcdc face-joint property aperature-initial field 'aperture' shear-dilation 5 range geometry 'fault'"),
             options=(*_properties(COHESIVE), *_properties(POROUS), *_properties(FLUID_HEAT), *_properties(GRAINS)),
-            ranged="face-joint", needs_option=True),
+            ranged="face-joint", needs_option=True, dims=BOTH),
     Command("face-j{oint} res{et} state", "Damage of joints that are not broken is forgotten.",
-            ("pcdc face-joint reset state",), ranged="face-joint"),
+            ("pcdc face-joint reset state",), ranged="face-joint", dims=BOTH),
     _group_command("node", "node"),
     Command("node bou{ndary}", "A boundary condition of nodes.",
             ("pcdc node boundary mech-vel-b-c velocity-y -0.05 range group 'platen' set 'bc'",

@@ -394,7 +394,6 @@ class ModelDefinition:
         """Assign a cohesive model to inner edges: elements on both sides get nodes of their own, tied by tractions.
 
         Joints that are broken stay broken. None: all inner edges."""
-        self.refuse_in_space("joints between elements")
         at = self.numbers_of_joints(joints)
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 

@@ -90,35 +90,42 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
     "temperature": Quantity("node", "K", "temperature; NaN without a thermal model"),
-    "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken"),
-    "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken"),
-    "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken"),
-    "break_energy": Quantity("joint", "J/m", "kinetic energy of its two elements when it broke; NaN if it is not"),
-    "damage": Quantity("joint", "1", "largest damage of its points, 0 to 1"),
-    "opening": Quantity("joint", "m", "mean opening"),
-    "slip": Quantity("joint", "m", "mean slip"),
-    "normal_stress": Quantity("joint", "Pa", "mean normal stress, tension positive"),
-    "shear_stress": Quantity("joint", "Pa", "mean shear stress"),
-    "normal_stress_largest": Quantity("joint", "Pa", "largest normal stress of its three points, tension positive"),
-    "shear_stress_largest": Quantity("joint", "Pa", "largest shear stress of its three points, without sign"),
+    "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
+    "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),
+    "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken", dims=BOTH),
+    "break_energy": Quantity(
+        "joint", "J/m", "kinetic energy of its two elements when it broke; NaN if it is not", dims=BOTH
+    ),
+    "damage": Quantity("joint", "1", "largest damage of its points, 0 to 1", dims=BOTH),
+    "opening": Quantity("joint", "m", "mean opening", dims=BOTH),
+    "slip": Quantity("joint", "m", "mean slip, in space its size", dims=BOTH),
+    "normal_stress": Quantity("joint", "Pa", "mean normal stress, tension positive", dims=BOTH),
+    "shear_stress": Quantity("joint", "Pa", "mean shear stress, in space its size", dims=BOTH),
+    "normal_stress_largest": Quantity(
+        "joint", "Pa", "largest normal stress of its three points, tension positive", dims=BOTH
+    ),
+    "shear_stress_largest": Quantity(
+        "joint", "Pa", "largest shear stress of its three points, without sign", dims=BOTH
+    ),
     **{
-        f"{name}_stress_{point}": Quantity("joint", "Pa", f"{name} stress at the {point} of its three points", False)
+        f"{name}_stress_{point}": Quantity(
+            "joint", "Pa", f"{name} stress at the {point} of its three points", False, BOTH
+        )
         for name in ("normal", "shear")
         for point in ("first", "middle", "last")
     },
     "length": Quantity("joint", "m", "length in the mesh"),
+    "joint_area": Quantity("joint", "m2", "area in the mesh", dims=(3,)),
 }
 """Names that `values`, `total` and frames know. With `element_` or `joint_` before they are means of
-corners. The points of a joint go from the first corner of the face that it is numbered by to the last; the laws are
-evaluated there."""
+corners. The points of a joint go from the first corner of the face that it is numbered by to the last, in space they
+lie near its three corners; the laws are evaluated there."""
 
 for _on, _names in (("element", ("position", "displacement", "velocity")), ("joint", ("position",))):
     for _name in _names:
-        for _axis in "xyz" if _on == "element" else "xy":
+        for _axis in "xyz":
             _of = QUANTITIES[f"{_name}_{_axis}"]
-            QUANTITIES[f"{_on}_{_name}_{_axis}"] = Quantity(
-                _on, _of.unit, f"mean {_name}", False, _of.dims if _on == "element" else (2,)
-            )
+            QUANTITIES[f"{_on}_{_name}_{_axis}"] = Quantity(_on, _of.unit, f"mean {_name}", False, _of.dims)
 
 _STRENGTH = {"cohesion": "element_cohesion", "tensile": "element_tensile", "dilation": "element_dilation"}
 PROPERTIES = {
@@ -136,9 +143,11 @@ for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURG
         _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(
             _on, _model.property(_name).unit, _model.property(_name).doc, False,
-            BOTH if _on == "element" and MECH_ISO_ELASTIC.has(_name) else (2,),
+            BOTH if _on == "joint" or MECH_ISO_ELASTIC.has(_name) else (2,),
         )  # fmt: skip
 
+JOINT_SIZE = {2: "length", 3: "joint_area"}
+"""The quantity that says how large a joint is."""
 _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
 _AT_POINTS = tuple(f"{name}_stress_{point}" for name in ("normal", "shear") for point in ("first", "middle", "last"))
 
@@ -397,15 +406,14 @@ def _joint_columns(sim: Blocks, names: Sequence[str], at: np.ndarray | None = No
         columns["shear_stress_largest"] = np.abs(seen[:, 3:]).max(axis=1)
     for name in PROPERTIES["joint"].keys() & wanted:
         columns[name] = sim.joint_rows.column(PROPERTIES["joint"][name])[sim.joint_row[lower]]
-    if "length" in wanted:
-        ends = connectivity.face_points(mesh.cells, lower)
-        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
-        columns["length"] = np.hypot(way[:, 0], way[:, 1])
-    if {"joint_position_x", "joint_position_y"} & wanted:
-        row, k = sim.where[lower // 4], lower % 4
-        after = np.where(k + 1 < np.where(mesh.cells[lower // 4, 3] >= 0, 4, 3), k + 1, 0)
-        for c, axis in enumerate("xy"):
-            columns[f"joint_position_{axis}"] = 0.5 * (sim.x[row, 2 * k + c] + sim.x[row, 2 * after + c])
+    if JOINT_SIZE[sim.dim] in wanted:
+        columns[JOINT_SIZE[sim.dim]] = mesh.face_sizes(lower)
+    places = {f"joint_position_{axis}": c for c, axis in enumerate("xyz"[: sim.dim])}
+    if places.keys() & wanted:
+        corners = mesh.face_corners(lower)
+        row = sim.where[corners // 4]
+        for name, c in places.items():
+            columns[name] = sim.x[row, sim.stride * (corners % 4) + c].mean(axis=1)
     return columns
 
 
@@ -504,7 +512,7 @@ def crack_rows(sim: Blocks) -> list[Crack]:
 def events(sim: Blocks) -> dict[str, np.ndarray]:
     """Joints broken so far, in order: joint, step, time [s], x, y of its middle in the mesh [m], mode (1 opened, 2
     slid; between: mixed), length [m], kinetic energy [J/m] of the two elements; peak_step, peak_kinetic: when it
-    passed its strength. Equal on all ranks. Collective."""
+    passed its strength. In space also z, and joint_area [m2] in place of length. Equal on all ranks. Collective."""
     return described(sim, crack_rows(sim))
 
 
@@ -515,10 +523,9 @@ def described(sim: Blocks, cracks: Sequence[Crack]) -> dict[str, np.ndarray]:
     found = {name: table[:, k].copy() for k, name in enumerate(Crack._fields)}
     for name in ("joint", "step", "peak_step"):
         found[name] = found[name].astype(np.int64)
-    ends = connectivity.face_points(mesh.cells, found["joint"])
-    a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
-    found["x"], found["y"] = (0.5 * (a + b)).T
-    found["length"] = np.hypot(*(b - a).T)
+    middles = mesh.points[mesh.face_points(found["joint"])].mean(axis=1)
+    found |= {axis: middles[:, c].copy() for c, axis in enumerate("xyz"[: mesh.dim])}
+    found[JOINT_SIZE[mesh.dim]] = mesh.face_sizes(found["joint"])
     return found
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.physics.fdem.definition import TRACTIONS
-from hpcdem.physics.fdem.histories import WORDS, Histories
-from hpcdem.physics.fdem.kernels import elements, space, tets
+from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
+from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels.joints import HISTORY
+from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
 from hpcdem.physics.fdem.local import ALPHA, Evaluation, Local, element_table
 from hpcdem.physics.fdem.pairs import Surfaces
 from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace
@@ -39,6 +39,7 @@ class LocalSpace(Local):
         self.laws: list = []
         self._make_constants()
         self._make_joints()
+        self._put_histories()
         self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
         self._make_loads()
         self._make_nodes()
@@ -67,10 +68,37 @@ class LocalSpace(Local):
         self.heated = False
 
     def _make_joints(self) -> None:
-        self.slots = 0
-        self.first_slot = 4 * np.arange(self.sim.n_own)
-        self.slot_face = np.empty(0, np.int64)
-        self.slot_state, self.slot_history = np.empty(0, np.uint8), np.empty((0, HISTORY))
+        """Slots of the faces, four per tetrahedron."""
+        sim, mesh = self.sim, self.sim.the_mesh()
+        self.slots = self.slots_of_triangles = 4 * self.count
+        padded = self.slots + 12  # lanes are filled four tetrahedra at a time
+        self.slot_face, self.slot_link = np.zeros(padded, np.int64), np.zeros((padded, 3), np.int32)
+        self.slot_size, self.slot_state = np.ones(padded), np.zeros(padded, np.uint8)
+        self.slot_law, self.slot_kind, self.follow = (np.full(padded, fill, np.int32) for fill in (0, 0, -1))
+        self.head = np.full(4 * -(-self.count // tets.BLOCK), -1, np.int32)
+        self.slot_history = np.zeros((padded, HISTORY))
+        self.first_slot = 4 * np.arange(sim.n_own)
+        lost = joints_space.links(
+            sim.number, self.rows[: self.count], mesh.points, mesh.cells, sim.where, sim.partner, sim.closed_faces(),
+            sim.joint_row, self.slot_face, self.slot_link, self.slot_size, self.slot_law, self.slot_kind,
+            self.slot_state,
+        )  # fmt: skip
+        self._agree_on_lost(int(lost), "the joint of face")
+        self.jointed = bool(self.slot_state.any())
+        self._make_joint_laws()
+
+    def _put_histories(self) -> None:
+        histories = self.sim.histories
+        at = np.flatnonzero(histories.keys() < 0)
+        slot = self.first_slot[histories.owners()[at]] - 1 - histories.keys()[at]
+        there = self.slot_state[slot] != NONE  # else opened meanwhile, or its partner was taken out
+        slot, rows = slot[there], histories.rows[at[there]]
+        self.slot_law[slot], self.slot_state[slot] = 0, rows[:, STATE]
+        self.slot_history[slot] = rows[:, FIRST : FIRST + HISTORY]
+        self._relink()
+
+    def _relink(self) -> None:
+        joints_space.relink(self.slot_state, self.slots, tets.BLOCK, self.head, self.follow)
 
     def _make_loads(self) -> None:
         sim, mesh, own = self.sim, self.sim.the_mesh(), self.sim.owned
@@ -88,13 +116,20 @@ class LocalSpace(Local):
         pass
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: what the contact
-        of its free faces can have, k = P A (1 / h + 1 / h_other) / 3 per face, h_other: the smallest of all."""
+        """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
+        k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
+        h_other) / 3 per face, h_other: the smallest of all."""
         sim, own = self.sim, self.sim.owned
         springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
-        if not sim.options.collision:
-            return springs, dashpots
         faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
+        names = ("penalty_normal", "penalty_overlay", "penalty_shear")
+        penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[sim.joint_row[faces]]
+        tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
+        each = np.where(tied, penalty / self.slot_size[: self.slots] / 3.0, 0.0).reshape(-1, 4)
+        if not sim.options.collision:
+            for k in range(4):
+                springs[:, FACES[k]] += each[:, k, None]
+            return springs, dashpots
         length = self.shapes.double_area[own]
         surfaces = Surfaces(sim, self.shapes, faces, np.repeat(np.arange(own.start, own.stop), 4))
         silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
@@ -105,13 +140,13 @@ class LocalSpace(Local):
         contact = most * self.shapes.area[own] / 3.0 * (1.0 / length[:, None] + highest)
         may_touch = ~sim.closed_faces()[faces]
         if sim.options.dynamic:
-            may_touch |= sim.joint_row[faces] > 0  # once they break
+            may_touch |= tied  # once they break
         contact = np.where(may_touch.reshape(-1, 4), contact, 0.0)
         # A third of 2 xi sqrt(k m) A, with k A = 3 `contact` and m A no more than three corners of the element have.
         drag = 2.0 * ratio * np.sqrt(contact * self.true_mass[own].max(axis=1, initial=0.0)[:, None])
         for k in range(4):
             for c in FACES[k]:
-                springs[:, c] += contact[:, k]
+                springs[:, c] += np.maximum(each[:, k], contact[:, k])
                 dashpots[:, c] += drag[:, k]
         return springs, dashpots
 
@@ -132,7 +167,7 @@ class LocalSpace(Local):
         one = self.sim.threads == 1
         self._forces: Any = tets.forces if one else tets.forces_threaded
         self._move: Any = space.move if one else space.move_threaded
-        self.of_joints = np.zeros((1, tets.ROW))
+        self.of_joints = np.zeros((len(self.sim.number) if self.sim.budget is not None else 1, tets.ROW))
 
     def forces(self) -> None:
         """Forces at the present positions, and the velocities that follow from them. Collective."""
@@ -142,15 +177,17 @@ class LocalSpace(Local):
             with timers("contact"):
                 self.pairs.forces(sim.x, sim.v, sim.clock.dt)
         with timers("force"):
-            self._fill(self.force)
+            self._fill(self.force, self.of_joints, sim.budget is not None)
         with timers("node"):
             self.move_nodes()
 
-    def _fill(self, force: np.ndarray) -> None:
+    def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
         sim, o = self.sim, self.sim.options
         self._forces(
             sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, sim.stress0 is not None,
-            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
+            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping, self.jointed,
+            self.slot_size, self.slot_link, self.slot_law, self.slot_kind, self.slot_state, self.slot_history,
+            self.head, self.follow, self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
         self.pairs.add_to(force)
 
@@ -196,20 +233,29 @@ class LocalSpace(Local):
         """Forces at the present positions; everything is put back as it was. Collective."""
         sim, pairs = self.sim, self.pairs
         kept = [
-            (table, table.copy()) for table in (sim.v, self.outside, self.felt, pairs.history, pairs.touching)
+            (table, table.copy())
+            for table in (
+                sim.v, self.outside, self.felt, pairs.history, pairs.touching, self.slot_law, self.slot_state,
+                self.head, self.follow, self.tally,
+            )
         ]  # fmt: skip
+        behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
+        remembered = self.slot_history[behind]
         stored, self.force = self.force, np.zeros((len(sim.number), tets.ROW))
+        of_joints = np.zeros((len(sim.number), tets.ROW))
         if not contact:
             pairs.pushed[:] = 0.0
         elif len(pairs):
             pairs.forces(sim.x, sim.v, sim.clock.dt)
-        self._fill(self.force)
+        self._fill(self.force, of_joints, True)
         self.move_nodes()
         found = Evaluation(
-            self.force, np.zeros_like(self.force), pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
+            self.force, of_joints, pairs.pushed.copy(), pairs.touching.copy(), pairs.out.copy(),
             self.outside.copy(), self.felt.copy(), sim.v.copy(),
         )  # fmt: skip
         self.force = stored
+        self.slot_history[self.slot_state > INTACT] = 0.0
+        self.slot_history[behind] = remembered
         for table, values in kept:
             table[...] = values
         return found
@@ -228,20 +274,53 @@ class LocalSpace(Local):
         tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], self.s0[at], small, 0, stress, energy)
         return stress, energy
 
-    def stored_in_joints(self) -> np.ndarray:
-        """Nothing (n_own,) [J]."""
-        return np.zeros(self.sim.n_own)
+    def _edges(self, slots: np.ndarray) -> np.ndarray:
+        """See `joints_space.faces_now`; behind no forces, which the plane has."""
+        sim = self.sim
+        out = np.zeros((len(slots), 13))
+        joints_space.faces_now(
+            slots, self.slot_face, self.slot_link, self.slot_size, self.slot_kind, self.slot_state, self.slot_history,
+            sim.where, sim.x, self.joint_table, self.joint_beyond, out,
+        )  # fmt: skip
+        return out
 
-    def histories(self, transfer: bool) -> Histories:
-        """What contacts of the owned elements remember."""
-        return Histories.of(self.sim.n_own, *self.pairs.histories(self.sim))
+    def joint_means(self, slots: np.ndarray) -> np.ndarray:
+        """Mean opening, size of the mean slip [m], mean normal stress and size of the mean shear stress [Pa] (n, 4)."""
+        return self._edges(slots)[:, :4]
+
+    def joint_points(self, slots: np.ndarray) -> np.ndarray:
+        """Normal (3) and size of the shear (3) stress [Pa] at the points near the corners of the slot's face (n, 6)."""
+        return self._edges(slots)[:, 4:10]
 
     def handed_over(self) -> tuple[np.ndarray, np.ndarray]:
-        """Contact histories of joints that have just broken: there are none."""
-        return np.empty(0, np.int64), np.zeros((0, WORDS))
+        """As in the plane: the shear force on this side, half to each of the two faces."""
+        slots = np.flatnonzero(self.slot_state == BROKEN)
+        found = self._edges(slots)
+        slots, shear = slots[found[:, 2] < 0.0], found[found[:, 2] < 0.0, 10:]
+        mine, other = self.slot_face[slots], self.sim.partner[self.slot_face[slots]]
+        rows = np.zeros((2, len(slots), WORDS))
+        rows.view(np.int64)[0, :, KEY] = 8 * (other // 4) + mine % 4
+        rows.view(np.int64)[1, :, KEY] = 8 * (other // 4) + 4 + other % 4
+        rows[0, :, FIRST : FIRST + 3], rows[1, :, FIRST : FIRST + 3] = 0.5 * shear, -0.5 * shear
+        return np.tile(self.slot_element(slots), 2), rows.reshape(-1, WORDS)
 
     def renew_contacts(self, handed_over: tuple[np.ndarray, np.ndarray]) -> None:
-        """New contact lists. Collective."""
-        self.pairs = ContactSpace(self.sim, self.shapes, self.kinds, *self.pairs.known())
-        if self.sim.masses_change():
+        """New contact lists; joints on faces that have been opened are gone. Collective."""
+        sim = self.sim
+        self.tally[:, elements.NEW_BROKEN] = 0
+        opened = np.flatnonzero((self.slot_state != NONE) & ~sim.closed_faces()[self.slot_face])
+        if len(opened):
+            self.slot_state[opened] = NONE
+            self.slot_law[opened] = self.slot_kind[opened] = 0
+            self._relink()
+        known = self.pairs.known()
+        owner, rows = handed_over
+        if len(owner):
+            more = ContactSpace.named(sim.number[sim.owned][owner], rows)
+            known = tuple(np.concatenate(parts) for parts in zip(known, more))
+        self.pairs = ContactSpace(sim, self.shapes, self.kinds, *known)
+        self._bind()
+        if sim.masses_change():
+            if sim.budget is not None:
+                sim.budget.pause(sim)
             self._set_masses()

@@ -96,6 +96,13 @@ class Mesh:
         e, k = np.divmod(faces, 4)
         return np.column_stack([faces, 4 * e + (k + 1) % connectivity.corner_counts(self.cells[e])])
 
+    def face_sizes(self, faces: np.ndarray) -> np.ndarray:
+        """(n,) length of each face [m]; in space its area [m2]."""
+        at = self.points[self.face_points(faces)]
+        if self.dim == 3:
+            return 0.5 * np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
+        return np.hypot(*(at[:, 1] - at[:, 0]).T)
+
     def edges(self) -> Edges:
         """All edges, in space all faces, ascending by number. Computed again at each call."""
         return tetrahedra.faces_of(self.cells) if self.dim == 3 else edges_of(self.cells, len(self.points))

@@ -1,4 +1,4 @@
-"""What elements.py, tets.py, plasticity.py, joints.py and nodes.py compute, written plainly for one element, joint or
+"""What elements.py, tets.py, plasticity.py, joints.py, joints_space.py and nodes.py compute, written plainly for one element, joint or
 node, in small matrices. To be read beside them; tests hold the two against each other."""
 
 from __future__ import annotations
@@ -197,6 +197,27 @@ def joint_forces(
         jump = shape[0] * (q - a) + shape[1] * (p - b)
         sigma, tau = stresses(point, float(jump @ n), float(jump @ t), length)
         force += 0.5 * weight * length * np.outer(shape, sigma * n + tau * t)
+    return force
+
+
+def face_joint_forces(
+    corners: np.ndarray, opposite: np.ndarray, stresses: Callable[[int, float, float], tuple]
+) -> np.ndarray:
+    """Forces (3, 3) [N] on the corners (3, 3) [m] of this side of a joint in space, counter-clockwise from outside;
+    `opposite` (3, 3): the corners of the other side, in the same order. stresses: (sigma, tau) [Pa] at Gauss point 0,
+    1, 2, near the corner of that number, from its opening and the size of its slip [m]; tau acts along the slip."""
+    middle = 0.5 * (corners + opposite)
+    twice = np.cross(middle[1] - middle[0], middle[2] - middle[0])
+    n, area = twice / np.linalg.norm(twice), 0.5 * float(np.linalg.norm(twice))
+    force = np.zeros((3, 3))
+    for point in range(3):
+        shape = np.full(3, 1.0 / 6.0)
+        shape[point] = 2.0 / 3.0
+        jump = shape @ (opposite - corners)
+        slip = jump - (jump @ n) * n
+        size = float(np.linalg.norm(slip))
+        sigma, tau = stresses(point, float(jump @ n), size)
+        force += area / 3.0 * np.outer(shape, sigma * n + (tau / size * slip if size > 0.0 else 0.0))
     return force
 
 

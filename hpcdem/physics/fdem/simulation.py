@@ -32,7 +32,7 @@ from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, u
 from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import creep as creeping
-from hpcdem.physics.fdem.kernels import elements, plasticity, space, tets
+from hpcdem.physics.fdem.kernels import elements, joints_space, plasticity, space, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
@@ -435,9 +435,8 @@ class Blocks(State):
         with self.timers("neighbour"):
             middle, _ = self._middles()
             local = self.local
-            longest2 = build.longest_link(
-                middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state
-            )
+            longest_link = joints_space.longest_link if self.dim == 3 else build.longest_link
+            longest2 = longest_link(middle, local.slots, local.slot_face, self.partner, self.where, local.slot_state)
             self._longest = math.sqrt(float(self.comm.max_into(np.array([longest2]))[0]))
             self.histories = local.histories(transfer=True)
             self._collect_events()
@@ -706,10 +705,9 @@ class Blocks(State):
             return
         mesh = self.the_mesh()
         faces = np.flatnonzero(self.closed_faces() & (self.joint_row > 0))
-        ends = connectivity.face_points(mesh.cells, faces)
-        way = mesh.points[ends[:, 1]] - mesh.points[ends[:, 0]]
         longest = np.zeros(len(self.joint_rows))
-        np.maximum.at(longest, self.joint_row[faces], np.hypot(way[:, 0], way[:, 1]))
+        size = mesh.face_sizes(faces)
+        np.maximum.at(longest, self.joint_row[faces], np.sqrt(size) if self.dim == 3 else size)
         for strength, penalty, energy in (
             ("tensile_strength", "penalty_normal", "gf1"), ("cohesion", "penalty_shear", "gf2"),
         ):  # fmt: skip
@@ -726,7 +724,7 @@ class Blocks(State):
             self.log.warn_once(
                 f"snap back {row} {energy}",
                 f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
-                f"elastic way, {elastic[worst]:.3g} m at an edge of {longest[row]:.3g} m: what the body stores is set "
+                f"elastic way, {elastic[worst]:.3g} m at a face of {longest[row]:.3g} m: what the body stores is set "
                 "free at once; smaller elements or a higher penalty help",
             )
 

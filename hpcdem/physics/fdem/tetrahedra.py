@@ -16,6 +16,8 @@ from hpcdem.physics.fdem.connectivity import Edges, join_corners, root_of
 
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 """Corners of the faces, outwards."""
+ROW, STRIDE = 16, 4
+"""Words of a row of positions, velocities or forces, and from one corner of it to the next."""
 
 
 def _turns() -> np.ndarray:

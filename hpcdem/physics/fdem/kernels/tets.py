@@ -1,4 +1,5 @@
-"""Forces of tetrahedra: stress of large rotations from the corners, gravity, drag; what `elements` is in the plane.
+"""Forces of tetrahedra: stress of large rotations from the corners, joints (joints_space.py), gravity, drag; what
+`elements` is in the plane.
 
 A tetrahedron computes the forces on its own corners, in blocks of `BLOCK`: rows are turned into lanes
 (numerics/lanes.py), the formulas are plain loops over lanes, forces go back to rows. space.py adds them up by nodes.
@@ -13,11 +14,12 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.numerics.lanes import U, four_columns, lane, put_four_columns
+from hpcdem.physics.fdem.kernels import joints_space
+from hpcdem.physics.fdem.tetrahedra import ROW as ROW
+from hpcdem.physics.fdem.tetrahedra import STRIDE as STRIDE
 
 BLOCK = 32
 """Tetrahedra worked on together: their lanes stay in the first-level cache."""
-ROW, STRIDE = 16, 4
-"""Words of a row, and from one corner of it to the next."""
 
 # Columns of the table of tetrahedra (n, 16): inverse of the reference matrix [X2 - X1, X3 - X1, X4 - X1] by rows,
 # Lame's lambda, 2 mu, viscosity [Pa s], mass of a corner [kg] (for gravity).
@@ -29,7 +31,7 @@ STRESSES = 8
 X, V, C = (lane(k) for k in (0, 16, 32))
 S11, S22, S12, S33, S13, S23 = (lane(48 + k) for k in range(6))
 F = lane(56)
-LANES = 72
+LANES = joints_space.FIRST
 C11, C12, C13, C21, C22, C23, C31, C32, C33, LAM, MU2, VISC, MASS = (lane(32 + k) for k in range(13))
 _4, _8, _12, _16 = U(4), U(8), U(12), U(16)
 _PER_LANE = lane(1)
@@ -260,8 +262,40 @@ def _put(n, first, rows, force, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _forces(t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta):
-    lanes = np.zeros(LANES * np.int64(_PER_LANE))
+def _forces(
+    t,
+    threads,
+    count,
+    rows,
+    x,
+    v,
+    c,
+    s0,
+    stressed,
+    small,
+    force,
+    gx,
+    gy,
+    gz,
+    drag,
+    beta,
+    jointed,
+    sizes,
+    link,
+    law,
+    kind,
+    state,
+    history,
+    head,
+    follow,
+    table,
+    beyond,
+    keep,
+    of_joints,
+    step,
+    tally,
+):
+    lanes = np.zeros(joints_space.LANES * np.int64(_PER_LANE))
     x, v, c, s0, force = (
         x.reshape(x.size),
         v.reshape(v.size),
@@ -269,33 +303,47 @@ def _forces(t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy
         s0.reshape(s0.size),
         force.reshape(force.size),
     )
+    flat_table, room, kinetic = table.reshape(table.size), joints_space.rooms(), (V, MASS)
     blocks = -(-count // BLOCK)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
         first = b * BLOCK
         n = min(BLOCK, count - first)
         _gather(n, first, rows, x, v, c, s0, stressed, lanes)
         _stress(n, small, beta, lanes)
+        if jointed:
+            joints_space.add_joints(
+                b, n, first, rows, x, sizes, link, law, kind, state, history, head, follow, table, beyond, flat_table,
+                keep, of_joints, F, kinetic, step, lanes, room, tally[t],
+            )  # fmt: skip
         _weigh(n, gx, gy, gz, drag, lanes)
         _put(n, first, rows, force, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def forces(threads, *args):
-    """Forces on the corners of tetrahedra, stored.
+    """Forces on the corners of tetrahedra, stored. Joint histories move on.
 
     count: tetrahedra; rows (count + 3,) i4: their storage rows; x, v (n, 16); c (count + 3, 16): `TET`; s0 (count + 3,
     8) [Pa]: stress without strain, unless not `stressed`; small: no rotations; force (n, 16) [N]; gx, gy, gz [m/s2];
-    drag [1/s], beta [s]: Rayleigh damping.
+    drag [1/s], beta [s]: Rayleigh damping. With `jointed`, four slots per tetrahedron: sizes, link, see
+    `joints_space.links`; law, kind, state, history, follow, table, beyond, tally: see `elements.triangles`; head (4
+    blocks,): lists of joints behind their peak by block and face; keep: forces of joints into of_joints (n, 16) [N].
     """
     for t in range(threads):
         _forces(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta):
+def forces_threaded(
+    threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta, jointed, sizes, link, law, kind,
+    state, history, head, follow, table, beyond, keep, of_joints, step, tally,
+):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
-        _forces(t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta)
+        _forces(
+            t, threads, count, rows, x, v, c, s0, stressed, small, force, gx, gy, gz, drag, beta, jointed, sizes, link,
+            law, kind, state, history, head, follow, table, beyond, keep, of_joints, step, tally,
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
