@@ -93,6 +93,42 @@ def dig_below(sim: Blocks) -> None:
         changes.null(sim, np.arange(16 * 3 * 6, 16 * 3 * 6 + 20))
 
 
+def shattering(sim: Blocks) -> None:
+    """Jointed blocks that fly along a jointed beam through all strips, hit it and break, and the beam with them; parts
+    of them are whole, joints differ from place to place, one crack is there from the beginning."""
+    beam = box((16, 2, 1), (3.2, 0.4, 0.2), shaken=0.2)
+    stone = box((2, 2, 1), (0.24, 0.22, 0.14), 5), box((2, 1, 2), (0.2, 0.13, 0.2), 12)
+    away = [(0.13 + 0.5 * k, 0.05 + 0.03 * (k % 4), 0.205 + 0.005 * k) for k in range(6)]
+    parts = [(beam, (0.0, 0.0, 0.0)), *((stone[k % 2], at) for k, at in enumerate(away))]
+    begin = np.cumsum([0, *(len(mesh.points) for mesh, _ in parts)])
+    mesh = Mesh.of(
+        np.concatenate([mesh.points + np.array(at) for mesh, at in parts]),
+        np.concatenate([mesh.cells + k for (mesh, _), k in zip(parts, begin)]),
+    )
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 2e8, "damp_factor": 0.05, "friction": 25.0})
+    edges = mesh.edges()
+    inner = edges.faces[edges.inner, 0]
+    law = {
+        "friction": 30.0, "cohesion": 4e6, "tensile_strength": 8e5, "gf1": 25.0, "gf2": 100.0, "penalty_normal": 4e9,
+    }  # fmt: skip
+    sim.joint_model(inner[inner % 5 > 0], "classic_intrinsic_cohesive_interface", law)
+    sim.joint_property(inner[inner % 10 == 1], {"tensile_strength": 4e5, "penalty_overlay": 6e9, "penalty_shear": 2e9})
+    changes.crack(sim, inner[inner % 35 == 7])
+    sim.velocity_condition(np.flatnonzero(mesh.points[: begin[1], 2] < 1e-9)[::2], vx=0.0, vy=0.0, vz=0.0)
+    sim.gravity(4.0, 0.0, -9.81)
+    changes.set_velocity(sim, np.arange(begin[1], len(mesh.points)), 30.0, 0.5, -9.0)
+    changes.set_velocity(sim, np.arange(begin[-3], begin[-2]), -30.0, 0.0, -9.0)
+
+
+def dig_beam(sim: Blocks) -> None:
+    """A piece of the beam is taken out, damage is forgotten at one end."""
+    if sim.clock.step == 600:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 3.1)[:6])
+        holds = np.flatnonzero((sim.joint_row > 0) & sim.joint_exists() & ~sim.open)
+        changes.reset_joint_state(sim, holds[:20])
+
+
 VECTORS = "position", "velocity", "displacement", "reaction", "unbalanced"
 NAMES = (
     *(f"{name}_{axis}" for name in VECTORS for axis in "xyz"),
@@ -125,6 +161,21 @@ def touching(sim: Blocks, notes: dict[str, Any]) -> Found:
     return found | {f"contact_{name}": values[order] for name, values in every.items()}
 
 
+def in_pieces(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with joints and what broke."""
+    found = touching(sim, notes)
+    names = "state", "mode", "damage", "opening", "slip", "normal_stress", "shear_stress", "break_energy"
+    return found | {name: diagnostics.values(sim, name) for name in names} | {
+        f"event_{name}": values for name, values in diagnostics.events(sim).items()
+    }  # fmt: skip
+
+
+def it_shatters(found: Found) -> None:
+    counts = np.bincount(found["state"][np.isfinite(found["state"])].astype(int), minlength=4)
+    assert counts[1] > 30 and counts[2] > 30 and counts[3] > 100
+    assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
+
+
 def it_crowds(found: Found) -> None:
     assert len(found["contact_face"]) > 50
     assert np.nanmax(found["displacement_x"]) > 0.3
@@ -140,5 +191,6 @@ def it_settles(found: Found) -> None:
 MODELS = {
     "swinging": Model(swinging, result, it_swings, dig, steps=1000, middle=401, come=10),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
+    "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

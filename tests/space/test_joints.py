@@ -197,13 +197,13 @@ def test_all_joints_of_a_turned_mesh_are_opposite():
             assert np.abs(force + sum(others)).max() <= 4e-16 * np.abs(seen).max()
 
 
-def bar(**values: float) -> Blocks:
-    """Two cubes of tetrahedra on each other, whole but for the joints between them."""
-    mesh = box((2, 2, 4), (0.2, 0.2, 0.4), 6)
+def bar(height: float = 0.4, **values: float) -> Blocks:
+    """Two blocks of tetrahedra on each other, whole but for the joints between them."""
+    mesh = box((2, 2, 4), (0.2, 0.2, height), 6)
     sim = body(mesh)
     edges = mesh.edges()
     middle = edges.faces[edges.inner, 0]
-    middle = middle[(np.abs(mesh.points[mesh.face_points(middle)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
+    middle = middle[(np.abs(mesh.points[mesh.face_points(middle)][:, :, 2] - 0.5 * height) < 1e-9).all(axis=1)]
     sim.joint_model(middle, INTERFACE, {**VALUES, **values})
     return sim
 
@@ -231,7 +231,7 @@ def test_a_pulled_bar_breaks_in_the_middle_with_mode_1():
 @pytest.mark.parametrize("friction", [20.0, 35.0])
 def test_a_sheared_bar_breaks_with_mode_2_and_slides_on_by_friction(friction):
     """The pressed joint breaks while it is closed: friction is handed over to the contact, whose tangent it then is."""
-    sim = bar(gf2=5.0, friction=friction, cohesion=1e6, penalty_overlay=3e12)
+    sim = bar(0.06, gf2=5.0, friction=friction, cohesion=1e6, penalty_overlay=3e12)
     sim.element_property(None, {"friction": friction, "damp_factor": 1.0})
     sim.option(collision=True)
     top, bottom = nodes_on(sim.mesh, "top"), nodes_on(sim.mesh, "bottom")
