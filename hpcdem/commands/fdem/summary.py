@@ -147,6 +147,8 @@ def last_figure(project: Project) -> Path:
     path = project.folder() / f"all_{project.step:010d}.jpg"
     with project.blocks.timers.around("figure"):
         whole = frames.whole(project)
+        if project.blocks.dim == 3:
+            project.blocks.prepare_kernels("pictures")
 
         def draw() -> None:
             from hpcdem.post import blocks
