@@ -170,8 +170,7 @@ def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> 
 
     for name in IN_PLANE:
         if options[name] is not None:
-            raise UsageError(f"--{name} is for two dimensions; hpcdem draw DIR --field NAME -o FILE.gif draws any field "
-                             "of three")  # fmt: skip
+            raise UsageError(f"--{name} is for two dimensions; hpcdem draw DIR --field NAME -o FILE.gif draws three")
     view = view_in_space(read_moment(files[-1]), style_of(options, options["folder"], PAGE, 1.0).title or "")
     seen, ranges = common(files, view)
     if "elements" in ranges:

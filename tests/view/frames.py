@@ -115,9 +115,9 @@ SIZE = (4.0, 3.0, 2.0)
 
 def body(step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 0.1, broken: bool = False) -> MeshFrame:
     """A box of SIZE of tetrahedra, six to a brick, whose upper end is `grown` times its height higher, and as much
-    thinner along y: u = grown (0, -y, z). Its stress is uniaxial, stress_zz of element k -1e6 (k + 1); group "base" below
-    half of the height, else "roof". broken: joints on all inner faces, broken in shear where the roof lies on the base,
-    else intact."""
+    thinner along y: u = grown (0, -y, z). Its stress is uniaxial, stress_zz of element k -1e6 (k + 1); group "base"
+    below half of the height, else "roof". broken: joints on all inner faces, broken in shear where the roof lies on
+    the base, else intact."""
     mesh = structured_space.box(tuple(np.linspace(0.0, s, n + 1) for s, n in zip(SIZE, cells, strict=True)), 6)
     count = len(mesh.cells)
     place = mesh.points[mesh.cells].reshape(-1, 3)

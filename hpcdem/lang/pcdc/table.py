@@ -1124,10 +1124,10 @@ _RECORDS = (
              Option("arrows", (POSITIVE,), "factor on their length", default="1"),
              Option("filter", (STRING,), "only objects for which this holds, as 'stress_yy < -1e6 and x > 2'"),
              Option("deformed", (FLOAT,), "factor on displacements", default="1"),
-             Option("camera", (CORNER, CORNER), "lower left and upper right corner of the picture, in space along it and "
-                    "up it", "m", "the model"),
-             Option("eye", (EYE,), "from where a body is seen: along an axis, from the right, the front and above (iso), "
-                    "or from a direction", "", "'iso'", dims=SPACE),
+             Option("camera", (CORNER, CORNER), "lower left and upper right corner of the picture, in space along it "
+                    "and up it", "m", "the model"),
+             Option("eye", (EYE,), "from where a body is seen: along an axis, from the right, the front and above "
+                    "(iso), or from a direction", "", "'iso'", dims=SPACE),
              Option("section", (SECTION,), "a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' "
                     "and 'x>1.5' say what stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken "
                     "away", "", "whole", dims=SPACE),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.core.fields import PER_METRE
 from hpcdem.io.frame import Columns, Frame
 from hpcdem.io.frames import read_frame
 from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
@@ -47,8 +48,6 @@ PARTS = {
 def unit_of(name: str, dim: int = 2) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
     if dim == 3:
-        from hpcdem.physics.fdem.diagnostics import PER_METRE
-
         unit = unit_of(name)
         return PER_METRE.get(unit, unit)
     words = name.split("_")
@@ -64,8 +63,8 @@ def unit_of(name: str, dim: int = 2) -> str:
 class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
     in the fourth column of triangles) or lines (ends (n, 2, 2)); in space tetrahedra (points (k, 3), cells (n, 4), the
-    face (4 n,) that each of their faces lies on, or -1) or faces (points (k, 3), cells (n, 4) as polygons), read when it
-    is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer
+    face (4 n,) that each of their faces lies on, or -1) or faces (points (k, 3), cells (n, 4) as polygons), read when
+    it is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer
     field; number: the field by which the program numbers them; slow: fields that take a pass over other tables."""
 
     kind: str
@@ -312,9 +311,11 @@ def of_blocks(state: MeshState) -> Moment:
     return Moment(state.step, state.time, objects, displacement, dim)
 
 
-def _of_stress(given: Mapping[str, np.ndarray], dim: int) -> dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]]:
-    """What is computed of the stresses of elements (tension positive), where they are all there: mean, von Mises, and in
-    space the middle principal stress."""
+def _of_stress(
+    given: Mapping[str, np.ndarray], dim: int
+) -> dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]]:
+    """What is computed of the stresses of elements (tension positive), where they are all there: mean, von Mises, and
+    in space the middle principal stress."""
     shears = ("xy", "xz", "yz") if dim == 3 else ("xy",)
     if not {f"stress_{c}" for c in ("xx", "yy", "zz", *shears)} <= given.keys():
         return {}
@@ -327,7 +328,7 @@ def _of_stress(given: Mapping[str, np.ndarray], dim: int) -> dict[str, Callable[
         total = 0.5 * sum((of[f"stress_{c}"] - middle) ** 2 for c in ("xx", "yy", "zz"))
         return np.sqrt(3.0 * (total + sum(of[f"stress_{c}"] ** 2 for c in shears)))
 
-    found = {"stress_mean": mean, "stress_mises": mises}
+    found: dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]] = {"stress_mean": mean, "stress_mises": mises}
     if dim == 3:
         found["stress_middle"] = lambda of: 3.0 * mean(of) - of["stress_max"] - of["stress_min"]
     return found

@@ -88,7 +88,7 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     left, bottom = (k * _RIGHT, k * _CORNER) if oblique else (k * _LEFT, k * _BOTTOM)
     left, bottom = (left, bottom) if view.axes else (0.15, 0.15)
     classes = [entry for layer in shown.layers for entry in layer.legend] if view.legend else []
-    top = k * (_TOP + 0.45 * (-(-len(classes) // 4))) if view.title or classes else 0.15
+    top = k * (_TOP + 0.45 * (-(-len(classes) // 4))) if view.title or classes else 0.5 * k if bars else 0.15
     right = k * _RIGHT + k * _BAR * len(bars)
     width = paper.page - left - right
     if width < 1.0:

@@ -1,5 +1,5 @@
-"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in space
-by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py`
+"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in
+space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py`
 paints the same plainly."""
 
 from __future__ import annotations
@@ -277,8 +277,8 @@ def faces(x, y, z, cells, order, kind, rows, shades, light, near, face, first, t
         s = shades[kind[k]]
         red, green, blue = np.uint8(light[k] * s[0]), np.uint8(light[k] * s[1]), np.uint8(light[k] * s[2])
         tri = first + k
-        _facet(x, y, z, cells[k, 0], cells[k, 1], cells[k, 2], red, green, blue, rows[k], tri, near, face, colours, layer,
-               row, number, opacity)  # fmt: skip
+        _facet(x, y, z, cells[k, 0], cells[k, 1], cells[k, 2], red, green, blue, rows[k], tri, near, face, colours,
+               layer, row, number, opacity)  # fmt: skip
         if cells[k, 3] >= 0:
             _facet(x, y, z, cells[k, 0], cells[k, 2], cells[k, 3], red, green, blue, rows[k], tri, near, face, colours,
                    layer, row, number, opacity)  # fmt: skip

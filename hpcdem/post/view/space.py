@@ -52,8 +52,8 @@ def skin(
 ) -> Skin:  # fmt: skip
     """The surface of some tetrahedra: their faces on no other of them.
 
-    points (k, 3); cells (n, 4); partner (4 n,): the face that each lies on, -1: none; rows: which tetrahedra, ascending;
-    plane: a point and the normal into what is taken away, see `taken`.
+    points (k, 3); cells (n, 4); partner (4 n,): the face that each lies on, -1: none; rows: which tetrahedra,
+    ascending; plane: a point and the normal into what is taken away, see `taken`.
     """
     from hpcdem.physics.fdem import tetrahedra
 
@@ -148,6 +148,3 @@ def normals(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     four = cells[:, 3] >= 0  # the first three corners of a piece of a cut may lie in a row
     across[four] += np.cross(c[four] - a[four], points[cells[four, 3]] - a[four])
     return across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
-
-
-
