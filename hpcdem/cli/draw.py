@@ -59,7 +59,7 @@ LOOKS = {
 @click.option("--eye", metavar="WORD|X,Y,Z", help="In space: seen from +x, -x, +y, -y, +z, -z, iso (right, front, "
               "above), or from this direction [iso].")  # fmt: skip
 @click.option("--section", metavar="PLANE", help="In space: cut by x=1.5 (the part towards the eye is taken away), "
-              "x<1.5, x>1.5 (what stays), or PX,PY,PZ,NX,NY,NZ (a point, the normal into what is taken away).")  # fmt: skip
+              "x<1.5, x>1.5 (what stays), or PX,PY,PZ,NX,NY,NZ (a point, the normal into what goes).")  # fmt: skip
 @click.option("--title", metavar="TEXT", help="Over the picture; {step} and {time} are filled in.")
 @click.option("--no-axes", is_flag=True, help="Without axes.")
 @click.option("--no-legend", is_flag=True, help="Without legend and bars of colours.")

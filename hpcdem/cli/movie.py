@@ -163,10 +163,10 @@ def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> 
     """What is to be drawn of frames of bodies in space: their displacement, as at the end of a run."""
     from hpcdem.cli.draw import common
     from hpcdem.core.errors import UsageError
-    from hpcdem.post.blocks import view_in_space
     from hpcdem.post.series import ViewJob
     from hpcdem.post.view.moment import read_moment
     from hpcdem.post.view.paper import Paper
+    from hpcdem.post.view.scene import view_in_space
 
     for name in IN_PLANE:
         if options[name] is not None:

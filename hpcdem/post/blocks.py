@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +20,6 @@ from hpcdem.io.agreed import atomic_path
 from hpcdem.io.axes import CM, View
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post import bolts, fluid, liners
-
-if TYPE_CHECKING:
-    from hpcdem.post.view.model import ModelView
-    from hpcdem.post.view.moment import Moment
 
 CRACKS, STRESS, PLASTIC, TEMPERATURE = "cracks", "stress", "plastic", "temperature"
 PANELS = (CRACKS, STRESS, PLASTIC, TEMPERATURE, *fluid.PICTURES)
@@ -194,15 +190,13 @@ def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: 
 
 def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
     """Draw the frame in a file."""
-    plot(read_mesh_frame(source, solid=True), path, looks, seen)
+    plot(read_mesh_frame(source), path, looks, seen)
 
 
 def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
     """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
     from matplotlib.figure import Figure
 
-    if state.points.shape[1] == 3:
-        return _body(state, looks)
     seen = view(state) if seen is None else seen
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width
@@ -246,24 +240,6 @@ def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> An
         text = looks.title.replace("{step}", str(state.step)).replace("{time}", f"{state.time:.6g}")
         figure.text(0.99, 0.995, text, fontsize=looks.font, ha="right", va="top", parse_math=False)
     return figure
-
-
-def _body(state: MeshState, looks: Looks) -> Any:
-    from hpcdem.post.view.moment import of_blocks
-    from hpcdem.post.view.paper import Paper, figure_of
-    from hpcdem.post.view.scene import scene
-
-    moment = of_blocks(state)
-    return figure_of(scene(moment, view_in_space(moment, looks.title)), Paper(looks.page, looks.font, looks.dpi))
-
-
-def view_in_space(moment: Moment, title: str | None = None) -> ModelView:
-    """Bodies in space as they are usually drawn: coloured by how far they have moved."""
-    from hpcdem.post.view.scene import default_view, with_field
-
-    fine = moment.of("elements").count > MOST_EDGES
-    view = with_field(default_view(moment), moment, "displacement", "elements", edges=not fine)
-    return view if title is None else view.changed(title=title)
 
 
 def panel(axes: Any, state: MeshState, seen: View, width: float, looks: Looks = USUAL) -> list[Any]:

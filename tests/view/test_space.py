@@ -295,6 +295,7 @@ MODEL = (
 )
 
 
+@pytest.mark.slow
 def test_each_word_of_a_script_alone_changes_the_picture(tmp_path: Path):
     (tmp_path / "a.mv").write_text('{"view": 1, "layers": [{"object": "elements"}], "eye": "+y", "section": "z=0.3"}')
     words = ["", "eye '-y'", "section 'x=1.2'", "camera (0,0) (1,1)", "deformed 1e3", "range x 0 1", "title 'a'"]
@@ -313,6 +314,7 @@ def test_scripts_are_refused_before_they_run(tmp_path: Path, words: str):
     assert not (tmp_path / "data").exists() or not list((tmp_path / "data").iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_the_same_picture_on_two_ranks(launch: Launcher, tmp_path: Path):
     script = MODEL + "pcdc output image 'a' field 'displacement' vectors 'velocity' section 'y=0.4'\n"

@@ -1105,8 +1105,7 @@ _RECORDS = (
     Command("output image", "A picture of the model as it is now, `<name>_<step>.png`, of any field that frames have.",
             ("pcdc output image 'stress' field 'stress-yy' limits -2e6 0 colours blue-red",
              "pcdc output image 'roof.pdf' object elements field 'displacement' deformed 100 range group 'roof'",
-             "pcdc output image 'flow' view 'flow.mv' title 'step {step}'",
-             "pcdc output image 'cut' field 'displacement' eye '-y' section 'y=12.5'"),
+             "pcdc output image 'flow' view 'flow.mv' title 'step {step}'"),
             (_leading("file", FILE, "first part of the name, in the folder of the results; .pdf, .svg or .png at its "
                                     "end says what is drawn"),),
             (Option("view", (FILE,), "what is shown, as a file *.mv says, of hpcdem view or hpcdem draw", "",

@@ -103,6 +103,13 @@ def default_view(moment: Moment) -> ModelView:
     )
 
 
+def view_in_space(moment: Moment, title: str | None = None) -> ModelView:
+    """Bodies in space as they are usually drawn: coloured by how far they have moved."""
+    edges = moment.of("elements").count <= blocks.MOST_EDGES
+    view = with_field(default_view(moment), moment, "displacement", "elements", edges=edges)
+    return view if title is None else view.changed(title=title)
+
+
 def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
     """The view with objects coloured by a field; on: which, else the first that have it. looks: further values of that
     layer. HpcdemError that names the fields there are."""

@@ -1,6 +1,6 @@
 """Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in
-space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py`
-paints the same plainly."""
+space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up.
+`reference.py` paints the same plainly."""
 
 from __future__ import annotations
 
