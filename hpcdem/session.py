@@ -287,6 +287,12 @@ def _space() -> WarmUp:
     return warm_up.in_space, (tets, space, tetrahedra, contact_space, detect_space)
 
 
+def _pictures() -> WarmUp:
+    from hpcdem.post.view import screen, warm_up
+
+    return warm_up.in_space, (screen,)
+
+
 KINDS = {
     "shared": Kernels(_shared),
     "": Kernels(_particles),
@@ -302,10 +308,12 @@ KINDS = {
     "tangent": Kernels(_tangent),
     "plastic-tangent": Kernels(_plastic_tangent, after=("yielding", "tangent")),
     "space": Kernels(_space),
+    "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space")
+OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
+             "pictures")  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 
 
