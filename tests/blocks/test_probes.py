@@ -42,14 +42,15 @@ def whole(sim: Blocks, name: str) -> dict[int, float]:
 
 @pytest.fixture(scope="module")
 def solid() -> Blocks:
-    """Tetrahedra, some taken out, displacements counted from there on."""
-    sim = body(box((4, 3, 2), (0.4, 0.3, 0.2), split=5))
-    changes.set_velocity(sim, [3, 17], 6.0, 0.5, -2.0)
+    """Tetrahedra, some joints broken, an element taken out, displacements counted from there on."""
+    sim = jointed(body(box((4, 3, 2), (0.4, 0.3, 0.2), split=5)))
+    changes.set_velocity(sim, [3, 17, 18, 23], 16.0, 0.5, -2.0)
     sim.velocity_condition([0], vx=0.0, vz=0.0)
     convergence.advance(sim, 40)
     changes.null(sim, [2])
     changes.reset_displacement(sim, [1, 3])
     convergence.advance(sim, 20)
+    assert diagnostics.joint_counts(sim)[2] > 3
     return sim
 
 

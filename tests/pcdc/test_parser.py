@@ -250,7 +250,7 @@ REFUSED_IN_SPACE = [
     ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "'type' is for two dimensions in this version"),
     ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
     ("element c-model mech-m-c property density 1", "'mechanical-mohr-coulomb' is for two dimensions"),
-    ("face-joint c-model c-i-c-i property friction 1", "'face-joint c-model' is for two dimensions"),
+    ("face-joint c-model hydr-p-m property viscosity 1", "'hydraulic-porous-medium' is for two dimensions"),
     ("element-face boundary m-s-b-c quiet on", "'quiet' is for two dimensions"),
     ("model solve elastic", "'elastic' is for two dimensions"),
     ("model option energy on", "'energy' is for two dimensions"),

@@ -6,6 +6,8 @@ import numpy as np
 
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem.kernels.elements import TALLY
+from hpcdem.physics.fdem.kernels.joints import HISTORY
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import structured_space
@@ -44,3 +46,12 @@ def faces_on(mesh: Mesh, side: str) -> np.ndarray:
 def nodes_on(mesh: Mesh, side: str) -> np.ndarray:
     """Numbers of its points."""
     return np.unique(mesh.layers[side])
+
+
+def without_joints(threads: int) -> tuple:
+    """The arguments of `tets.forces` about joints, where there are none."""
+    ints, rows = np.zeros(0, np.int32), np.zeros((0, HISTORY))
+    return (
+        False, np.zeros(0), np.zeros((0, 3), np.int32), ints, ints, np.zeros(0, np.uint8), rows, ints, ints,
+        np.zeros((1, 8)), np.zeros((1, 4)), False, np.zeros((1, 16)), 0, np.zeros((threads, TALLY), np.int64),
+    )  # fmt: skip

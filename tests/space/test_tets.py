@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from hpcdem.physics.fdem import changes, diagnostics
 from hpcdem.physics.fdem.kernels import space, tets
 from hpcdem.physics.fdem.reference import Solid, tetrahedron_forces
-from tests.space.support import LAME, ROCK, SHEAR, body, box
+from tests.space.support import LAME, ROCK, SHEAR, body, box, without_joints
 
 A = np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 3.0], [2.0, 0.0, 1.0]]) * 1e-4
 
@@ -70,9 +70,10 @@ def test_forces_are_those_of_the_plain_reference(small: bool) -> None:
     gravity, drag, beta = rng.uniform(-9.0, 9.0, 3), 0.3, 0.2
     force = np.full((n + 2, 16), np.nan)
     padded = np.concatenate([rows, rows[-1:].repeat(3)])
-    tets.forces(1, n, padded, x, v, c, s0, True, small, force, *gravity, drag, beta)
+    none = without_joints(3)
+    tets.forces(1, n, padded, x, v, c, s0, True, small, force, *gravity, drag, beta, *none)
     several = np.full_like(force, np.nan)
-    tets.forces.py_func(3, n, padded, x, v, c, s0, True, small, several, *gravity, drag, beta)
+    tets.forces.py_func(3, n, padded, x, v, c, s0, True, small, several, *gravity, drag, beta, *none)
     assert np.array_equal(force, several, equal_nan=True)
     assert np.isnan(force[[0, n + 1]]).all()  # of others nothing is written
     for i in range(n):
@@ -155,7 +156,7 @@ def test_the_time_step_is_stable_and_near_the_limit() -> None:
         shape /= np.abs(shape).max()
         at[:, :, :3] = points + 1e-6 * shape[node]
         force = np.zeros((sim.n_own, 16))
-        sim.local._fill(force)
+        sim.local._fill(force, np.zeros((1, 16)), False)
         pull = np.zeros_like(shape)
         np.add.at(pull, node.reshape(-1), force.reshape(-1, 4, 4)[:, :, :3].reshape(-1, 3))
         new = -pull / mass[:, None] / 1e-6
