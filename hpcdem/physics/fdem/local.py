@@ -560,7 +560,8 @@ class Local:
         cells, node = mesh.cells[number], sim.node[number]
         real = node >= 0
         self.special[real] |= (sim.node_sizes[node[real]] > 1) | (sim.point_row[cells[real]] > 0)
-        self.special[cells[:, 3] >= 0] = True
+        if self.dim == 2:  # quads
+            self.special[cells[:, 3] >= 0] = True
         self.special &= real
         self.some_special = bool(self.special.any())
         nothing = np.empty(0, np.int64)

@@ -105,7 +105,8 @@ class LocalSpace(Local):
         faces = 4 * sim.number[own][:, None] + np.arange(4)
         i, k = np.nonzero(sim.load_row[faces] > 0)
         corner = mesh.face_corners(faces[i, k]) % 4
-        self.special = np.ones((sim.n_own, 4), bool)
+        self.special = np.zeros((sim.n_own, 4), bool)
+        self.special[i[:, None], corner] = True
         self.load_corner = tets.ROW * (i + own.start)[:, None] + tets.STRIDE * corner
         places = mesh.points[mesh.face_points(faces[i, k])].mean(axis=1)
         self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
@@ -113,7 +114,9 @@ class LocalSpace(Local):
         self.some_applied = sim.comm.any(len(i) > 0)
 
     def _mark_special(self) -> None:
-        pass
+        """All forces are stored."""
+        if len(self.force) < len(self.sim.number):
+            self.force = np.zeros((len(self.sim.number), self.force_width))
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
@@ -161,11 +164,13 @@ class LocalSpace(Local):
         space.static_masses(self.c, self.rows[: self.count], self.sim.n_left, self.springs()[0], ALPHA, self.mass)
 
     def _set_kicks(self, dt: float) -> None:
-        pass
+        self.kick = np.where(self.alone(), dt / self.mass[self.sim.owned], 0.0)
+        self.some_alone = bool(self.alone().any())
 
     def _bind(self) -> None:
         one = self.sim.threads == 1
         self._forces: Any = tets.forces if one else tets.forces_threaded
+        self._kick: Any = space.kick if one else space.kick_threaded
         self._move: Any = space.move if one else space.move_threaded
         self.of_joints = np.zeros((len(self.sim.number) if self.sim.budget is not None else 1, tets.ROW))
 
@@ -194,6 +199,11 @@ class LocalSpace(Local):
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
         sim, clock = self.sim, self.sim.clock
+        alpha = 0.0 if sim.options.dynamic else ALPHA
+        if self.some_alone:
+            self._kick(sim.threads, sim.n_left, self.kick, self.force, sim.v, alpha)
+        if not (self.some_special or self.shared):
+            return
         if self.some_applied:
             self.applied[:] = 0.0
             loads = self.loads_now(self.load_functions, clock.time)
@@ -208,7 +218,7 @@ class LocalSpace(Local):
             table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
         self._move(
             sim.threads, self.node_begin, self.node_corner, self.node_kick, self.node_condition, self.node_share, table,
-            self.some_applied, self.force, self.applied, sim.v, 0.0 if sim.options.dynamic else ALPHA, self.outside,
+            self.some_applied, self.force, self.applied, sim.v, alpha, self.outside,
             self.felt,
         )  # fmt: skip
 

@@ -248,6 +248,32 @@ def _bind(kind, k, alpha, condition, f, before, w, drawn):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _kick(t, threads, first, kick, force, v, alpha):
+    n = len(kick)
+    for i in range(n * t // threads, n * (t + 1) // threads):
+        r = first + i
+        for k in range(4):
+            q = kick[i, k]
+            for c in range(STRIDE * k, STRIDE * k + STRIDE):
+                v[r, c] += q * laws.damped(force[r, c], v[r, c], alpha)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def kick(threads, *args):
+    """New velocities of corners that are nodes by themselves: v (n, 16) += kick force, of the storage rows from `first`
+    on; kick (n_own, 4): dt / mass, 0 for corners that `move` moves."""
+    for t in range(threads):
+        _kick(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def kick_threaded(threads, first, kick, force, v, alpha):
+    """The same on several threads."""
+    for t in prange(threads):
+        _kick(t, threads, first, kick, force, v, alpha)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners, see `nodes.move`; corner (m,): where they begin in
     `force`, `applied` and v (flat); table (rows, 13); outside (n, 3) [N], felt (n, 6)."""
