@@ -269,8 +269,8 @@ def test_an_open_crack_and_reset_and_excavation():
 
 
 def test_stiffness_of_a_jointed_lattice():
-    """A Kuhn box with joints everywhere under uniform strain in one direction, all of its surface moved: softer than the
-    solid by what was computed elsewhere, .879 M for P = 10 E and 4 cells, .984 M for 100 E."""
+    """A Kuhn box with joints everywhere under uniform strain in one direction, all of its surface moved: softer than
+    the solid by what was computed elsewhere, .879 M for P = 10 E and 4 cells, .984 M for 100 E."""
     for factor, expected in ((10.0, 0.879), (100.0, 0.984)):
         mesh = box((4, 4, 4), (1.0, 1.0, 1.0), 6)
         sim = body(mesh, dynamic=False)

@@ -138,7 +138,7 @@ def _creep(mesh: Mesh, threads: int) -> None:
 
 
 def in_space(threads: int = 1) -> None:
-    """Those of tetrahedra: in motion with conditions and loads, and at rest."""
+    """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     below = [(x, y, z - 1.001) for x, y, z in points[:4]]
     mesh = Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
@@ -153,6 +153,11 @@ def in_space(threads: int = 1) -> None:
     sim.rebuild()
     for name in ("stress_xx", "strain_energy", "position_x", "reaction_x"):
         diagnostics.values(sim, name)
+    sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+    changes.set_velocity(sim, [4], 1.0, 1.0, 1.0)
+    convergence.advance(sim, 20)
+    diagnostics.values(sim, "normal_stress")
+    sim.rebuild()
     sim.option(dynamic=False)
     convergence.advance(sim, 2)
     diagnostics.unbalanced_ratio(sim)
