@@ -103,10 +103,11 @@ def creep_more(sim: Blocks) -> None:
         creep.switch(sim, True)
         changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] > 1.5), 2.0, 1.0, -3.0)
     if step == 700:
-        changes.reset_kelvin_strain(sim, np.arange(40))
-        sim.element_property(np.arange(20, 60), {"kelvin_viscosity": 3e6})
+        soft = np.flatnonzero(sim.creeping())
+        changes.reset_kelvin_strain(sim, soft[:40])
+        sim.element_property(soft[20:60], {"kelvin_viscosity": 3e6})
     if step == 800:
-        changes.element_model(sim, np.arange(10), "mech_iso_elastic", ROCK)
+        changes.element_model(sim, np.flatnonzero(sim.creeping())[:10], "mech_iso_elastic", ROCK)
 
 
 def settling(sim: Blocks) -> None:

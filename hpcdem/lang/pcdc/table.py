@@ -571,7 +571,10 @@ def _group_command(kind: str, notation: str) -> Command:
 
 def _properties(model: Model) -> tuple[Option, ...]:
     """Those of a model, none of them compulsory, for commands that change some."""
-    return tuple(Option(o.notation, o.values, o.doc, o.unit, also=o.also) for o in model.options if o.name != "np")
+    return tuple(
+        Option(o.notation, o.values, o.doc, o.unit, also=o.also, dims=tuple(d for d in o.dims if d in model.dims))
+        for o in model.options if o.name != "np"
+    )  # fmt: skip
 
 
 _FRICTION = next(o.values for o in MOHR_COULOMB.options if o.name == "friction")
@@ -581,14 +584,14 @@ _OF_SOLIDS = (
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *_properties(ISO_HEAT),
-    _PARAMETER,
+    replace(_PARAMETER, dims=PLANE),
 )  # fmt: skip
 
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 3"),
-            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three this version computes elastic "
-                            "bodies", "", "2"),), manual=True, dims=BOTH),
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three not everything is there, see "
+                            "the end of the reference", "", "2"),), manual=True, dims=BOTH),
     Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
             "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
             (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),

@@ -130,8 +130,7 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     that is done, over the largest deviator of all. Equal on all ranks. Collective."""
     local, after = sim.local, sim.cold["creep"]
     found = np.zeros(2)
-    stress, kelvin = (space.BEFORE, space.IN_KELVIN) if sim.dim == 3 else (STRESS, STRAIN)
-    stress, kelvin = list(stress), list(kelvin)
+    stress, kelvin = map(list, (space.BEFORE, space.IN_KELVIN) if sim.dim == 3 else (STRESS, STRAIN))
     for (old, law), (new, _) in zip(local.creep_memory(before), local.creep_memory(after)):
         if not len(law):
             continue
