@@ -258,7 +258,7 @@ REFUSED_IN_SPACE = [
     ("element property conductivity 3", "'conductivity' is for two dimensions"),
     ("element property parameter 'a' 3", "'parameter' is for two dimensions"),
     ("element property young table 't' over temperature", "'over temperature' is for two dimensions"),
-    ("element c-model mech-m-c property density 1 cohesion table 't' over temperature", "'over temperature' is for two"),
+    ("element c-model mech-m-c property coh table 't' over temperature", "'over temperature' is for two dimensions"),
     ("face-joint c-model c-i-c-i property friction 1", "'face-joint c-model' is for two dimensions"),
     ("element-face boundary m-s-b-c quiet on", "'quiet' is for two dimensions"),
     ("model solve elastic", "'elastic' is for two dimensions"),
