@@ -4,7 +4,7 @@
 # 0.29 of what it does far behind (Vlachopoulos & Diederichs 2009; 0.26 here). A few seconds on one core.
 # Needs the extra [mesh].
 #
-#   hpcdem tunnel_face.sc      tunnel_face.png: closure along the tunnel; a picture of the rock, a frame in data/
+#   hpcdem tunnel_face.sc      tunnel_face.png: closure along the tunnel; data/closure_<step>.png: the rock
 import numpy as np
 
 radius, face, pressure, young, poisson = 3.0, 30.0, 10e6, 10e9, 0.25
@@ -24,6 +24,7 @@ pcdc node boundary mech-vel-b-c velocity-z 0 range z -0.001 0.001
 pcdc node boundary mech-vel-b-c velocity-z 0 range z 29.999 30.001
 pcdc element c-model null range group 'tunnel'
 pcdc model solve ratio 1e-5
+pcdc output image 'closure' field 'displacement' eye '-1,-1,0.7'
 
 x, y, z = (pcdc.values('node', 'position-' + axis) for axis in 'xyz')
 dx, dz = (pcdc.values('node', 'displacement-' + axis) for axis in 'xz')

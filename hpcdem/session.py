@@ -301,6 +301,12 @@ def _space() -> WarmUp:
     return warm_up.in_space, (tets, space, tetrahedra, contact_space, detect_space)
 
 
+def _pictures() -> WarmUp:
+    from hpcdem.post.view import screen, warm_up
+
+    return warm_up.in_space, (screen,)
+
+
 KINDS = {
     "shared": Kernels(_shared),
     "": Kernels(_particles),
@@ -318,12 +324,13 @@ KINDS = {
     "space": Kernels(_space),
     "yielding-space": Kernels(_yielding_space, after=("space",)),
     "creep-space": Kernels(_creep_space, after=("space",)),
+    "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
 OF_BLOCKS = (
     "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-    "yielding-space", "creep-space",
+    "yielding-space", "creep-space", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 

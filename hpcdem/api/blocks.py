@@ -938,18 +938,22 @@ class Output(Words):
         filter: str | None = None,
         deformed: float | None = None,
         camera: tuple[tuple[float, float], tuple[float, float]] | None = None,
+        eye: str | None = None,
+        section: str | None = None,
         title: str | None = None,
         where: Where = None,
     ) -> None:
         """Draw the model as it is now, ``<file>_<step>.png``, with objects coloured by a field that frames have.
 
         view: a file *.mv, else everything is shown; object: "elements", "joints", ..., of which the field and the other
-        looks are; limits: values of the first and the last colour; camera: lower left and upper right corner [m];
-        where: the objects that are shown. See docs/view.md."""
+        looks are; limits: values of the first and the last colour; camera: lower left and upper right corner [m]; eye:
+        in space from where it is seen ("-y", "iso", "1,-2,0.5"); section: a plane that cuts it ("x=1.5"); where: the
+        objects that are shown. See docs/view.md."""
         given = {
             "file": file, "view": view, "field": field, "object": object, "limits": limits, "log": log,
             "colours": colours, "opacity": opacity, "edges": edges, "size": size, "vectors": vectors, "arrows": arrows,
-            "filter": filter, "deformed": deformed, "camera": camera, "title": title,
+            "filter": filter, "deformed": deformed, "camera": camera, "eye": eye, "section": section,
+            "title": title,
         }  # fmt: skip
         self._do("output image", given, where, g.SHOWN.get(object or "", g.ELEMENT))
 

@@ -54,7 +54,12 @@ LOOKS = {
 @click.option("--hide", multiple=True, metavar="WORD", help="Leave these objects out; may stand several times.")
 @click.option("--show", multiple=True, metavar="WORD", help="Show these objects (contacts and bonds are hidden).")
 @click.option("--deformed", type=float, metavar="N", help="Factor on displacements of blocks [1].")
-@click.option("--camera", type=Numbers(4), metavar="L,R,B,T", help="Left, right, bottom, top of the picture, m [all].")
+@click.option("--camera", type=Numbers(4), metavar="L,R,B,T", help="Left, right, bottom, top of the picture, m; in "
+              "space along the picture and up it [all].")  # fmt: skip
+@click.option("--eye", metavar="WORD|X,Y,Z", help="In space: seen from +x, -x, +y, -y, +z, -z, iso (right, front, "
+              "above), or from this direction [iso].")  # fmt: skip
+@click.option("--section", metavar="PLANE", help="In space: cut by x=1.5 (the part towards the eye is taken away), "
+              "x<1.5, x>1.5 (what stays), or PX,PY,PZ,NX,NY,NZ (a point, the normal into what goes).")  # fmt: skip
 @click.option("--title", metavar="TEXT", help="Over the picture; {step} and {time} are filled in.")
 @click.option("--no-axes", is_flag=True, help="Without axes.")
 @click.option("--no-legend", is_flag=True, help="Without legend and bars of colours.")
@@ -181,7 +186,9 @@ def view_of(options: dict[str, Any], moment: Moment) -> ModelView:
 
     view = default_view(moment) if options["view_file"] is None else read_view(options["view_file"])
     looks = {LOOKS[name]: options[name] for name in LOOKS if options[name] is not None}
-    more = {name: options[name] for name in ("deformed", "camera", "title") if options[name] is not None}
+    more = {
+        name: options[name] for name in ("deformed", "camera", "eye", "section", "title") if options[name] is not None
+    }
     more |= {name: False for name in ("axes", "legend") if options[f"no_{name}"]}
     view = adjusted(view, moment, options["field"], options["on"], looks, **more)
     for visible, words in ((True, options["show"]), (False, options["hide"])):
@@ -222,4 +229,4 @@ def _list(files: Sequence[Path]) -> None:
         click.echo(f"{name} ({objects.count})")
         for field in objects.known():
             kind = "vector" if field in objects.vectors else ", ".join(objects.names.get(field, ()))
-            click.echo(f"  {field:<24} {unit_of(field):<6} {kind}".rstrip())
+            click.echo(f"  {field:<24} {unit_of(field, moment.dim):<6} {kind}".rstrip())

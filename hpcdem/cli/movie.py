@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from hpcdem.cli.pictures import ManualCommand, common_view, looks, number, posit
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
-    from hpcdem.post.series import Job
+    from hpcdem.post.series import Job, ViewJob
     from hpcdem.runtime.progress import Log
 
 FLUID = ("pressure", "saturation", "aperture", "velocity", "concentration")
@@ -132,7 +133,7 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
     from hpcdem.io.frames import left_out, list_frames, list_mesh_frames
     from hpcdem.post.series import Job, draw_all
 
-    def plan() -> list[Job]:
+    def plan() -> Sequence[Job | ViewJob]:
         folder: Path = options["folder"]
         files = [] if options["name"] else [file.path for file in list_frames(folder)]
         if others := left_out(folder):
@@ -154,7 +155,31 @@ def draw(comm: SerialComm, log: Log, options: dict[str, Any], scratch: Path) -> 
     return [job.picture for job in jobs]
 
 
-def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) -> list[Job]:
+IN_PLANE = ("show", "xmin", "xmax", "ymin", "ymax")
+"""Options of films of blocks that do nothing in space."""
+
+
+def jobs_in_space(files: list[Path], options: dict[str, Any], scratch: Path) -> list[ViewJob]:
+    """What is to be drawn of frames of bodies in space: their displacement, as at the end of a run."""
+    from hpcdem.cli.draw import common
+    from hpcdem.core.errors import UsageError
+    from hpcdem.post.series import ViewJob
+    from hpcdem.post.view.moment import read_moment
+    from hpcdem.post.view.paper import Paper
+    from hpcdem.post.view.scene import view_in_space
+
+    for name in IN_PLANE:
+        if options[name] is not None:
+            raise UsageError(f"--{name} is for two dimensions; hpcdem draw DIR --field NAME -o FILE.gif draws three")
+    view = view_in_space(read_moment(files[-1]), style_of(options, options["folder"], PAGE, 1.0).title or "")
+    seen, ranges = common(files, view)
+    if "elements" in ranges:
+        view = view.with_layer("elements", limits=ranges["elements"])
+    paper = Paper(PAGE, options["fontsize"], 2.0 * options["size"] * 2.54 / PAGE)
+    return [ViewJob(file, scratch / f"{k:06d}.png", view, paper, seen) for k, file in enumerate(files)]
+
+
+def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) -> Sequence[Job | ViewJob]:
     """What is to be drawn of frames of blocks: one view and one range of stress and of strain for all."""
     from hpcdem.io.axes import View
     from hpcdem.io.vtkhdf_mesh import read_mesh_frame
@@ -164,6 +189,8 @@ def jobs_of_blocks(files: list[Path], options: dict[str, Any], scratch: Path) ->
     views = []
     spans: dict[str, list[tuple[float, float]]] = {name: [] for name in blocks.COLOURED}
     panels: set[str] = set()
+    if read_mesh_frame(files[-1], lazily=True, solid=True).points.shape[1] == 3:
+        return jobs_in_space(files, options, scratch)
     for file in files:
         state = read_mesh_frame(file)
         views.append(blocks.view(state))

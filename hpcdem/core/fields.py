@@ -75,3 +75,6 @@ FIELDS: dict[str, Field] = {
     "color": Field(COLD, COLOR, np.int64, "1", "colour number 0-9"),
     "birth": Field(COLD, BIRTH, np.int64, "1", "step at which the particle was made"),
 }
+
+PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s"}
+"""Units in the plane, where everything is that of a metre of thickness, and in space."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
+from typing import NamedTuple
+
 OBJECTS = (
     "elements", "particles", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners",
 )  # fmt: skip
@@ -22,3 +26,52 @@ COLOURS = {
 }
 """Colours of fields, and their names in matplotlib. blue-red and orange-violet, white in their middle, are for values
 of both signs. The colour-blind can read all but yellow-green, spectral and rainbow."""
+EYES = {
+    "+x": (1.0, 0.0, 0.0), "-x": (-1.0, 0.0, 0.0), "+y": (0.0, 1.0, 0.0), "-y": (0.0, -1.0, 0.0),
+    "+z": (0.0, 0.0, 1.0), "-z": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),
+}  # fmt: skip
+"""Named places of the eye in space, as directions from the model to it; iso: from the right, the front and above."""
+
+
+class Section(NamedTuple):
+    """A plane that cuts a body: a point of it [m], its normal, and whether the part on the side of the normal is taken
+    away (else the part towards the eye)."""
+
+    point: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    sided: bool
+
+
+def eye_of(text: str) -> tuple[float, float, float]:
+    """Direction from the model to the eye: one of EYES, or three numbers. ValueError for what is neither."""
+    if text in EYES:
+        return EYES[text]
+    found = _numbers(text)
+    if len(found) != 3 or not any(found):
+        raise ValueError(f"expected {', '.join(EYES)}, or a direction towards the eye, such as 1,-2,0.5")
+    return found[0], found[1], found[2]
+
+
+def section_of(text: str) -> Section:
+    """A plane: x=1.5 (also y, z), of which the part towards the eye is taken away; x<1.5 or x>1.5, which says what
+    stays; or a point and the normal into the part that is taken away, px,py,pz,nx,ny,nz. ValueError."""
+    if found := re.fullmatch(r"\s*([xyz])\s*([=<>])\s*(\S+)\s*", text):
+        values = _numbers(found[3])
+        if len(values) == 1:
+            axis, sign = "xyz".index(found[1]), -1.0 if found[2] == ">" else 1.0
+            point, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+            point[axis], normal[axis] = values[0], sign
+            return Section(tuple(point), tuple(normal), found[2] != "=")  # type: ignore[arg-type]
+    values = _numbers(text)
+    if len(values) != 6 or not any(values[3:]):
+        raise ValueError("expected x=1.5, x<1.5 or x>1.5 (y and z too), or a point and a normal, px,py,pz,nx,ny,nz")
+    return Section(tuple(values[:3]), tuple(values[3:]), True)  # type: ignore[arg-type]
+
+
+def _numbers(text: str) -> list[float]:
+    """Finite numbers with commas between them; none if there is anything else."""
+    try:
+        found = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    return found if all(map(math.isfinite, found)) else []

@@ -101,7 +101,7 @@ class Sources:
         key = str(file.path), status.st_mtime_ns, status.st_size
         with self.lock:
             if key not in self.moments:
-                self.moments[key] = read_moment(file.path)
+                self.moments[key] = _in_plane(read_moment(file.path), file.path)
                 while len(self.moments) > MOMENTS or (len(self.moments) > 1 and self._objects() > OBJECTS):
                     self.moments.popitem(last=False)
             self.moments.move_to_end(key)
@@ -169,6 +169,13 @@ class Sources:
         except OSError as problem:
             raise HpcdemError(f"process {holder['pid']} cannot be reached: {problem.strerror}") from None
         return f"process {holder['pid']}: {SIGNALS[what].name}"
+
+
+def _in_plane(moment: Moment, path: Path) -> Moment:
+    """HpcdemError for a frame in three dimensions."""
+    if moment.dim == 3:
+        raise HpcdemError(f"{path} is a frame in three dimensions: this is for two")
+    return moment
 
 
 def _run(folder: Path) -> dict[str, Any] | None:

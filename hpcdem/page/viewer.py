@@ -85,10 +85,11 @@ class Viewer:
 
     def warm_up(self) -> None:
         """Have the kernels compiled, or loaded, before the first picture is asked for."""
-        from hpcdem.page.warm_up import warm_up
+        from hpcdem.post.view import warm_up
 
         with self.turn:
-            warm_up()
+            warm_up.in_plane()
+            warm_up.in_space()
 
     # ---- what there is ---------------------------------------------------------------------------------------------
 

@@ -190,17 +190,13 @@ def plot(state: MeshState, path: str | os.PathLike, looks: Looks = USUAL, seen: 
 
 def plot_file(source: Path, path: Path, looks: Looks, seen: View | None = None) -> None:
     """Draw the frame in a file."""
-    plot(read_mesh_frame(source, solid=True), path, looks, seen)
+    plot(read_mesh_frame(source), path, looks, seen)
 
 
 def draw(state: MeshState, looks: Looks = USUAL, seen: View | None = None) -> Any:
     """A matplotlib Figure with the panels, beside each other for tall models, else below each other."""
     from matplotlib.figure import Figure
 
-    if state.points.shape[1] == 3:
-        from hpcdem.post import solids
-
-        return solids.draw(state, looks.page, looks.font)
     seen = view(state) if seen is None else seen
     panels = looks.panels or panels_of(state)
     ratio = seen.height / seen.width

@@ -363,6 +363,8 @@ IN_SPACE: list[tuple[str, str]] = [
      "cohesion=sim.tables.over('c', 'plastic-strain'))"),
     ("pcdc history create 'h' node nearest (0,0,1) value displacement-z",
      "sim.histories.create('h', 'node', 'displacement-z', nearest=(0, 0, 1))"),
+    ("pcdc output image 'cut' field 'displacement' eye '-y' section 'y=12.5'",
+     "sim.output.image('cut', field='displacement', eye='-y', section='y=12.5')"),
 ]  # fmt: skip
 """In three dimensions."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
+from hpcdem.pre.mesh import structured_space
 
 
 def blocks(step: int = 7, n: int = 3, grown: float = 0.0) -> MeshFrame:
@@ -107,14 +109,43 @@ def write_discs(folder: Path, step: int = 3, **values: int) -> Path:
     return path
 
 
-def write_tetrahedra(folder: Path) -> Path:
-    """One tetrahedron: a frame in three dimensions."""
-    at = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-    none = {name: np.zeros(0, np.int64) for name in ("number", "first", "last")} | {"state": np.zeros(0)}
-    frame = MeshFrame(
-        5, 1e-3, 1e-6, Table({"number": np.arange(4), "x": at[:, 0], "y": at[:, 1], "z": at[:, 2]}, 0, 4),
-        Table({"number": np.arange(1), "corners": np.array([4]), "stress_yy": np.ones(1)}, 0, 1), Table(none, 0, 0), {},
-    )  # fmt: skip
-    path = folder / "body_0000000005.vtkhdf"
-    write_mesh_frame(path, frame, SerialComm())
+SIZE = (4.0, 3.0, 2.0)
+"""Of the body [m]."""
+
+
+def body(step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 0.1, broken: bool = False) -> MeshFrame:
+    """A box of SIZE of tetrahedra, six to a brick, whose upper end is `grown` times its height higher, and as much
+    thinner along y: u = grown (0, -y, z). Its stress is uniaxial, stress_zz of element k -1e6 (k + 1); group "base"
+    below half of the height, else "roof". broken: joints on all inner faces, broken in shear where the roof lies on
+    the base, else intact."""
+    mesh = structured_space.box(tuple(np.linspace(0.0, s, n + 1) for s, n in zip(SIZE, cells, strict=True)), 6)
+    count = len(mesh.cells)
+    place = mesh.points[mesh.cells].reshape(-1, 3)
+    u = grown * np.column_stack([np.zeros(len(place)), -place[:, 1], place[:, 2]])
+    number = np.arange(count)
+    zz = -1e6 * (number + 1.0)
+    stress = {f"stress_{c}": zz if c == "zz" else np.zeros(count) for c in ("xx", "yy", "xy", "zz", "xz", "yz")}
+    roof = mesh.points[mesh.cells].mean(axis=1)[:, 2] > 0.5 * SIZE[2]
+    corners = {"number": np.arange(4 * count), "node": mesh.cells.reshape(-1).astype(np.int64)}
+    corners |= {axis: (place + u)[:, c] for c, axis in enumerate("xyz")}
+    corners |= {f"displacement_{axis}": u[:, c] for c, axis in enumerate("xyz")}
+    corners |= {f"velocity_{axis}": np.full(4 * count, float(c == 0)) for c, axis in enumerate("xyz")}
+    volume = np.full(count, np.prod(SIZE) / count)
+    elements = {"number": number, "corners": np.full(count, 4), **stress, "stress_max": 0.0 * zz, "stress_min": zz,
+                "volume": volume, "strain_energy": 0.5 * volume, "group_rock": roof.astype(np.int32)}  # fmt: skip
+    joints = {name: np.zeros(0, np.int64) for name in ("number", "first", "last")} | {"state": np.zeros(0)}
+    if broken:
+        pairs = mesh.edges().faces
+        lower, upper = pairs[pairs[:, 1] >= 0].T
+        apart = roof[lower // 4] != roof[upper // 4]
+        joints = {"number": lower, "first": lower, "last": lower, "state": np.where(apart, 3.0, 1.0),
+                  "mode": np.where(apart, 2.0, 0.0)}  # fmt: skip
+    tables = (Table(columns, 0, len(columns["number"])) for columns in (corners, elements, joints))
+    return MeshFrame(step, 1e-3 * step, 1e-6, *tables, {"group_rock": ["base", "roof"]})
+
+
+def write_body(folder: Path, step: int = 5, **values: Any) -> Path:
+    """A frame in three dimensions in a file."""
+    path = folder / f"body_{step:010d}.vtkhdf"
+    write_mesh_frame(path, body(step, **values), SerialComm())  # type: ignore[arg-type]
     return path

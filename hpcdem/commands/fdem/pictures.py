@@ -23,6 +23,8 @@ def image(
     field: str = "",
     kind: str = "",
     corners: tuple[tuple[float, float], tuple[float, float]] | None = None,
+    eye: str | None = None,
+    section: str | None = None,
     deformed: float | None = None,
     title: str | None = None,
     where: Range | None = None,
@@ -30,8 +32,8 @@ def image(
 ) -> None:
     """Draw the model as it is now into `<name>_<step>.png` in the folder of the results (.pdf or .svg if the name ends
     so). view: a file *.mv; field: what colours objects of this kind (else the first that have it); looks: values of
-    `hpcdem.post.view.model.Layer`; corners: of the part of the plane [m]; where: the objects of the kind that are
-    shown. Collective."""
+    `hpcdem.post.view.model.Layer`; corners: of the part of the plane [m]; eye, section: in space, as in
+    `hpcdem.post.view.model.ModelView`; where: the objects of the kind that are shown. Collective."""
     from hpcdem.post.view.model import ModelView, read_view
     from hpcdem.post.view.moment import of_blocks
     from hpcdem.post.view.paper import draw
@@ -48,12 +50,14 @@ def image(
     step = project.step
     path = project.to_write(project.folder() / f"{stem}_{step:010d}{suffix if suffix in FIGURES else FIGURES[0]}")
     state = frames.whole(project)
+    if project.blocks.dim == 3:
+        project.blocks.prepare_kernels("pictures")
 
     def picture() -> None:
         assert state is not None
         moment = of_blocks(state)
         shown: ModelView = default_view(moment) if file is None else read_view(file)
-        more: dict[str, Any] = {"deformed": deformed, "title": title}
+        more: dict[str, Any] = {"deformed": deformed, "title": title, "eye": eye, "section": section}
         if corners is not None:
             (left, bottom), (right, top) = corners
             more["camera"] = left, right, bottom, top

@@ -143,15 +143,23 @@ def _tell_both(project: Project) -> None:
 
 
 def last_figure(project: Project) -> Path:
-    """Cracks and stress at this moment, `all_<step>.jpg` in the folder of the results. Collective."""
+    """Cracks and stress, in space displacement, at this moment: `all_<step>.jpg` in the folder of the results.
+    Collective."""
     path = project.folder() / f"all_{project.step:010d}.jpg"
     with project.blocks.timers.around("figure"):
         whole = frames.whole(project)
+        if project.blocks.dim == 3:
+            project.blocks.prepare_kernels("pictures")
 
         def draw() -> None:
             from hpcdem.post import blocks
+            from hpcdem.post.view import moment, paper, scene
 
-            if whole is not None:
+            assert whole is not None
+            if project.blocks.dim == 3:
+                found = moment.of_blocks(whole)
+                paper.draw(found, path, scene.view_in_space(found))
+            else:
                 blocks.plot(whole, path)
 
         on_first(project.comm, draw)

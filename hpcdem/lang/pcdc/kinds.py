@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, NoReturn
 
+from hpcdem.core.looks import EYES, eye_of, section_of
 from hpcdem.lang.pcdc.lexer import Escape, Number, Text, Token, Vector, Word, short
 from hpcdem.lang.zdem.nearest import hint
 from hpcdem.physics.fdem.tables import AXES, PLASTIC_STRAIN, TEMPERATURE
@@ -126,6 +127,20 @@ def _string(value: Any) -> str:
     return value
 
 
+def _read_by(read: Callable[[str], Any]) -> Callable[[Any], str]:
+    """A check for a text that `read` understands."""
+
+    def check(value: Any) -> str:
+        text = _string(value)
+        try:
+            read(text)
+        except ValueError:
+            raise Unfit from None
+        return text
+
+    return check
+
+
 def _file(value: Any) -> str:
     text = _string(value).replace("\\", "/")
     if len(text.rpartition("/")[2].encode()) > 255 or text.endswith("/"):
@@ -191,6 +206,11 @@ BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"
 VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2))
+"""Of a picture, in space too."""
+EYE = Kind("<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of))
+SECTION = Kind("<s>", "a plane, 'x=1.5', 'x<1.5', 'x>1.5', or a point and a normal as '0,0,2,0,1,1'",
+               _read_by(section_of))  # fmt: skip
 THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSITIVE))
 """One more in three dimensions."""
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))

@@ -20,8 +20,10 @@ from hpcdem.core.looks import COLOURS, OBJECTS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
     BOOL,
+    CORNER,
     COUNT,
     DIMENSIONS,
+    EYE,
     FILE,
     FLOAT,
     FREEDOM,
@@ -31,6 +33,7 @@ from hpcdem.lang.pcdc.kinds import (
     PART,
     POINTS,
     POSITIVE,
+    SECTION,
     SPLIT,
     STRING,
     STRINGS,
@@ -1130,8 +1133,14 @@ _RECORDS = (
              Option("arrows", (POSITIVE,), "factor on their length", default="1"),
              Option("filter", (STRING,), "only objects for which this holds, as 'stress_yy < -1e6 and x > 2'"),
              Option("deformed", (FLOAT,), "factor on displacements", default="1"),
-             Option("camera", (VECTOR, VECTOR), "lower left and upper right corner of the picture", "m", "the model"),
-             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any"),
+             Option("camera", (CORNER, CORNER), "lower left and upper right corner of the picture, in space along it "
+                    "and up it", "m", "the model"),
+             Option("eye", (EYE,), "from where a body is seen: along an axis, from the right, the front and above "
+                    "(iso), or from a direction", "", "'iso'", dims=SPACE),
+             Option("section", (SECTION,), "a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' "
+                    "and 'x>1.5' say what stays, 'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken "
+                    "away", "", "whole", dims=SPACE),
+             Option("title", (STRING,), "over the picture; {step} and {time} are filled in")), ranged="any", dims=BOTH),
 )  # fmt: skip
 
 COMMANDS = (*_MODEL, *_GEOMETRY, *_MESH, *_OBJECTS, *_RECORDS)

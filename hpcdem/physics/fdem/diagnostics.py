@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.core.fields import PER_METRE
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import connectivity, user_laws
 from hpcdem.physics.fdem.budget import Budget
@@ -35,8 +36,6 @@ class Quantity:
 
 
 BOTH = (2, 3)
-PER_METRE = {"N/m": "N", "J/m": "J", "N m/m": "N m", "m2/s": "m3/s"}
-"""Units in the plane, where everything is that of a metre of thickness, and in space."""
 
 
 def unit_of(sim: Blocks, name: str) -> str:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.looks import COLOURS, OBJECTS, eye_of, section_of
 from hpcdem.io.agreed import atomic_path
 from hpcdem.io.disk import explain
 
@@ -66,11 +66,14 @@ class Layer(_Table):
 
 class ModelView(_Table):
     """layers: what is shown, the later ones over the earlier; camera: left, right, bottom, top of the part of the plane
-    [m], else the whole model; deformed: factor on displacements, 1 as it is, 0 as it was in the mesh; title: over the
-    picture, with {step} and {time}; step: of the frame, else the last one."""
+    [m], in space of the plane of the picture, else the whole model; eye, section: in space from where it is seen, and
+    a plane that cuts it, as `hpcdem.core.looks` reads them; deformed: factor on displacements, 1 as it is, 0 as it was
+    in the mesh; title: over the picture, with {step} and {time}; step: of the frame, else the last one."""
 
     layers: tuple[Layer, ...] = ()
     camera: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+    eye: Annotated[str, Field(max_length=100)] = "iso"
+    section: Annotated[str, Field(max_length=200)] = ""
     deformed: FiniteFloat = 1.0
     title: Annotated[str, Field(max_length=200)] = "step {step}, {time} s"
     axes: bool = True
@@ -81,6 +84,12 @@ class ModelView(_Table):
     def _a_part(self) -> ModelView:
         if self.camera is not None and not (self.camera[0] < self.camera[1] and self.camera[2] < self.camera[3]):
             raise ValueError("camera: expected left, right, bottom, top with left below right and bottom below top")
+        for word, read in (("eye", eye_of), ("section", section_of)):
+            if word == "eye" or self.section:
+                try:
+                    read(getattr(self, word))
+                except ValueError as problem:
+                    raise ValueError(f"{word}: {problem}, not '{getattr(self, word)}'") from None
         labels = [layer.label for layer in self.layers]
         for label in labels:
             if labels.count(label) > 1:

@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError
+from hpcdem.core.fields import PER_METRE
 from hpcdem.io.frame import Columns, Frame
 from hpcdem.io.frames import read_frame
 from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
 
 DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
+SOLIDS, FACES = "solids", "faces"
+"""In space."""
 INSIDE = ("contacts", "bonds", "joints", "channels")
 """Objects that lie between others."""
 OF_CHANNELS = (
@@ -35,12 +38,18 @@ UNITS = {
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
 
-PARTS = {"x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "min", "largest", "first", "last", "shear"}
+PARTS = {
+    "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest", "first",
+    "last", "shear",
+}  # fmt: skip
 """Ends of the names of fields that change no unit."""
 
 
-def unit_of(name: str) -> str:
+def unit_of(name: str, dim: int = 2) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
+    if dim == 3:
+        unit = unit_of(name)
+        return PER_METRE.get(unit, unit)
     words = name.split("_")
     while words and words[-1] in PARTS:
         words.pop()
@@ -53,9 +62,10 @@ def unit_of(name: str) -> str:
 @dataclass
 class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
-    in the fourth column of triangles) or lines (ends (n, 2, 2)), read when it is asked for; fields: (n,) by name;
-    vectors: (n, 2) by name; names: of the values of an integer field; number: the field by which the program numbers
-    them; slow: fields that take a pass over other tables."""
+    in the fourth column of triangles) or lines (ends (n, 2, 2)); in space tetrahedra (points (k, 3), cells (n, 4), the
+    face (4 n,) that each of their faces lies on, or -1) or faces (points (k, 3), cells (n, 4) as polygons), read when
+    it is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer
+    field; number: the field by which the program numbers them; slow: fields that take a pass over other tables."""
 
     kind: str
     count: int
@@ -66,14 +76,19 @@ class Objects:
     number: str = "number"
     slow: Collection[str] = ()
 
+    @property
+    def dim(self) -> int:
+        """Dimensions of space."""
+        return 3 if self.kind in (SOLIDS, FACES) else 2
+
     def centres(self) -> np.ndarray:
-        """(n, 2) [m]."""
+        """(n, 2), in space (n, 3) [m]."""
         shape = self.read()
         if self.kind == DISCS:
             return shape[0]
         if self.kind == LINES:
             return shape[0].mean(axis=1)
-        points, cells = shape
+        points, cells = shape[:2]
         last = np.where(cells[:, 3] >= 0, cells[:, 3], cells[:, 0])
         total = points[cells[:, 0]] + points[cells[:, 1]] + points[cells[:, 2]]
         quads = cells[:, 3] >= 0
@@ -84,7 +99,7 @@ class Objects:
         if name in self.fields:
             return self.fields[name]
         if name in self.vectors:
-            return np.hypot(*self.vectors[name].T)
+            return lengths(self.vectors[name])
         raise self.lack(name, label)
 
     def lack(self, name: str, label: str) -> HpcdemError:
@@ -108,6 +123,11 @@ class Objects:
         return {name for name in self.slow if isinstance(self.fields, Columns) and not self.fields.was_read(name)}
 
 
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """(n,) of vectors (n, 2) or (n, 3)."""
+    return np.hypot(*vectors.T) if vectors.shape[1] == 2 else np.sqrt((vectors**2).sum(axis=1))
+
+
 def there(values: np.ndarray) -> bool:
     """Whether a column says anything: what an object does not have is NaN, or -1 in whole numbers."""
     if not len(values) or values.dtype.kind != "f":
@@ -117,12 +137,14 @@ def there(values: np.ndarray) -> bool:
 
 @dataclass
 class Moment:
-    """A frame. displacement: (k, 2) [m] of the points of the elements, None where the frame has none."""
+    """A frame. displacement: (k, dim) [m] of the points of the elements, None where the frame has none; dim: dimensions
+    of space."""
 
     step: int
     time: float
     objects: dict[str, Objects]
     displacement: Callable[[], np.ndarray] | None = None
+    dim: int = 2
 
     def of(self, name: str) -> Objects:
         """The objects of a kind. HpcdemError that names what there is."""
@@ -130,14 +152,14 @@ class Moment:
             raise HpcdemError(f"this frame has no {name}; it has {', '.join(self.objects) or 'nothing'}")
         return self.objects[name]
 
-    def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom, top of what is there [m]."""
+    def extent(self, turn: np.ndarray | None = None) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of what is there [m]; turn (3, 3): right, up and towards the eye, in space."""
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for name, objects in self.objects.items():
             if not objects.count or name in INSIDE:
                 continue
             shape = objects.read()
-            at = shape[0].reshape(-1, 2)
+            at = shape[0].reshape(-1, 2) if turn is None else shape[0] @ turn[:2].T
             around = shape[1][:, None] if objects.kind == DISCS else 0.0
             low = np.fmin(low, np.nanmin(np.where(np.isfinite(at), at, np.nan) - around, axis=0))
             high = np.fmax(high, np.nanmax(np.where(np.isfinite(at), at, np.nan) + around, axis=0))
@@ -152,7 +174,7 @@ def read_moment(path: str | os.PathLike) -> Moment:
     if path.suffix != ".vtkhdf":
         return of_particles(read_frame(path))
     if is_mesh_frame(path):
-        return of_blocks(read_mesh_frame(path, lazily=True))
+        return of_blocks(read_mesh_frame(path, lazily=True, solid=True))
     from hpcdem.io.vtkhdf import read_vtkhdf
 
     return of_particles(read_vtkhdf(path, lazily=True))
@@ -240,7 +262,7 @@ def _stresses(frame: Frame) -> dict[str, np.ndarray]:
 
 def of_blocks(state: MeshState) -> Moment:
     """A frame of blocks."""
-    cells, count = state.cells, len(state.joints)
+    cells, count, dim = state.cells, len(state.joints), state.points.shape[1]
 
     def mean(name: str) -> np.ndarray:
         """(ne, ...) of what the corners of each element have."""
@@ -254,12 +276,16 @@ def of_blocks(state: MeshState) -> Moment:
     flat = [name for name in of_corners if name not in VECTORS]
     fields = {name: partial(state.of_elements.__getitem__, name) for name in state.of_elements if name != "cell"}
     fields |= {name: partial(mean, name) for name in flat}
+    fields |= {name: partial(make, state.of_elements) for name, make in _of_stress(state.of_elements, dim).items()}
     vectors = {name: partial(mean, name) for name in of_corners if name in VECTORS}
+    beside = Columns({"partner": lambda: _partners(state)})
     objects = {
         "elements": Objects(
-            POLYGONS, len(cells), lambda: (state.points, cells), Columns(fields), Columns(vectors), state.group_names
+            SOLIDS if dim == 3 else POLYGONS, len(cells),
+            lambda: (state.points, cells, beside["partner"]) if dim == 3 else (state.points, cells),
+            Columns(fields), Columns(vectors), state.group_names,
         )
-    }
+    }  # fmt: skip
 
     def joint(name: str, rows: Any) -> np.ndarray:
         return state.of_joints[name][rows]
@@ -269,7 +295,9 @@ def of_blocks(state: MeshState) -> Moment:
 
     wet = [name for name in OF_CHANNELS if name in state.of_joints]
     rest = [name for name in state.of_joints if name not in (*wet, "cell") and not name.startswith("group_")]
-    if count:
+    if count and dim == 3:
+        objects["joints"] = Objects(FACES, count, lambda: (state.points, _faces(state)), of_joints(slice(None), rest))
+    elif count:
         objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(slice(None), rest))
     if "aperture" in wet and fluid.there(state):
         rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
@@ -280,7 +308,60 @@ def of_blocks(state: MeshState) -> Moment:
     for name, tables in state.supports.items():
         objects[name] = _supports(name, tables)
     displacement = (lambda: state.of_points["displacement"]) if "displacement" in state.of_points else None
-    return Moment(state.step, state.time, objects, displacement)
+    return Moment(state.step, state.time, objects, displacement, dim)
+
+
+def _of_stress(
+    given: Mapping[str, np.ndarray], dim: int
+) -> dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]]:
+    """What is computed of the stresses of elements (tension positive), where they are all there: mean, von Mises, and
+    in space the middle principal stress."""
+    shears = ("xy", "xz", "yz") if dim == 3 else ("xy",)
+    if not {f"stress_{c}" for c in ("xx", "yy", "zz", *shears)} <= given.keys():
+        return {}
+
+    def mean(of: Mapping[str, np.ndarray]) -> np.ndarray:
+        return (of["stress_xx"] + of["stress_yy"] + of["stress_zz"]) / 3.0
+
+    def mises(of: Mapping[str, np.ndarray]) -> np.ndarray:
+        middle = mean(of)
+        total = 0.5 * sum((of[f"stress_{c}"] - middle) ** 2 for c in ("xx", "yy", "zz"))
+        return np.sqrt(3.0 * (total + sum(of[f"stress_{c}"] ** 2 for c in shears)))
+
+    found: dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]] = {"stress_mean": mean, "stress_mises": mises}
+    if dim == 3:
+        found["stress_middle"] = lambda of: 3.0 * mean(of) - of["stress_max"] - of["stress_min"]
+    return found
+
+
+def _partners(state: MeshState) -> np.ndarray:
+    """(4 n,) the face of a tetrahedron on which each of their faces lies, -1: none, or one across a crack."""
+    from hpcdem.physics.fdem import tetrahedra
+    from hpcdem.post.blocks import BROKEN, FREE
+
+    if "node" not in state.of_points:
+        raise HpcdemError("this frame does not tell which elements are neighbours")
+    partner = tetrahedra.face_partners(state.of_points["node"][state.cells].astype(np.int64))
+    if len(state.joints):
+        now = state.of_joints["state"]
+        lower = faces_of_joints(state)[(now == BROKEN) | (now == FREE)]
+        across = partner[lower]
+        partner[lower] = partner[across[across >= 0]] = -1
+    return partner
+
+
+def faces_of_joints(state: MeshState) -> np.ndarray:
+    """(nj,) the faces that joints are numbered by, as place of the element * 4 + k."""
+    number = state.of_joints["number"].astype(np.int64)
+    return 4 * np.searchsorted(state.of_elements["number"], number // 4) + number % 4
+
+
+def _faces(state: MeshState) -> np.ndarray:
+    """(nj, 4) rows of points of joints in space."""
+    from hpcdem.physics.fdem import tetrahedra
+
+    three = tetrahedra.face_points(state.cells, faces_of_joints(state))
+    return np.column_stack([three, np.full(len(three), -1)])
 
 
 VECTORS = ("displacement", "velocity")

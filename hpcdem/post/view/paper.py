@@ -1,4 +1,5 @@
-"""Views as figures: PNG and JPG, and true vectors in PDF and SVG. matplotlib draws, without a window system."""
+"""Views as figures: PNG and JPG, and true vectors in PDF and SVG. matplotlib draws, without a window system. Bodies in
+space are painted by screen.py, also for PDF and SVG, and set into the figure."""
 
 from __future__ import annotations
 
@@ -13,9 +14,10 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS
 from hpcdem.io.agreed import atomic_path
-from hpcdem.io.axes import CM, View
+from hpcdem.io.axes import CM, View, number
 from hpcdem.post import blocks
 from hpcdem.post.saved import FORMATS, SAVED, saving
+from hpcdem.post.view import space
 from hpcdem.post.view.model import ModelView
 from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
 from hpcdem.post.view.scene import Painted, Scale, Scene, scene
@@ -23,7 +25,15 @@ from hpcdem.post.view.scene import Painted, Scale, Scene, scene
 TALLEST = 1.3
 """Largest height of the model over its width on paper; taller ones are narrower."""
 EDGE = "#5a5a5a"
+FINE = 2
+"""Pixels of bodies in space are the means of so many squared."""
+EDGES = 0.5
+"""Width of their edges [points]."""
+LARGEST = 8192
+"""Pixels of them along a side at most."""
 _LEFT, _RIGHT, _BOTTOM, _TOP, _BAR = 1.35, 0.35, 1.05, 0.75, 1.9  # cm around the model, and for each bar of colours
+_CORNER = 2.0
+"""Side of the square with the axes of space [cm]."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +83,12 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
 
     seen, view, k = shown.seen, shown.view, paper.font / 9.0
     bars = [layer for layer in shown.layers if layer.scale is not None] if view.legend else []
-    left, bottom = (k * _LEFT, k * _BOTTOM) if view.axes else (0.15, 0.15)
+    along = None if shown.turn is None else space.axes_of(shown.turn)
+    oblique = shown.turn is not None and along is None
+    left, bottom = (k * _RIGHT, k * _CORNER) if oblique else (k * _LEFT, k * _BOTTOM)
+    left, bottom = (left, bottom) if view.axes else (0.15, 0.15)
     classes = [entry for layer in shown.layers for entry in layer.legend] if view.legend else []
-    top = k * (_TOP + 0.45 * (-(-len(classes) // 4))) if view.title or classes else 0.15
+    top = k * (_TOP + 0.45 * (-(-len(classes) // 4))) if view.title or classes else 0.5 * k if bars else 0.15
     right = k * _RIGHT + k * _BAR * len(bars)
     width = paper.page - left - right
     if width < 1.0:
@@ -87,14 +100,22 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
     figure = Figure(figsize=(page[0] * CM, page[1] * CM))
     axes = figure.add_axes((left / page[0], bottom / page[1], width / page[0], height / page[1]))
     blocks.frame(axes, seen, blocks.Looks(font=paper.font), first=True, last=True)
-    if not view.axes:
+    if not view.axes or oblique:
         axes.set_axis_off()
+    if shown.turn is not None:
+        _body(axes, shown, width * CM * paper.dpi, paper.dpi)
+        if along is not None:
+            _named(axes, seen, along, paper.font)
+        elif view.axes:
+            _axes_of_space(figure, shown.turn, paper.font, k * _CORNER, page)
+            _length(figure, seen, width, (left + width, 0.45 * k), paper.font, page)
     handles = []
-    for number, layer in enumerate(shown.layers):
-        _draw(axes, layer, number)
+    for place, layer in enumerate(shown.layers):
+        if shown.turn is None:
+            _draw(axes, layer, place)
         handles += _handles(layer) if view.legend else []
-    for number, layer in enumerate(bars):
-        at = left + width + k * (0.3 + _BAR * number)
+    for place, layer in enumerate(bars):
+        at = left + width + k * (0.3 + _BAR * place)
         assert layer.scale is not None
         colour_bar(figure, figure.add_axes((at / page[0], bottom / page[1], 0.3 * k / page[0], height / page[1])),
              layer.scale, paper.font)  # fmt: skip
@@ -109,6 +130,58 @@ def figure_of(shown: Scene, paper: Paper = USUAL) -> Any:
             parse_math=False,
         )  # fmt: skip
     return figure
+
+
+def _body(axes: Any, shown: Scene, pixels: float, dpi: float) -> None:
+    """What is seen of bodies in space, so many pixels wide."""
+    from hpcdem.post.view.screen import paint
+
+    seen = shown.seen
+    columns = max(1, min(round(pixels), LARGEST))
+    rows = max(1, min(round(columns * seen.height / seen.width), LARGEST))
+    picture = paint(shown, columns, rows, FINE, pen=EDGES * columns / pixels * dpi / 72.0)
+    axes.imshow(picture.colours, extent=(seen.left, seen.right, seen.bottom, seen.top), interpolation="antialiased",
+                aspect="equal", zorder=0.5)  # fmt: skip
+
+
+def _named(axes: Any, seen: View, along: tuple[tuple[float, str], tuple[float, str]], font: float) -> None:
+    """Axes of space along the sides of the picture, which may run to the left or down."""
+    size, unit = seen.unit
+    for axis, (sign, name) in zip((axes.xaxis, axes.yaxis), along, strict=True):
+        axis.set_label_text(f"{name} ({unit})", fontsize=font)
+        if sign < 0.0:
+            places = axis.get_majorticklocs()
+            axis.set_ticks(places, labels=[number(-v / size) for v in places])
+
+
+def _axes_of_space(figure: Any, turn: np.ndarray, font: float, side: float, page: tuple[float, float]) -> None:
+    """Arrows of x, y and z in the lower left corner, in a square of this side [cm]."""
+    axes = figure.add_axes((0.1 / page[0], 0.1 / page[1], side / page[0], side / page[1]))
+    axes.set(xlim=(-1.35, 1.35), ylim=(-1.35, 1.35), aspect="equal")
+    axes.set_axis_off()
+    for k in np.argsort(turn[2]):  # what comes towards the eye over what goes away from it
+        x, y = turn[:2, k]
+        axes.annotate("", (x, y), (0.0, 0.0), arrowprops={"arrowstyle": "-|>", "lw": 0.8, "color": EDGE, "shrinkA": 0,
+                                                          "shrinkB": 0})  # fmt: skip
+        axes.text(1.22 * x, 1.22 * y, "xyz"[k], fontsize=font, ha="center", va="center")
+
+
+def _length(
+    figure: Any, seen: View, width: float, at: tuple[float, float], font: float, page: tuple[float, float]
+) -> None:
+    """A bar of a round length, which ends at `at` [cm] on the right; far things are not smaller."""
+    size, unit = seen.unit
+    tick = seen.ticks()[0].major
+    step = (tick[1] - tick[0]) if len(tick) > 1 else 0.2 * seen.width / size
+    part = step * size / seen.width * width
+    low = at[1] / page[1]
+    ends = (at[0] - part) / page[0], at[0] / page[0]
+    axes = figure.add_axes((ends[0], low, ends[1] - ends[0], 0.09 / page[1]))
+    axes.set(xticks=[], yticks=[], facecolor=EDGE)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    figure.text(0.5 * (ends[0] + ends[1]), low + 0.15 / page[1], f"{number(step)} {unit}", fontsize=font, ha="center",
+                va="bottom")  # fmt: skip
 
 
 def _draw(axes: Any, layer: Painted, order: int) -> None:

@@ -28,3 +28,19 @@ def triangles(corners: np.ndarray, width: int, height: int) -> np.ndarray:
         shown[inside] = k
         shown[on] = -2
     return shown
+
+
+def nearest(corners: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle (n, 3, 3) in pixels, z towards the eye, that is nearest at the middle of each pixel, -1 for none,
+    and how near; the middle of a pixel is taken as it is in each triangle's own coordinates."""
+    row, column = np.mgrid[0:height, 0:width] + 0.5
+    shown, near = np.full((height, width), -1), np.full((height, width), -np.inf)
+    for k, (a, b, c) in enumerate(corners):
+        sides = np.array([b[:2] - a[:2], c[:2] - a[:2]]).T
+        if abs(np.linalg.det(sides)) < 1e-12:
+            continue
+        of_b, of_c = np.linalg.solve(sides, np.stack([column - a[0], row - a[1]]).reshape(2, -1)).reshape(2, height, -1)
+        depth = a[2] + of_b * (b[2] - a[2]) + of_c * (c[2] - a[2])
+        there = (of_b >= 0.0) & (of_c >= 0.0) & (of_b + of_c <= 1.0) & (depth > near)
+        shown[there], near[there] = k, depth[there]
+    return shown, near

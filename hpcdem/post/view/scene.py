@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.looks import COLOURS, OBJECTS, eye_of, section_of
 from hpcdem.io import colours
 from hpcdem.io.axes import View
 from hpcdem.post import blocks
 from hpcdem.post.view.filter import chosen, refusal
 from hpcdem.post.view.model import Layer, ModelView
-from hpcdem.post.view.moment import DISCS, LINES, Moment, Objects, unit_of
+from hpcdem.post.view.moment import DISCS, LINES, SOLIDS, Moment, Objects, lengths, unit_of
 
 STEPS = 256
 """Colours of a field."""
@@ -61,9 +61,10 @@ class Scale:
 class Painted:
     """A layer ready to be drawn.
 
-    rows (m,): which of its objects these are; shape as in `Objects`, of these; shades (c, 3): colours as fractions,
-    kind (m,): the colour of each; width: of lines [points]; values (m,): of the field, None without; arrows: where
-    (k, 2), and how far (k, 2) [m]; legend: (word, colour) of classes; scale: of the field."""
+    rows (m,): which of its objects these are; shape as in `Objects`, of these; of tetrahedra what is seen of them, the
+    columns of `space.Skin`; shades (c, 3): colours as fractions, kind (m,): the colour of each; width: of lines
+    [points]; values (m,): of the field, None without; arrows: where (k, dim), and how far (k, dim) [m]; legend: (word,
+    colour) of classes; scale: of the field."""
 
     layer: Layer
     kind_of_shape: str
@@ -80,12 +81,14 @@ class Painted:
 
 @dataclass
 class Scene:
-    """All of a picture. seen: the part of the plane."""
+    """All of a picture. seen: the part of the plane, in space of that of the picture; turn (3, 3): in space right, up
+    and towards the eye."""
 
     moment: Moment
     view: ModelView
     seen: View
     layers: list[Painted]
+    turn: np.ndarray | None = None
 
     def title(self) -> str:
         """Over the picture."""
@@ -98,6 +101,13 @@ def default_view(moment: Moment) -> ModelView:
     return ModelView(
         layers=tuple(Layer(object=name, visible=name not in hidden) for name in OBJECTS if name in moment.objects)
     )
+
+
+def view_in_space(moment: Moment, title: str | None = None) -> ModelView:
+    """Bodies in space as they are usually drawn: coloured by how far they have moved."""
+    edges = moment.of("elements").count <= blocks.MOST_EDGES
+    view = with_field(default_view(moment), moment, "displacement", "elements", edges=edges)
+    return view if title is None else view.changed(title=title)
 
 
 def with_field(view: ModelView, moment: Moment, name: str, on: str | None = None, **looks: Any) -> ModelView:
@@ -145,9 +155,30 @@ def seen_of(moment: Moment, view: ModelView) -> View:
     """The part of the plane: that of the view, else all that is there, with some air."""
     if view.camera is not None:
         return View(*view.camera)
-    left, right, bottom, top = moment.extent()
+    left, right, bottom, top = moment.extent(turn_of(moment, view))
     air = 0.03 * max(right - left, top - bottom, 1e-12)
     return View(left - air, right + air, bottom - air, top + air)
+
+
+def turn_of(moment: Moment, view: ModelView) -> np.ndarray | None:
+    """(3, 3) right, up and towards the eye; None in the plane. HpcdemError for words that are for space."""
+    if moment.dim == 3:
+        from hpcdem.post.view import space
+
+        return space.turn_of(eye_of(view.eye))
+    for word in ("eye", "section"):
+        if getattr(view, word) != ModelView.model_fields[word].default:
+            raise HpcdemError(f"{word} is for three dimensions; this frame has two")
+    return None
+
+
+def plane_of(moment: Moment, view: ModelView) -> tuple[np.ndarray, np.ndarray] | None:
+    """A point of the plane that cuts bodies in space, and its normal into what is taken away; None without."""
+    if moment.dim != 3 or not view.section:
+        return None
+    from hpcdem.post.view import space
+
+    return space.taken(section_of(view.section), eye_of(view.eye))
 
 
 def scene(
@@ -157,15 +188,16 @@ def scene(
     frame does not have."""
     seen = seen_of(moment, view) if seen is None else seen
     shifted = shift_of(moment, view.deformed)
+    plane = plane_of(moment, view)
     layers = [
-        painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object))
+        painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object), plane)
         for layer in view.layers if layer.visible
     ]  # fmt: skip
-    return Scene(moment, view, seen, layers)
+    return Scene(moment, view, seen, layers, turn_of(moment, view))
 
 
 def shift_of(moment: Moment, factor: float) -> np.ndarray | None:
-    """(k, 2) [m] by which the points of elements are moved for the picture."""
+    """(k, dim) [m] by which the points of elements are moved for the picture."""
     if factor == 1.0:
         return None
     if moment.displacement is None:
@@ -196,17 +228,18 @@ class _Words(Mapping[str, np.ndarray]):
         objects = self.objects
         if name in objects.fields:
             return np.asarray(objects.fields[name])
-        if name in ("x", "y"):
-            return objects.centres()[:, "xy".index(name)]
+        axes = "xyz"[: objects.dim]
+        if name in tuple(axes):
+            return objects.centres()[:, axes.index(name)]
         stem, _, part = name.rpartition("_")
-        if part in ("x", "y") and stem in objects.vectors:
-            return objects.vectors[stem][:, "xy".index(part)]
+        if part in tuple(axes) and stem in objects.vectors:
+            return objects.vectors[stem][:, axes.index(part)]
         if name in objects.vectors:
-            return np.hypot(*objects.vectors[name].T)
+            return lengths(objects.vectors[name])
         raise KeyError(name)
 
     def __iter__(self) -> Any:
-        return iter(dict.fromkeys(["x", "y", *self.objects.known()]))
+        return iter(dict.fromkeys([*"xyz"[: self.objects.dim], *self.objects.known()]))
 
     def __len__(self) -> int:
         return len(list(iter(self)))
@@ -229,8 +262,9 @@ def _members(objects: Objects, layer: Layer, group: str, set_name: str) -> np.nd
 
 
 def painted(
-    moment: Moment, layer: Layer, seen: View, shifted: np.ndarray | None = None, only: np.ndarray | None = None
-) -> Painted:
+    moment: Moment, layer: Layer, seen: View, shifted: np.ndarray | None = None, only: np.ndarray | None = None,
+    plane: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Painted:  # fmt: skip
     """One layer of a picture."""
     objects = moment.of(layer.object)
     rows = chosen_rows(moment, layer, only)
@@ -244,14 +278,12 @@ def painted(
         WIDTH.get(layer.object, 1.0) * layer.size,
     )
     if layer.field:
-        _by_field(result, objects)
+        _by_field(result, objects, moment.dim)
     elif layer.colour:
         _one_colour(result, layer.colour)
     else:
         _as_usual(result, objects)
     rows = result.rows
-    if layer.vectors:
-        result.arrows = _arrows(objects, layer, rows, seen)
     whole = objects.read()
     if objects.kind == DISCS:
         result.shape = whole[0][rows], layer.size * whole[1][rows]
@@ -259,7 +291,17 @@ def painted(
         result.shape = (whole[0][rows],)
     else:
         points = whole[0] if shifted is None else whole[0] + shifted
-        result.shape = points, whole[1] if len(rows) == len(whole[1]) else whole[1][rows]
+        if objects.dim == 3:
+            from hpcdem.post.view import space
+
+            solid = objects.kind == SOLIDS
+            result.shape = space.skin(points, whole[1], whole[2], rows, plane) if solid else space.cut_faces(
+                points, whole[1][rows, :3], plane
+            )  # fmt: skip
+        else:
+            result.shape = points, whole[1] if len(rows) == len(whole[1]) else whole[1][rows]
+    if layer.vectors:
+        result.arrows = _arrows(objects, result, seen)
     return result
 
 
@@ -291,7 +333,7 @@ def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
     return (float(fit.min()), float(fit.max())) if len(fit) else (np.inf, -np.inf)
 
 
-def _by_field(result: Painted, objects: Objects) -> None:
+def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     layer = result.layer
     values = np.asarray(objects.values(layer.field, layer.object))[result.rows]
     names = objects.names.get(layer.field)
@@ -304,7 +346,7 @@ def _by_field(result: Painted, objects: Objects) -> None:
         raise HpcdemError(f"log: no value of {layer.field} is above 0")
     if not low <= high:
         low, high = 0.0, 1.0
-    result.scale = Scale(_title(layer), low, high, layer.log, layer.colours)
+    result.scale = Scale(_title(layer, dim), low, high, layer.log, layer.colours)
     result.values = values
     with np.errstate(invalid="ignore", divide="ignore"):
         place, ends = (np.log10(values), np.log10((low, high))) if layer.log else (values, np.array((low, high)))
@@ -316,8 +358,8 @@ def _by_field(result: Painted, objects: Objects) -> None:
     result.shades = np.concatenate([shades_of(layer.colours), rgb([NOTHING])])
 
 
-def _title(layer: Layer) -> str:
-    unit = unit_of(layer.field)
+def _title(layer: Layer, dim: int) -> str:
+    unit = unit_of(layer.field, dim)
     words = layer.field.replace("_", " ")
     return f"{words} ({unit})" if unit else words
 
@@ -359,16 +401,25 @@ def _as_usual(result: Painted, objects: Objects) -> None:
         _one_colour(result, INK.get(name, "#202020"))
 
 
-def _arrows(objects: Objects, layer: Layer, rows: np.ndarray, seen: View) -> tuple[np.ndarray, np.ndarray]:
+def _arrows(objects: Objects, result: Painted, seen: View) -> tuple[np.ndarray, np.ndarray]:
+    """From the middle of the objects; in space from that of their faces that are seen."""
+    layer, rows = result.layer, result.rows
     if layer.vectors not in objects.vectors:
         known = ", ".join(objects.vectors) or "none"
         raise HpcdemError(f"{layer.object} have no vectors {layer.vectors} in this frame; there is {known}")
-    at = objects.centres()[rows]
-    inside = (at[:, 0] >= seen.left) & (at[:, 0] <= seen.right) & (at[:, 1] >= seen.bottom) & (at[:, 1] <= seen.top)
-    some = np.flatnonzero(inside)
+    if objects.dim == 3:
+        from hpcdem.post.view import space
+
+        points, cells, of, _ = result.shape
+        at, rows = space.middles(points, cells), rows[of]
+        some = np.arange(len(at))
+    else:
+        at = objects.centres()[rows]
+        inside = (at[:, 0] >= seen.left) & (at[:, 0] <= seen.right) & (at[:, 1] >= seen.bottom) & (at[:, 1] <= seen.top)
+        some = np.flatnonzero(inside)
     some = some[:: max(1, -(-len(some) // MOST_ARROWS))]
     far = np.asarray(objects.vectors[layer.vectors], float)[rows][some]
-    length = np.hypot(*far.T)
+    length = lengths(far)
     longest = float(np.max(length, initial=0.0, where=np.isfinite(length)))
     shown = np.isfinite(length) & (length > 1e-3 * longest)
     return at[some][shown], far[shown] * (layer.arrows * ARROW * seen.width / max(longest, 1e-300))

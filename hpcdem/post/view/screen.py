@@ -1,5 +1,6 @@
-"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, and beside
-the colours a buffer of what each pixel shows, in which a click is looked up. `reference.py` paints the same plainly."""
+"""Scenes as pixels, fast enough to be moved about: discs, polygons and lines painted one after the other, faces in
+space by their depth, and beside the colours a buffer of what each pixel shows, in which a click is looked up.
+`reference.py` paints the same plainly."""
 
 from __future__ import annotations
 
@@ -10,13 +11,23 @@ import numpy as np
 from numba import njit
 
 from hpcdem.io.axes import View
-from hpcdem.post.view.moment import DISCS, POLYGONS
+from hpcdem.post.view.moment import DISCS, FACES, POLYGONS
 from hpcdem.post.view.scene import Painted, Scene
 
 GROUND, DARK_GROUND, RIM = (255, 255, 255), (18, 24, 26), (60, 60, 60)
 DOT = 96.0 / 72.0
 """Pixels of a point, at one pixel per pixel of the page."""
 NOTHING = -1
+LIGHT = np.array([-0.35, 0.45, 0.82]) / np.linalg.norm([-0.35, 0.45, 0.82])
+"""Where light comes from in space: right, up, towards the eye."""
+IN_SHADE = 0.7
+"""Part of their colour that faces have which light only grazes; a section has all of it."""
+SHARP = 0.8
+"""Faces whose normals have a smaller product meet in an edge, which is drawn."""
+STEP = 6.0
+"""So many pixels of depth between neighbours, too."""
+NEARER = 2.0
+"""So many pixels nearer than they are lie faces of joints, which lie on those of elements."""
 
 
 @dataclass
@@ -29,15 +40,21 @@ class Picture:
     row: np.ndarray
 
 
-def paint(scene: Scene, width: int, height: int, fine: int = 1, dark: bool = False) -> Picture:
-    """The picture of a scene, so many pixels wide and high. fine: each pixel is the mean of so many squared."""
+def paint(
+    scene: Scene, width: int, height: int, fine: int = 1, dark: bool = False, pen: float = 1.0
+) -> Picture:  # fmt: skip
+    """The picture of a scene, so many pixels wide and high. fine: each pixel is the mean of so many squared; pen: width
+    of edges in space [pixels]."""
     w, h = width * fine, height * fine
     colours = np.empty((h, w, 3), np.uint8)
     colours[:] = DARK_GROUND if dark else GROUND
     layer, row = np.full((h, w), NOTHING, np.int8), np.full((h, w), NOTHING, np.int32)
     place = transform(scene.seen, w, h)
-    for number, painted in enumerate(scene.layers):
-        _layer(painted, number, place, colours, layer, row, fine)
+    if scene.turn is not None:
+        _in_space(scene, scene.turn, place, (colours, layer, row), fine, max(1, round(pen * fine)))
+    else:
+        for number, painted in enumerate(scene.layers):
+            _layer(painted, number, place, colours, layer, row, fine)
     if fine > 1:
         mean = np.zeros((height, width, 3), np.uint16)
         for i in range(fine):
@@ -53,6 +70,48 @@ def transform(seen: View, width: int, height: int) -> tuple[float, float, float,
     """Column = a x + b, row = c y + d of a place [m]."""
     a, c = width / seen.width, -height / seen.height
     return a, -a * seen.left, c, -c * seen.top
+
+
+def _in_space(scene: Scene, turn: np.ndarray, place: tuple, target: tuple, fine: int, pen: int) -> None:
+    """Faces by their depth: first those that nothing shines through, then the others from the far to the near."""
+    from hpcdem.post.view import space
+
+    a, b, c, d = place
+    near, face = np.full(target[1].shape, -np.inf), np.full(target[1].shape, NOTHING, np.int32)
+    every: list[np.ndarray] = []
+    outlined: list[np.ndarray] = []
+    count = 0
+    for number, painted in sorted(enumerate(scene.layers), key=lambda one: one[1].layer.opacity < 1.0):
+        points, cells, of, cut = painted.shape
+        seen = points @ turn.T
+        normals = space.normals(points, cells) @ turn.T
+        normals[normals[:, 2] < 0.0] *= -1.0
+        light = IN_SHADE + (1.0 - IN_SHADE) * np.maximum(normals @ LIGHT, 0.0)
+        light[cut] = 1.0
+        x, y, z = a * seen[:, 0] + b, c * seen[:, 1] + d, a * seen[:, 2]
+        order = np.arange(len(cells))
+        if painted.layer.opacity < 1.0:
+            order = np.argsort(space.middles(seen, cells)[:, 2], kind="stable")
+        shades = np.clip(np.rint(255.0 * painted.shades), 0, 255)
+        faces(
+            x, y, z + NEARER * (painted.kind_of_shape == FACES), np.ascontiguousarray(cells), order,
+            painted.kind.astype(np.int64)[of], painted.rows.astype(np.int64)[of], shades, light, near, face, count,
+            target, np.int8(number), float(painted.layer.opacity),
+        )  # fmt: skip
+        every.append(normals)
+        outlined.append(np.full(len(cells), painted.layer.edges))
+        count += len(cells)
+    if count:
+        edges(target[0], near, face, np.concatenate(every), np.concatenate(outlined), pen)
+    for painted in scene.layers:
+        if painted.arrows is None:
+            continue
+        at, far = (one @ turn.T for one in painted.arrows)
+        i, j = np.floor(c * at[:, 1] + d).astype(int), np.floor(a * at[:, 0] + b).astype(int)
+        there = (i >= 0) & (i < near.shape[0]) & (j >= 0) & (j < near.shape[1])
+        at, far, i, j = at[there], far[there], i[there], j[there]
+        free = a * at[:, 2] > near[i, j] - STEP
+        _arrows(at[free, :2], far[free, :2], place, fine, target)
 
 
 def _layer(painted: Painted, number: int, place: tuple, colours: np.ndarray, layer: np.ndarray, row: np.ndarray,
@@ -167,6 +226,98 @@ def _triangle(x0, y0, x1, y1, x2, y2, red, green, blue, which, colours, layer, r
                 _put(colours, layer, row, i, j, red, green, blue, opacity, number, which)
                 count += 1
     return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _facet(x, y, z, p, q, r, red, green, blue, which, tri, near, face, colours, layer, row, number, opacity):
+    """Pixels whose middles lie in a triangle of the points p, q, r, where nothing is nearer: x, y [pixels], z towards
+    the eye. One that lets light through hides nothing, and is told of a pixel only where there is nothing else."""
+    h, w = layer.shape
+    x0, y0, z0, x1, y1, z1, x2, y2, z2 = x[p], y[p], z[p], x[q], y[q], z[q], x[r], y[r], z[r]
+    low_x, high_x = min(x0, x1, x2), max(x0, x1, x2)
+    low_y, high_y = min(y0, y1, y2), max(y0, y1, y2)
+    if not (high_x > 0.0 and low_x < w and high_y > 0.0 and low_y < h):
+        return
+    area = _side(x0, y0, x1, y1, x2, y2)
+    if area == 0.0:
+        return
+    if area < 0.0:
+        x1, y1, z1, x2, y2, z2, area = x2, y2, z2, x1, y1, z1, -area
+    along = ((z1 - z0) * (y2 - y0) - (z2 - z0) * (y1 - y0)) / area
+    down = ((z2 - z0) * (x1 - x0) - (z1 - z0) * (x2 - x0)) / area
+    first, second, third = _owns(x0, y0, x1, y1), _owns(x1, y1, x2, y2), _owns(x2, y2, x0, y0)
+    for i in range(max(0, math.ceil(low_y - 0.5)), min(h - 1, math.floor(high_y - 0.5)) + 1):
+        py = i + 0.5
+        for j in range(max(0, math.ceil(low_x - 0.5)), min(w - 1, math.floor(high_x - 0.5)) + 1):
+            px = j + 0.5
+            e0, e1, e2 = (
+                _side(x0, y0, x1, y1, px, py), _side(x1, y1, x2, y2, px, py), _side(x2, y2, x0, y0, px, py)
+            )  # fmt: skip
+            if (
+                (e0 > 0.0 or (e0 == 0.0 and first))
+                and (e1 > 0.0 or (e1 == 0.0 and second))
+                and (e2 > 0.0 or (e2 == 0.0 and third))
+            ):
+                depth = z0 + along * (px - x0) + down * (py - y0)
+                if depth > near[i, j]:
+                    told = which if opacity >= 1.0 or layer[i, j] < 0 else NOTHING
+                    _put(colours, layer, row, i, j, red, green, blue, opacity, number, told)
+                    if opacity >= 1.0:
+                        near[i, j], face[i, j] = depth, tri
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def faces(x, y, z, cells, order, kind, rows, shades, light, near, face, first, target, number, opacity):
+    """Triangles and quads (m, 4) of points x, y [pixels], z towards the eye, in this order (m,); kind (m,) of shades
+    (c, 3), made darker by light (m,); rows (m,): what is told of them; near, face (h, w): depth and number, from
+    `first` on, of what each pixel shows."""
+    colours, layer, row = target
+    for n in range(len(order)):
+        k = order[n]
+        s = shades[kind[k]]
+        red, green, blue = np.uint8(light[k] * s[0]), np.uint8(light[k] * s[1]), np.uint8(light[k] * s[2])
+        tri = first + k
+        _facet(x, y, z, cells[k, 0], cells[k, 1], cells[k, 2], red, green, blue, rows[k], tri, near, face, colours,
+               layer, row, number, opacity)  # fmt: skip
+        if cells[k, 3] >= 0:
+            _facet(x, y, z, cells[k, 0], cells[k, 2], cells[k, 3], red, green, blue, rows[k], tri, near, face, colours,
+                   layer, row, number, opacity)  # fmt: skip
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def edges(colours, near, face, normals, outlined, pen):
+    """Darken pixels beside the outline of a body, a step in depth, or an edge between faces, of normals (m, 3) towards
+    the eye; lighter the outlines of faces that are `outlined` (m,)."""
+    h, w = face.shape
+    for i in range(h):
+        for j in range(w):
+            f = face[i, j]
+            dark = 0.0
+            for way in range(2):
+                m, n = (i, j + pen) if way == 0 else (i + pen, j)
+                if m >= h or n >= w:
+                    continue
+                g = face[m, n]
+                if f == g:
+                    continue
+                if f < 0 or g < 0:
+                    dark = max(dark, 0.65)
+                    continue
+                a, b = normals[f], normals[g]
+                if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < SHARP:
+                    dark = max(dark, 0.65)
+                    continue
+                rise = near[m, n] - near[i, j]
+                across, down = n - j, m - i
+                of_a = (-a[0] * across + a[1] * down) / max(a[2], 0.05)
+                of_b = (-b[0] * across + b[1] * down) / max(b[2], 0.05)
+                if min(abs(rise - of_a), abs(rise - of_b)) > STEP * pen:
+                    dark = max(dark, 0.65)
+                elif outlined[f] or outlined[g]:
+                    dark = max(dark, 0.4)
+            if dark > 0.0:
+                for c in range(3):
+                    colours[i, j, c] = np.uint8((1.0 - dark) * colours[i, j, c])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
