@@ -1,5 +1,5 @@
-"""What elements.py, tets.py, plasticity.py, joints.py and nodes.py compute, written plainly for one element, joint or
-node, in small matrices. To be read beside them; tests hold the two against each other."""
+"""What elements.py, tets.py, plasticity.py, creep_tets.py, joints.py and nodes.py compute, written plainly for one
+element, joint or node, in small matrices. To be read beside them; tests hold the two against each other."""
 
 from __future__ import annotations
 
