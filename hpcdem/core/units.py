@@ -112,7 +112,8 @@ def kind_of(name: str, unit: str) -> Kind | None:
 def doubt(where: System, name: str, unit: str, value: float) -> str:
     """What is to be said of a value of a property given in these units, "" if it is plausible.
 
-    Of the units that would make it plausible the one counts that brings it nearest to what is usual.
+    Of the units that would make it plausible that of SI counts first, then the one that brings it nearest to what is
+    usual.
     """
     kind = kind_of(name, unit)
     if kind is None or value == 0.0 or not math.isfinite(value):
@@ -121,11 +122,11 @@ def doubt(where: System, name: str, unit: str, value: float) -> str:
     if kind.low <= abs(value) * own <= kind.high:
         return ""
     said = f"{name} {value:g} {where.label(kind.unit)} is an unlikely {kind.name}"
-    fits = [(abs(math.log(abs(value) * size / kind.usual)), called, size) for called, size in kind.meant
+    fits = [(size != 1.0, abs(math.log(abs(value) * size / kind.usual)), called, size) for called, size in kind.meant
             if kind.low <= abs(value) * size <= kind.high]  # fmt: skip
     if not fits:
         low, high = kind.low / own, kind.high / own
         return f"{said}: {low:.3g} to {high:.3g} was expected; it is used as it is"
-    _, called, size = min(fits)
+    *_, called, size = min(fits)
     factor = size / own
     return f"{said}: looks like {called}; x {factor:g} makes it {value * factor:g}; it is used as it is"
