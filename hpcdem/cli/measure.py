@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hpcdem.cli import pictures
 from hpcdem.cli.common import HELP, PATH
 from hpcdem.cli.pictures import finite, positive
 
@@ -14,7 +15,8 @@ if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
     from hpcdem.runtime.progress import Log
 
-WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid")
+WHAT = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks", "fragments", "emission", "fluid",
+        "regions", "displacement")  # fmt: skip
 FORMATS = ("png", "jpg", "pdf", "svg")
 
 
@@ -112,6 +114,8 @@ def _length(name: str, metavar: str, text: str, more: str | None = None) -> Any:
               "energy when a joint broke, or by how much it grew since the joint's peak [kinetic].")  # fmt: skip
 @click.option("--joule", type=float, default=1.0, callback=positive, metavar="F", help="emission: J per unit of energy "
               "in the files, thickness of the model included [1].")  # fmt: skip
+@click.option("--box", type=pictures.Numbers(6), metavar="X,Y,Z,X,Y,Z", help="regions: elements with their middle in "
+              "this box of the mesh, m: its least x, y, z, its greatest.")  # fmt: skip
 def measure(**options: Any) -> None:
     """Measure the frames in DIR: tables (CSV) and figures of
 
@@ -126,6 +130,8 @@ def measure(**options: Any) -> None:
     fragments  of blocks: number, areas, distribution of sizes
     emission   of blocks: joints that broke as acoustic events: rate, magnitudes, b-value
     fluid      of blocks: wet length, volume, largest pressure, aperture and velocity; each channel of the last frame
+    regions    of blocks in space: volume, extent, mean stress and strain of groups and of a --box
+    displacement  of blocks in space: how far their surface has moved
     """
 
 
@@ -150,6 +156,9 @@ def request(options: dict[str, Any]) -> Any:
         colors.append(number)
     if options["last"] is not None and options["last"] < (options["first"] or 0):
         raise UsageError(f"--to {options['last']} is before --from {options['first']}")
+    box = options["box"]
+    if box is not None and not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
+        raise UsageError("--box: the least x, y and z come first, then the greatest")
     return Request(
         folder=Path(options["folder"]), what=tuple(dict.fromkeys(options["what"])), output=options["output"],
         walls=tuple(dict.fromkeys(options["walls"])), groups=tuple(options["groups"]), colors=tuple(colors),
@@ -158,5 +167,6 @@ def request(options: dict[str, Any]) -> Any:
         skin=options["skin"], increment=options["increment"], ids=tuple(options["ids"]), points=options["points"],
         number=options["number"], log=options["log"], history=options["history"], bins=options["bins"],
         completeness=options["completeness"], released=options["energy"] == "released", joule=options["joule"],
+        box=box,
         color_names={number: name for name, number in COLORS.items()},
     )  # fmt: skip

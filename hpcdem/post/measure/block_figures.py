@@ -9,7 +9,7 @@ import numpy as np
 
 from hpcdem.io.vtkhdf_mesh import MeshState
 from hpcdem.post import blocks, plots
-from hpcdem.post.measure import emission
+from hpcdem.post.measure import bodies, emission
 from hpcdem.post.measure.blocks import Emission, Part
 from hpcdem.post.measure.emission import Events
 from hpcdem.post.measure.figures import BOTTOM, GAP, INK, LEFT, LINES, RIGHT, TOP, key, label, length_unit, page, scaled
@@ -125,12 +125,13 @@ def _elements(axes: Any, state: MeshState, colour: Any = PALE, edges: Any = "fac
 def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> Any:
     """Broken joints by mode (of the events, which are finer than the frames, if there are any) and damage over time;
     below, where they are in the last frame, by mode and by time."""
+    known = [one.cracks for one in parts if one.cracks is not None]
     timed = "break_time" in state.of_joints and bool((state.of_joints["state"] == blocks.BROKEN).any())
     sheet = _Maps(state, [4.6, 3.6], [GAP, LOWER_GAP + LEGEND], 2 if timed else 1)
     a, b = sheet.panels
     at, axis = when(parts)
     if events is None or not len(events):
-        ends, counts = at, np.array([one.cracks.broken for one in parts])
+        ends, counts = at, np.array([c.broken for c in known])
     else:
         stamps = np.array([one.time if "time" in axis else one.step for one in parts], float)
         factor = float(at[-1] / stamps[-1]) if stamps[-1] else 1.0
@@ -142,9 +143,9 @@ def cracks(parts: Sequence[Part], state: MeshState, events: Events | None) -> An
     a.step(ends, counts.sum(axis=1), where="post", lw=1.0, color=INK, label="all")
     label(a, None, "broken joints")
     key(a, loc="upper left")
-    damage = np.array([one.cracks.damage for one in parts])
-    length = np.array([one.cracks.broken_length.sum() for one in parts])
-    total = np.array([one.cracks.length for one in parts])
+    damage = np.array([c.damage for c in known])
+    length = np.array([c.broken_length.sum() for c in known])
+    total = np.array([c.length for c in known])
     b.plot(at, 100.0 * damage, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[0], label="damage index")
     b.plot(at, 100.0 * length / np.where(total > 0.0, total, 1.0), "--", lw=1.0, color=INK, label="broken length")
     label(b, axis, "of all joints (%)")
@@ -200,8 +201,10 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
     """Number of fragments and share of the largest over time; distribution of sizes; the last frame."""
     from matplotlib import colormaps
 
-    sheet = _Maps(state, [3.8, 4.6], [LOWER_GAP, LOWER_GAP], 1, 0.0, 1.6)
-    a, b = sheet.panels
+    flat = state.points.shape[1] == 2
+    sheet = _Maps(state, [3.8, 4.6], [LOWER_GAP, LOWER_GAP], 1, 0.0, 1.6) if flat else None
+    figure, (a, b) = (sheet.figure, sheet.panels) if sheet is not None else page([3.8, 4.6], [LOWER_GAP], 1.6)
+    amount, body = ("area", "circle") if flat else ("volume", "sphere")
     at, axis = when(parts)
     pieces = [one.pieces for one in parts if one.pieces is not None]
     number = np.array([len(p.area) for p in pieces])
@@ -212,7 +215,7 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
     other = a.twinx()
     other.plot(at, 100.0 * share, _marks(len(at)), ms=2.5, lw=1.2, color=LINES[1])
     other.set_ylim(0.0, 105.0)
-    other.set_ylabel("area of the largest (%)", fontsize=plots.FONT, color=LINES[1])
+    other.set_ylabel(f"{amount} of the largest (%)", fontsize=plots.FONT, color=LINES[1])
     _plain(a)
     other.tick_params(labelsize=plots.FONT - 1.0, width=0.6, length=3.0, colors=LINES[1])
     a.set_xlim(*_ends(at))
@@ -228,9 +231,12 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
                label=moment)  # fmt: skip
     b.set_xscale("log")
     b.set_ylim(0.0, 105.0)
-    label(b, f"size of fragment: diameter of the circle of its area ({unit})", "area in smaller ones (%)")
+    label(b, f"size of fragment: diameter of the {body} of its {amount} ({unit})", f"{amount} in smaller ones (%)")
     key(b, loc="upper left")
     _plain(b)
+    if sheet is None:  # hpcdem draw shows bodies in space
+        _letters([a, b])
+        return figure
     ax = sheet.maps[0]
     last = pieces[-1]
     shades = np.array([*FRAGMENT_COLOURS, "#f2f0ea"], object)
@@ -241,6 +247,61 @@ def fragments(parts: Sequence[Part], state: MeshState) -> Any:
     blocks.lines(ax, state.points[state.joints[broken]], INK, 0.5 * blocks.line_width(state, sheet.scale))
     _letters([a, b, ax])
     return sheet.figure
+
+
+# --- bodies in space -----------------------------------------------------------------------------------------------
+
+
+def regions(parts: Sequence[Part]) -> Any:
+    """Mean stress of every region over time; components of stress and of strain of the last of them."""
+    figure, axes = page([4.2, 4.6, 4.6], [GAP, GAP])
+    at, axis = when(parts)
+    series: dict[tuple[str, str], list[tuple[float, bodies.Region]]] = {}
+    for time, one in zip(at.tolist(), parts, strict=True):
+        for region in one.regions or ():
+            series.setdefault((region.set_name, region.name), []).append((time, region))
+    largest = max(float(np.abs(r.stress).max()) for many in series.values() for _, r in many)
+    size, unit = scaled(largest, "Pa")
+    for k, ((_, name), many) in enumerate(series.items()):
+        axes[0].plot([t for t, _ in many], [r.stress[:3].mean() / size for _, r in many], _marks(len(many)), ms=2.5,
+                     lw=1.2, color=LINES[k % len(LINES)], label=name)  # fmt: skip
+    name, many = next((name, many) for (_, name), many in reversed(series.items()))
+    time = [t for t, _ in many]
+    for k, c in enumerate(bodies.COMPONENTS):
+        look = {"lw": 1.2, "ls": "-" if k < 3 else "--", "color": LINES[k % 3]}
+        axes[1].plot(time, [r.stress[k] / size for _, r in many], label=c, **look)
+        axes[2].plot(time, [1e3 * r.strain[k] for _, r in many], label=c, **look)
+    label(axes[0], None, f"mean stress ({unit})")
+    label(axes[1], None, f"stress, {name} ({unit})")
+    label(axes[2], axis, f"strain, {name} (‰)")
+    for ax in axes:
+        _plain(ax)
+        ax.set_xlim(*_ends(at))
+        key(ax, 3)
+    _letters(axes)
+    return figure
+
+
+def displacement(parts: Sequence[Part]) -> Any:
+    """The largest displacement of the surface, and the least and the greatest of each component, over time."""
+    figure, axes = page([4.6, 5.2], [GAP])
+    at, axis = when(parts)
+    kept = [k for k, one in enumerate(parts) if one.surface is not None and len(one.surface.node)]
+    at, some = at[kept], [surface for k in kept if (surface := parts[k].surface) is not None]
+    size, unit = length_unit(max(float(s.length.max()) for s in some))
+    axes[0].plot(at, [s.length.max() / size for s in some], _marks(len(at)), ms=2.5, lw=1.2, color=INK)
+    for k, c in enumerate("xyz"):
+        for end, ls in ((np.min, "--"), (np.max, "-")):
+            axes[1].plot(at, [end(s.moved[:, k]) / size for s in some], ls=ls, lw=1.2, color=LINES[k],
+                         label=f"{'least' if end is np.min else 'greatest'} $u_{c}$")  # fmt: skip
+    label(axes[0], None, f"largest ({unit})")
+    label(axes[1], axis, f"displacement ({unit})")
+    key(axes[1], 3)
+    for ax in axes:
+        _plain(ax)
+        ax.set_xlim(*_ends(at))
+    _letters(axes)
+    return figure
 
 
 # --- fluid -------------------------------------------------------------------------------------------------------

@@ -22,10 +22,12 @@ from hpcdem.io.frames import FrameFile, list_mesh_frames
 from hpcdem.io.vtkhdf_mesh import MeshState, read_mesh_frame
 from hpcdem.post.blocks import BROKEN, FREE, YIELDED
 from hpcdem.post.fluid import WET
-from hpcdem.post.measure import emission
+from hpcdem.post.measure import bodies, emission
+from hpcdem.post.measure.bodies import Region, Surface
 from hpcdem.post.measure.emission import BIN, MODES, Curve, Events, Fit
 from hpcdem.post.measure.kinds import NAN, Sheet
 from hpcdem.post.measure.scene import Request
+from hpcdem.post.view.moment import neighbours
 
 INTACT = 1.0
 SHARES = 0.2, 0.5, 0.8
@@ -36,17 +38,18 @@ HEAD = ("step", "time[s]")
 @dataclass(frozen=True)
 class Pieces:
     """Fragments of a frame, the largest first: fragment of each element that is asked for (n,), -1: not asked for;
-    area [m2], elements in it, x, y: of its middle [m] (m,) each."""
+    area [m2], in space volume [m3], elements in it (m,) each; at (m, dim): their middles [m]."""
 
     of: np.ndarray
     area: np.ndarray
     elements: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    at: np.ndarray
 
     @property
     def size(self) -> np.ndarray:
-        """(m,) diameters of circles of these areas [m]."""
+        """(m,) diameters of circles of these areas, or of spheres of these volumes [m]."""
+        if self.at.shape[1] == 3:
+            return np.cbrt(6.0 * self.area / math.pi)
         return np.sqrt(4.0 * self.area / math.pi)
 
     def passing(self) -> tuple[np.ndarray, np.ndarray]:
@@ -94,13 +97,15 @@ class Fluid:
 
 @dataclass(frozen=True)
 class Part:
-    """What is taken from a frame."""
+    """What is taken from a frame: joints in the plane, regions and surface in space."""
 
     step: int
     time: float
-    cracks: Cracks
+    cracks: Cracks | None
     pieces: Pieces | None
     fluid: Fluid | None
+    regions: list[Region] | None = None
+    surface: Surface | None = None
 
 
 def frames(request: Request) -> list[FrameFile]:
@@ -111,15 +116,24 @@ def frames(request: Request) -> list[FrameFile]:
 
 def read(file: FrameFile, request: Request) -> MeshState:
     """A frame, moved as asked for."""
-    state = read_mesh_frame(file.path)
-    state.points = state.points + np.array([request.xmove, request.ymove])
+    state = read_mesh_frame(file.path, solid=True)
+    state.points = state.points + np.array([request.xmove, request.ymove, 0.0])[: state.points.shape[1]]
     return state
+
+
+def dim_of(file: FrameFile) -> int:
+    """Dimensions of space of a frame."""
+    return read_mesh_frame(file.path, lazily=True, solid=True).points.shape[1]
 
 
 def part(state: MeshState, request: Request, what: Sequence[str]) -> Part:
     """Joints, and fragments if they are asked for, of a frame."""
     wanted = chosen(state, request)
     pieces = fragments(state, wanted) if "fragments" in what else None
+    if state.points.shape[1] == 3:
+        found = bodies.regions(state, request, wanted) if "regions" in what else None
+        moved = bodies.surface(state, wanted) if "displacement" in what else None
+        return Part(state.step, state.time, None, pieces, None, found, moved)
     fluid = fluid_of(state, wanted) if "fluid" in what else None
     return Part(state.step, state.time, cracks(state, wanted), pieces, fluid)
 
@@ -232,15 +246,20 @@ def fragments(state: MeshState, wanted: np.ndarray) -> Pieces:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    first, second, face = _pairs(state)
-    holds = (state.of_joints["state"] == INTACT) | (state.of_joints["state"] == YIELDED)
-    gone = state.of_joints["number"][~holds].astype(np.int64)
-    tied = ~np.isin(face, gone) & wanted[first] & wanted[second]
+    if state.points.shape[1] == 3:
+        beside = neighbours(state)
+        face = np.flatnonzero(beside > np.arange(len(beside)))
+        first, second = face // 4, beside[face] // 4
+        tied, area = wanted[first] & wanted[second], state.of_elements["volume"]
+    else:
+        first, second, face = _pairs(state)
+        holds = (state.of_joints["state"] == INTACT) | (state.of_joints["state"] == YIELDED)
+        gone = state.of_joints["number"][~holds].astype(np.int64)
+        tied, area = ~np.isin(face, gone) & wanted[first] & wanted[second], state.of_elements["area"]
     n = len(state.cells)
     graph = coo_matrix((np.ones(int(tied.sum())), (first[tied], second[tied])), (n, n))
     _, label = connected_components(graph, directed=False)
     rows = np.flatnonzero(wanted)
-    area = state.of_elements["area"]
     _, of = np.unique(label[rows], return_inverse=True)
     of = of.reshape(-1)
     areas, count = np.bincount(of, area[rows]), np.bincount(of)
@@ -251,14 +270,14 @@ def fragments(state: MeshState, wanted: np.ndarray) -> Pieces:
     place[order] = np.arange(len(order))
     of = place[of]
     middle = _middles(state)[rows]
-    x, y = (np.bincount(of, area[rows] * middle[:, c]) / areas[order] for c in range(2))
+    at = np.column_stack([np.bincount(of, area[rows] * along) / areas[order] for along in middle.T])
     whole = np.full(n, -1)
     whole[rows] = of
-    return Pieces(whole, areas[order], count[order], x, y)
+    return Pieces(whole, areas[order], count[order], at)
 
 
 def _middles(state: MeshState) -> np.ndarray:
-    """(ne, 2) means of the corners."""
+    """(ne, dim) means of the corners."""
     real = state.cells >= 0
     corners = np.where(real[:, :, None], state.points[state.cells], 0.0)
     return corners.sum(axis=1) / real.sum(axis=1)[:, None]
@@ -276,6 +295,7 @@ def cracks_sheets(parts: Sequence[Part]) -> list[Sheet]:
     def rows() -> Iterable[Sequence[Any]]:
         for one in parts:
             c = one.cracks
+            assert c is not None
             broken = float(c.broken_length.sum())
             yield (
                 one.step, one.time, c.joints, c.yielded, *c.broken.tolist(), int(c.broken.sum()), c.length,
@@ -287,8 +307,11 @@ def cracks_sheets(parts: Sequence[Part]) -> list[Sheet]:
 
 
 def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
+    last = parts[-1].pieces
+    assert last is not None
+    amount = "area[m2]" if last.at.shape[1] == 2 else "volume[m3]"
     head = (
-        *HEAD, "fragments", "single_elements", "area[m2]", "largest_share",
+        *HEAD, "fragments", "single_elements", amount, "largest_share",
         *(f"size_{100 * share:.0f}[m]" for share in SHARES),
     )  # fmt: skip
 
@@ -302,12 +325,17 @@ def fragments_sheets(parts: Sequence[Part]) -> list[Sheet]:
                 *p.characteristic(),
             )  # fmt: skip
 
-    last = parts[-1].pieces
-    assert last is not None
     passing = last.passing()[1][::-1]
-    columns = (last.elements, last.area, last.size, passing, last.x, last.y)
+    columns = (last.elements, last.area, last.size, passing, *last.at.T)
     each = ((k, *row) for k, row in enumerate(zip(*(c.tolist() for c in columns), strict=True), 1))
-    names = ("fragment", "elements", "area[m2]", "size[m]", "passing", "x[m]", "y[m]")
+    names = (
+        "fragment",
+        "elements",
+        amount,
+        "size[m]",
+        "passing",
+        *(f"{axis}[m]" for axis in "xyz"[: last.at.shape[1]]),
+    )
     return [Sheet("fragments", head, rows()), Sheet("fragments_last", names, each)]
 
 

@@ -17,11 +17,11 @@ from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.frames import FrameFile, left_out, list_frames
 from hpcdem.post import fluid
-from hpcdem.post.measure import block_figures, blocks, cracks, emission, figures, kinds
+from hpcdem.post.measure import block_figures, blocks, bodies, cracks, emission, figures, kinds
 from hpcdem.post.measure import walls as curves
 from hpcdem.post.measure.grains import Grains
 from hpcdem.post.measure.kinds import Done, Sheet
-from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, Plan, Request, Scene, look, make_plan
+from hpcdem.post.measure.scene import BLOCK_KINDS, KINDS, SOLID_KINDS, Plan, Request, Scene, look, make_plan
 
 _T = TypeVar("_T")
 
@@ -164,12 +164,29 @@ def _of_blocks(request: Request) -> list[str]:
     """What can be measured of blocks in the folder, of what is asked for. Raises HpcdemError where a word asks for
     blocks, and there are none."""
     frames = blocks.frames(request)
+    solid = bool(frames) and blocks.dim_of(frames[-1]) == 3
+    if request.box is not None and not solid:
+        raise UsageError("--box: only frames of blocks in three dimensions are measured in a box")
+    if frames:
+        others = {*BLOCK_KINDS, *SOLID_KINDS} - {*(SOLID_KINDS if solid else BLOCK_KINDS)} - {*KINDS}
+        others |= {"cracks"} if solid and not list_frames(request.folder) else set()
+        for kind in request.what:
+            if kind in others:
+                raise HpcdemError(f"{kind} is for {'two' if solid else 'three'} dimensions; {frames[-1].path.name} has "
+                                  f"{'three' if solid else 'two'}")  # fmt: skip
+    if solid:
+        if request.colors and not list_frames(request.folder):
+            raise UsageError("--colors: blocks have groups, no colours")
+        if request.box is not None and request.what and "regions" not in request.what:
+            raise UsageError("--box goes with regions")
+        return [kind for kind in SOLID_KINDS if kind in request.what or not request.what]
     there = dict.fromkeys(("cracks", "fragments", "fluid"), bool(frames))
+    there |= dict.fromkeys(("regions", "displacement"), False)
     if frames and "fluid" not in request.what:
         there["fluid"] = fluid.there(blocks.read(frames[-1], request))
     there["emission"] = bool(frames) or (request.folder / emission.TABLE).is_file()
     for kind in request.what:
-        if kind in BLOCK_KINDS and kind not in KINDS and not there[kind]:
+        if kind in (*BLOCK_KINDS, *SOLID_KINDS) and kind not in KINDS and not there[kind]:
             raise HpcdemError(f"{kind}: {request.folder} holds no frames of blocks of these steps")
     if any(there.values()) and request.colors and not list_frames(request.folder):
         raise UsageError("--colors: blocks have groups, no colours")
@@ -188,7 +205,7 @@ def _blocks(comm: Any, log: Any, request: Request, what: Sequence[str]) -> list[
         others = on_first(comm, lambda: "" if list_frames(request.folder) else left_out(request.folder))
         if others:
             log.warn(others)
-    n = len(files) if {"cracks", "fragments", "fluid"} & set(what) else 0
+    n = len(files) if {"cracks", "fluid", *SOLID_KINDS} & set(what) else 0
     mine, error = [], None
     try:
         for file in files[n * comm.rank // comm.size : n * (comm.rank + 1) // comm.size]:
@@ -218,6 +235,16 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
         found = blocks.emitted(request, files)
         sheets = blocks.emission_sheets(found)
         draw = lambda: block_figures.emitted(found)  # noqa: E731
+    elif kind == "regions":
+        if not any(part.regions for part in parts):
+            raise _NothingThere(f"regions: {request.folder} has no elements that are asked for")
+        sheets = bodies.regions_sheets(parts)
+        draw = lambda: block_figures.regions(parts)  # noqa: E731
+    elif kind == "displacement":
+        if not any(part.surface is not None and len(part.surface.node) for part in parts):
+            raise _NothingThere(f"displacement: {request.folder} has no elements that are asked for")
+        sheets = bodies.displacement_sheets(parts)
+        draw = lambda: block_figures.displacement(parts)  # noqa: E731
     elif kind == "fluid":
         if not any(part.fluid is not None and part.fluid.channels for part in parts):
             raise _NothingThere(f"fluid: the blocks in {request.folder} have no channels")
@@ -225,7 +252,8 @@ def _write_blocks(kind: str, request: Request, files: list[FrameFile], parts: li
         sheets = blocks.fluid_sheets(parts, last, blocks.chosen(last, request))
         draw = lambda: block_figures.fluid(parts, last)  # noqa: E731
     else:
-        if kind == "cracks" and not parts[-1].cracks.joints:
+        of_last = parts[-1].cracks
+        if kind == "cracks" and (of_last is None or not of_last.joints):
             raise _NothingThere(f"cracks: the blocks in {request.folder} have no joints")
         sheets = blocks.cracks_sheets(parts) if kind == "cracks" else blocks.fragments_sheets(parts)
         draw = lambda: _draw_blocks(kind, request, files, parts)  # noqa: E731

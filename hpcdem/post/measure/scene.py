@@ -28,6 +28,8 @@ KINDS = ("surface", "wedge", "faults", "wallforce", "tracks", "layers", "cracks"
 """What can be measured of particles, by its word on the command line."""
 BLOCK_KINDS = ("cracks", "fragments", "emission", "fluid")
 """What can be measured of blocks."""
+SOLID_KINDS = ("regions", "displacement", "fragments")
+"""What can be measured of blocks in space."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ class Request:
     formats: of figures; strain, length, skin: threshold, shortest band and height above the base for faults; increment:
     strain from frame to frame even if there are sections; ids, points, number: particles to follow; log: of the run.
     history: name of that which is drawn with the emission, none: none; bins: of its rate; completeness: magnitude Mc;
-    released: energies since the peak of the joints; joule: J per unit of energy in the files.
+    released: energies since the peak of the joints; joule: J per unit of energy in the files; box: its least
+    x, y, z, then its greatest [m].
     """
 
     folder: Path
@@ -68,6 +71,7 @@ class Request:
     completeness: float | None = None
     released: bool = False
     joule: float = 1.0
+    box: tuple[float, ...] | None = None
     color_names: dict[int, str] = field(default_factory=dict)
 
     @property

@@ -278,7 +278,7 @@ def of_blocks(state: MeshState) -> Moment:
     fields |= {name: partial(mean, name) for name in flat}
     fields |= {name: partial(make, state.of_elements) for name, make in _of_stress(state.of_elements, dim).items()}
     vectors = {name: partial(mean, name) for name in of_corners if name in VECTORS}
-    beside = Columns({"partner": lambda: _partners(state)})
+    beside = Columns({"partner": lambda: neighbours(state)})
     objects = {
         "elements": Objects(
             SOLIDS if dim == 3 else POLYGONS, len(cells),
@@ -334,7 +334,7 @@ def _of_stress(
     return found
 
 
-def _partners(state: MeshState) -> np.ndarray:
+def neighbours(state: MeshState) -> np.ndarray:
     """(4 n,) the face of a tetrahedron on which each of their faces lies, -1: none, or one across a crack."""
     from hpcdem.physics.fdem import tetrahedra
     from hpcdem.post.blocks import BROKEN, FREE
