@@ -183,7 +183,8 @@ def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], flo
 def unit_of(sim: Simulation, what: str) -> str:
     """The unit of what a HIST follows, as declared."""
     name = what.split()[0]
-    return label(sim.settings.units, OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0])
+    unit = OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0]
+    return label(sim.settings.units, unit)
 
 
 def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Declared units: values that are unlikely in them are warned of, what is written has their names, nothing is changed."""
+"""Declared units: values that are unlikely in them are warned of, what is written has their names, nothing changes."""
 
 from __future__ import annotations
 

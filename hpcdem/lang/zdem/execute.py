@@ -191,9 +191,9 @@ def look_at_units(sim: Any, command: str, given: Mapping[str, Any]) -> None:
     """Warn of arguments of a command of the table that are unlikely in the units declared."""
     row = ZDEM.command(command.lower())
     settings = getattr(sim, "settings", None)
-    if row is not None and getattr(settings, "units", ""):
+    if row is not None and settings is not None and settings.units:
         of = {option.key: option.unit for option in (*row.leading, *row.options) if option.unit}
-        units.look(sim.settings.units, sim.log, ((name, of[name], given[name]) for name in of if name in given))
+        units.look(settings.units, sim.log, ((name, of[name], given[name]) for name in of if name in given))
 
 
 def check_same_beginning(script: Script, saved_text: str, position: int) -> None:
