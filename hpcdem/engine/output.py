@@ -273,9 +273,10 @@ def tell_energy(sim: Simulation) -> None:
         if name != "work_blocks" or seen.work_blocks
     ]
     rows += [(name, f"{value:.6g}") for name, value in of_physics.items()]
-    sim.log.table("energy budget", ("energy", label(sim.settings.units, "J")), rows)
+    joule = label(sim.settings.units, "J")
+    sim.log.table("energy budget", ("energy", joule), rows)
     sim.log.info(
-        f"energy: closing error {seen.closing:.4g} {label(sim.settings.units, 'J')}, {seen.relative:.2g} of the largest flow "
+        f"energy: closing error {seen.closing:.4g} {joule}, {seen.relative:.2g} of the largest flow "
         "(docs/physics.md says which terms close to rounding and which with the time step)"
     )
 
