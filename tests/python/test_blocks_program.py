@@ -52,6 +52,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model time-step value 1e-7 auto off", "sim.time_step(value=1e-7, auto=False)"),
     ("pcdc model creep on dt 10 change 0.1 least 1 greatest 100",
      "sim.creep(True, dt=10, change=0.1, least=1, greatest=100)"),
+    ("pcdc model units mm-MPa-s", "sim.units('mm-MPa-s')"),
     ("pcdc model rayleigh 0.05 frequency 12 part stiffness",
      "sim.rayleigh(0.05, frequency=12, part='stiffness')"),
     ("pcdc model creep off", "sim.creep(False)"),

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
     BOOL,
@@ -602,6 +603,10 @@ _MODEL = (
             ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH),
     Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
             (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH),
+    Command("mod{el} units", "The units of all values that follow: those that are unlikely in them are warned of, once "
+            "per property and with the factor that looks missing; histories and charts are labelled with them. No "
+            "value is changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
+            (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH),
     Command("mod{el} opt{ion}", "Switches of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(

@@ -299,7 +299,7 @@ def of_blocks(state: MeshState) -> Moment:
         objects["joints"] = Objects(FACES, count, lambda: (state.points, _faces(state)), of_joints(slice(None), rest))
     elif count:
         objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(slice(None), rest))
-    if "aperture" in wet and fluid.there(state):
+    if "aperture" in wet and dim == 2 and fluid.there(state):
         rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
         both = [*wet, *(name for name in ("number", "length") if name in rest)]
         objects["channels"] = Objects(
