@@ -18,7 +18,7 @@ from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
-from hpcdem.physics.fdem.properties import COHESIVE, KELVIN_STRAIN, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
+from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 
@@ -73,16 +73,26 @@ QUANTITIES: dict[str, Quantity] = {
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
     "plastic_state": Quantity(
-        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8"
+        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8", dims=BOTH
     ),
     "plastic_shear_strain": Quantity(
-        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator"
+        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator", dims=BOTH
     ),
-    "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain"),
-    "plastic_work": Quantity("element", "J/m", "work of plastic flow"),
-    **{f"creep_strain_{c}": Quantity("element", "1", f"creep strain {c}, without volume") for c in ("xx", "yy", "xy")},
-    **{f"kelvin_strain_{c}": Quantity("element", "1", f"strain {c} of the Kelvin unit") for c in ("xx", "yy", "xy")},
-    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep"),
+    "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain", dims=BOTH),
+    "plastic_work": Quantity("element", "J/m", "work of plastic flow", dims=BOTH),
+    **{
+        f"creep_strain_{c}": Quantity(
+            "element", "1", f"creep strain {c}, without volume", dims=BOTH if c in ("xx", "yy", "xy") else (3,)
+        )
+        for c in COMPONENTS[3]
+    },
+    **{
+        f"kelvin_strain_{c}": Quantity(
+            "element", "1", f"strain {c} of the Kelvin unit", dims=BOTH if c in ("xx", "yy", "xy") else (3,)
+        )
+        for c in COMPONENTS[3]
+    },
+    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep", dims=BOTH),
     **_vector("position", "node", "m", "position"),
     **_vector("displacement", "node", "m", "displacement"),
     **_vector("velocity", "node", "m/s", "velocity"),
@@ -125,7 +135,7 @@ PROPERTIES = {
         _STRENGTH.get(p.name, p.name): p.name
         for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)
         for p in m.properties
-        if p.name not in KELVIN_STRAIN and not p.internal  # that strain at a time is a quantity
+        if not p.name.startswith("kelvin_strain") and not p.internal  # that strain at a time is a quantity
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }
@@ -135,7 +145,7 @@ for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURG
         _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(
             _on, _model.property(_name).unit, _model.property(_name).doc, False,
-            BOTH if _on == "element" and MECH_ISO_ELASTIC.has(_name) else (2,),
+            BOTH if _on == "element" else (2,),
         )  # fmt: skip
 
 _MEANS = ("opening", "slip", "normal_stress", "shear_stress")
@@ -295,10 +305,11 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
 
 def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
     """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
-    strains, lost = np.zeros((sim.n_own, 6)), np.zeros(sim.n_own)
+    components = COMPONENTS[3] if sim.dim == 3 else ("xx", "yy", "xy")
+    strains, lost = np.zeros((sim.n_own, 2 * len(components))), np.zeros(sim.n_own)
     if "creep" in sim.cold:
         strains, lost = sim.local.creep_strains(), sim.local.lost_by_creep()
-    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy")]
+    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in components]
     return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 
 
