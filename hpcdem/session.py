@@ -280,6 +280,20 @@ def _plastic_tangent() -> WarmUp:
     return warm_up.plastic_tangent, (plastic_stiffness,)
 
 
+def _yielding_space() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import plastic_tets
+
+    return warm_up.yielding_in_space, (plastic_tets,)
+
+
+def _creep_space() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import creep_tets
+
+    return warm_up.creeping_in_space, (creep_tets,)
+
+
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
     from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
@@ -308,12 +322,16 @@ KINDS = {
     "tangent": Kernels(_tangent),
     "plastic-tangent": Kernels(_plastic_tangent, after=("yielding", "tangent")),
     "space": Kernels(_space),
+    "yielding-space": Kernels(_yielding_space, after=("space",)),
+    "creep-space": Kernels(_creep_space, after=("space",)),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_BLOCKS = ("bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-             "pictures")  # fmt: skip
+OF_BLOCKS = (
+    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
+    "yielding-space", "creep-space", "pictures",
+)  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 
 

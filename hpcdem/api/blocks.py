@@ -18,7 +18,7 @@ from hpcdem.api.arguments import Where, arguments, chosen_by, model_arguments
 from hpcdem.api.program import HELP, carried_out, place
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError
-from hpcdem.lang.pcdc.bindings import BINDINGS, Call
+from hpcdem.lang.pcdc.bindings import Call, carry_out
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.physics.fdem import groups as g
@@ -85,7 +85,7 @@ class Orders:
         project.line = place()[1]
         call = Call(project, found, None, lambda names, file: None)
         call.where = chosen
-        BINDINGS[command](call)
+        carry_out(row, call)
 
 
 class Words:
@@ -999,6 +999,11 @@ class BlockCommands:
     def gravity(self, gravity: Point) -> None:
         """Gravity of the blocks from now on [m/s2]; that of particles is ``set(gravity=...)``."""
         self._blocks("model gravity", {"gravity": gravity})
+
+    def units(self, system: str) -> None:
+        """Units of what is given of blocks from now on, "SI", "mm-MPa-s" or "km-MPa-s": unlikely values are warned of,
+        histories and charts labelled; no value changes. Those of particles are ``set(units=...)``."""
+        self._blocks("model units", {"system": system})
 
     def option(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageErro
 from hpcdem.core.fields import FIELDS, FIX_BITS
 from hpcdem.core.selection import Selection
 from hpcdem.io import checkpoint
-from hpcdem.lang.zdem.execute import Interpreter, find, tell_warnings
+from hpcdem.lang.zdem.execute import Interpreter, find, look_at_units, tell_warnings
 from hpcdem.lang.zdem.parser import parse_text
 from hpcdem.lang.zdem.table import COLORS
 from hpcdem.physics.dem.materials import MATERIAL
@@ -40,11 +41,18 @@ Method = TypeVar("Method", bound=Callable[..., Any])
 OF_BOTH = {"start", "save", "restore", "resume", "finish", "cycle", "imple", "energy"}
 """Methods that may find blocks alone. The others make the particles first: kernels must be settled before modules that
 have some are imported, and these import them when they are named."""
+LOOKED_AT = {
+    "box": "BOX", "wall": "WALL", "ball": "BALL", "gen": "GEN", "gen_grid": "GEN", "gline": "GLINE", "prop": "PROP",
+    "bond": "PROP", "set": "SET",
+}  # fmt: skip
+"""Methods whose values are held against declared units, and the commands whose units they have."""
 
 
 def _command(method: Method, edits: bool = True) -> Method:
     """Errors of a command leave with file and line of the program; values of a wrong kind too. edits: it may change the
     particles."""
+
+    signature = inspect.signature(method)
 
     @functools.wraps(method)
     def call(self: Simulation, *values: Any, **options: Any) -> Any:
@@ -55,7 +63,11 @@ def _command(method: Method, edits: bool = True) -> Method:
         def carry_out() -> Any:
             if method.__name__ not in OF_BOTH:
                 _ = self.engine
-            return method(self, *values, **options)
+            value = method(self, *values, **options)
+            if self._engine is not None and self._engine.settings.units and method.__name__ in LOOKED_AT:
+                given = signature.bind(self, *values, **options).arguments
+                look_at_units(self._engine, LOOKED_AT[method.__name__], given.get("options", given))
+            return value
 
         def done() -> Any:
             value = carried_out(place, method.__name__, carry_out)
@@ -387,8 +399,8 @@ class Simulation(BlockCommands):
 
     @_command
     def set(self, **options: Any) -> None:
-        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, outdir,
-        and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
+        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, units,
+        outdir, and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
         for name, value in options.items():
             if name == "outdir":
                 self._write_into(value)

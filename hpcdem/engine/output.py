@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.core.units import label
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.behind import under_way as _under_way
 from hpcdem.io.columns import append_rows
@@ -180,9 +181,10 @@ def followed(sim: Simulation) -> dict[str, tuple[str, Callable[[Simulation], flo
 
 
 def unit_of(sim: Simulation, what: str) -> str:
-    """The unit of what a HIST follows."""
+    """The unit of what a HIST follows, as declared."""
     name = what.split()[0]
-    return OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0]
+    unit = OF_PARTS[name].unit if name in OF_PARTS else followed(sim)[what][0]
+    return label(sim.settings.units, unit)
 
 
 def write_history(sim: Simulation, ident: int, _: Snapshot | None = None) -> None:
@@ -271,9 +273,10 @@ def tell_energy(sim: Simulation) -> None:
         if name != "work_blocks" or seen.work_blocks
     ]
     rows += [(name, f"{value:.6g}") for name, value in of_physics.items()]
-    sim.log.table("energy budget", ("energy", "J"), rows)
+    joule = label(sim.settings.units, "J")
+    sim.log.table("energy budget", ("energy", joule), rows)
     sim.log.info(
-        f"energy: closing error {seen.closing:.4g} J, {seen.relative:.2g} of the largest flow "
+        f"energy: closing error {seen.closing:.4g} {joule}, {seen.relative:.2g} of the largest flow "
         "(docs/physics.md says which terms close to rounding and which with the time step)"
     )
 

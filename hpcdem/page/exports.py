@@ -17,7 +17,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frames import FrameFile
 from hpcdem.post import movie
 from hpcdem.post.view.model import ModelView
-from hpcdem.post.view.moment import DISCS, POLYGONS, Moment, read_moment
+from hpcdem.post.view.moment import DISCS, FACES, POLYGONS, SOLIDS, Moment, read_moment
 from hpcdem.post.view.paper import Paper, draw
 from hpcdem.post.view.scene import Painted, common_spans, scene, seen_of
 
@@ -57,13 +57,14 @@ def table(moment: Moment, view: ModelView, label: Any) -> bytes:
         raise HpcdemError("no layer is chosen")
     shown = scene(moment, view.changed(layers=[layer.model_dump() | {"visible": True}])).layers[0]
     objects = moment.of(layer.object)
-    names = [name for name in objects.known() if name in objects.fields and name not in ("x", "y")]
+    axes = "xyz"[: objects.dim]
+    names = [name for name in objects.known() if name in objects.fields and name not in tuple(axes)]
     columns = [np.asarray(objects.fields[name])[shown.rows] for name in names]
     middle = objects.centres()[shown.rows]
-    titles = ["x", "y", *names]
-    columns = [middle[:, 0], middle[:, 1], *columns]
+    titles = [*axes, *names]
+    columns = [*middle.T, *columns]
     for name, values in objects.vectors.items():
-        titles += [f"{name}_x", f"{name}_y"]
+        titles += [f"{name}_{axis}" for axis in axes]
         columns += list(np.asarray(values)[shown.rows].T)
     text = io.StringIO()
     text.write(",".join(titles) + "\n")
@@ -90,6 +91,11 @@ def drawing(moment: Moment, view: ModelView) -> bytes:
 
 def _dxf_layer(out: Any, painted: Painted, near: np.ndarray) -> None:
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in painted.layer.label).upper() or "LAYER"
+    if painted.kind_of_shape in (SOLIDS, FACES):  # what is seen, where it is in space
+        points, cells, of, _ = painted.shape
+        for corners, kind in zip(cells, painted.kind[of]):
+            out.add_3dface(points[corners[corners >= 0]], layer=name, color=int(near[kind]))
+        return
     for k, kind in enumerate(painted.kind):
         look = {"layer": name, "color": int(near[kind])}
         if painted.kind_of_shape == DISCS:

@@ -52,7 +52,7 @@ class Sources:
         self._see_one()
 
     def _see_one(self) -> None:
-        """HpcdemError if there are frames, and none of their first ones can be shown, as those in three dimensions."""
+        """HpcdemError if there are frames, and none of their first ones can be shown."""
         said: HpcdemError | None = None
         for source in self.found:
             try:
@@ -101,7 +101,7 @@ class Sources:
         key = str(file.path), status.st_mtime_ns, status.st_size
         with self.lock:
             if key not in self.moments:
-                self.moments[key] = _in_plane(read_moment(file.path), file.path)
+                self.moments[key] = read_moment(file.path)
                 while len(self.moments) > MOMENTS or (len(self.moments) > 1 and self._objects() > OBJECTS):
                     self.moments.popitem(last=False)
             self.moments.move_to_end(key)
@@ -169,13 +169,6 @@ class Sources:
         except OSError as problem:
             raise HpcdemError(f"process {holder['pid']} cannot be reached: {problem.strerror}") from None
         return f"process {holder['pid']}: {SIGNALS[what].name}"
-
-
-def _in_plane(moment: Moment, path: Path) -> Moment:
-    """HpcdemError for a frame in three dimensions."""
-    if moment.dim == 3:
-        raise HpcdemError(f"{path} is a frame in three dimensions: this is for two")
-    return moment
 
 
 def _run(folder: Path) -> dict[str, Any] | None:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.looks import COLOURS, EYES, OBJECTS
 from hpcdem.page import exports
 from hpcdem.page.lifetime import live, static
 from hpcdem.page.maker import packed
@@ -26,7 +26,17 @@ from hpcdem.page.server import Answer, Call, PageServer, as_json
 from hpcdem.page.sources import Sources
 from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
 from hpcdem.post.view.moment import Moment, unit_of
-from hpcdem.post.view.scene import Painted, Scene, default_view, painted, seen_of, shades_of, shift_of
+from hpcdem.post.view.scene import (
+    Painted,
+    Scene,
+    default_view,
+    painted,
+    plane_of,
+    seen_of,
+    shades_of,
+    shift_of,
+    turn_of,
+)
 
 KINDS = {
     "viewer.html": "text/html; charset=utf-8",
@@ -42,6 +52,8 @@ LARGEST = 4096
 """Pixels along a side of a picture."""
 KEPT = 24
 """Layers that are kept put together."""
+MOVED = ("elements", "joints")
+"""What is drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
 """A picture at rest is the mean of so many squared pixels for each."""
 
@@ -94,7 +106,8 @@ class Viewer:
     # ---- what there is ---------------------------------------------------------------------------------------------
 
     def about(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """Objects of a frame, the view to begin with, colours, and the part of the plane that holds everything."""
+        """Objects of a frame, the view to begin with, colours, and the part of the plane that holds everything; in
+        space the corners of the box that does."""
         moment = self._moment(wanted)[1]
         view = default_view(moment) if self.first is None else self.first
         left, right, bottom, top = (lambda seen: (seen.left, seen.right, seen.bottom, seen.top))(
@@ -104,7 +117,7 @@ class Viewer:
             "step": moment.step, "time": moment.time, "view": view.model_dump(), "whole": [left, right, bottom, top],
             "objects": {name: objects.count for name, objects in moment.objects.items()},
             "order": list(OBJECTS), "displaced": moment.displacement is not None,
-            "colours": {name: _stops(name) for name in COLOURS},
+            "colours": {name: _stops(name) for name in COLOURS}, "box": _box(moment), "eyes": EYES,
         }  # fmt: skip
 
     def fields(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -113,7 +126,9 @@ class Viewer:
         objects = moment.of(str(wanted.get("object")))
         waiting = objects.waiting()
         return {
-            "fields": [[name, unit_of(name)] for name in objects.fields if name in waiting or objects.filled(name)],
+            "fields": [
+                [name, unit_of(name, moment.dim)] for name in objects.fields if name in waiting or objects.filled(name)
+            ],
             "vectors": list(objects.vectors),
         }
 
@@ -164,15 +179,14 @@ class Viewer:
             if names:
                 told: Any = names[int(value)] if 0 <= int(value) < len(names) else None
             elif np.ndim(value):
-                told = f"({value[0]:.6g}, {value[1]:.6g})"
+                told = f"({', '.join(f'{part:.6g}' for part in value)})"
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
-            values.append([name, told, unit_of(name)])
+            values.append([name, told, unit_of(name, shown.moment.dim)])
         number = objects.fields[objects.number][which] if objects.number in objects.fields else which
-        x, y = objects.centres()[which]
+        place_of = {axis: float(v) for axis, v in zip("xyz", objects.centres()[which])}
         return {
-            "object": layer.object, "label": layer.label, "number": int(number), "x": float(x), "y": float(y),
-            "values": values,
+            "object": layer.object, "label": layer.label, "number": int(number), **place_of, "values": values,
         }  # fmt: skip
 
     def file(self, wanted: dict[str, Any]) -> Answer:
@@ -222,17 +236,20 @@ class Viewer:
     def _scene(self, key: tuple, moment: Moment, view: ModelView) -> Scene:
         """As scene.scene, with layers that were put together before."""
         seen = seen_of(moment, view)
-        shifted = None
+        shifted, plane = None, plane_of(moment, view)
+        cut = None if plane is None else tuple(np.concatenate(plane).tolist())
         layers = []
         for layer in view.layers:
             if not layer.visible or layer.object not in moment.objects:
                 continue
             # Arrows are as long as the picture is wide; all else of a layer does not know the camera.
-            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, seen if layer.vectors else None)
+            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, cut,
+                     seen if layer.vectors else None)  # fmt: skip
             if about not in self.layers:
-                if shifted is None and layer.object == "elements":
+                if shifted is None and layer.object in MOVED:
                     shifted = shift_of(moment, view.deformed)
-                self.layers[about] = painted(moment, layer, seen, shifted if layer.object == "elements" else None)
+                moved = shifted if layer.object in MOVED else None
+                self.layers[about] = painted(moment, layer, seen, moved, plane=plane)
                 while len(self.layers) > KEPT or _older(self.layers, key):
                     self.layers.popitem(last=False)
             self.layers.move_to_end(about)
@@ -240,7 +257,16 @@ class Viewer:
             if found.layer.label != layer.label:
                 found.layer = layer
             layers.append(found)
-        return Scene(moment, view, seen, layers)
+        return Scene(moment, view, seen, layers, turn_of(moment, view))
+
+
+def _box(moment: Moment) -> list[list[float]] | None:
+    """The corner with the least x, y and z of all that is there in space, and that with the greatest."""
+    if moment.dim != 3:
+        return None
+    points = moment.of("elements").read()[0]
+    points = points[np.isfinite(points).all(axis=1)]
+    return [points.min(axis=0).tolist(), points.max(axis=0).tolist()] if len(points) else [[0.0] * 3, [1.0] * 3]
 
 
 def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:

@@ -83,6 +83,7 @@ LINES = [
     ("SET damp 0.4", "expected the word 'lsm' after damp"),
     ("SET damp lsm -1", "expected a number not below 0"),
     ("SET wallside right", "expected left or both"),
+    ("SET units cgs", "expected SI, mm-MPa-s, km-MPa-s"),
     ("SET", "say what to set: dt, gravity"),
     # shapes and places
     ("WALL id 1 nodes (0 0) (0 0)", "the wall has no length"),

@@ -341,14 +341,6 @@ def test_what_is_no_run_is_refused(tmp_path: Path, launch: Launcher):
     assert done.returncode != 0 and half.name in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_frame_in_three_dimensions_is_refused_by_its_name(tmp_path: Path, launch: Launcher):
-    solid = frames.write_tetrahedra(tmp_path)
-    for words in (("view", solid, "--no-browser"), ("view", tmp_path, "--no-browser"), ("draw", solid)):
-        done = launch(1, *words)
-        assert done.returncode != 0 and "Traceback" not in done.stderr
-        assert f"{solid.name} is a frame in three dimensions" in done.stderr
-
-
 # ---- without a browser -----------------------------------------------------------------------------------------------
 
 

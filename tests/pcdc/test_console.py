@@ -70,7 +70,7 @@ def test_exit_ends(bench):
     ("line", "words"),
     [
         ("pcdc mod", "model"),
-        ("pcdc model ", "new save restore gravity option time-step step solve sub-step rayleigh creep"),
+        ("pcdc model ", "new save restore gravity units option time-step step solve sub-step rayleigh creep"),
         ("pcdc geom cr p", "polyline polygon point"),
         ("pcdc model option dynamic ", "on off true false"),
         ("pcdc element c-model null ", "property relax range"),

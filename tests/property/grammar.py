@@ -212,7 +212,7 @@ class Maker:
         more = [
             self.perhaps(20, f"seed {self.whole(0, 99)}"), self.perhaps(15, "wallside", self.pick("left", "both")),
             self.perhaps(15, f"gentry {self.pick('3', '0.5', '40')}"), self.perhaps(15, f"stepbar {self.whole(7, 90)}"),
-            self.perhaps(10, "thickness 3.0"),
+            self.perhaps(10, "thickness 3.0"), self.perhaps(10, "units", self.pick("SI", "mm-MPa-s")),
         ]  # fmt: skip
         if any(more):
             self.add("SET", *more)

@@ -52,6 +52,7 @@ SAME: list[tuple[str, str]] = [
     ("pcdc model time-step value 1e-7 auto off", "sim.time_step(value=1e-7, auto=False)"),
     ("pcdc model creep on dt 10 change 0.1 least 1 greatest 100",
      "sim.creep(True, dt=10, change=0.1, least=1, greatest=100)"),
+    ("pcdc model units mm-MPa-s", "sim.units('mm-MPa-s')"),
     ("pcdc model rayleigh 0.05 frequency 12 part stiffness",
      "sim.rayleigh(0.05, frequency=12, part='stiffness')"),
     ("pcdc model creep off", "sim.creep(False)"),
@@ -355,6 +356,12 @@ IN_SPACE: list[tuple[str, str]] = [
     ("pcdc element-face boundary m-s-b-c stress-zz -1 range boundary", "sim.faces.stress(zz=-1, where='boundary')"),
     ("pcdc element initial stress-xz 1 stress-yz 2 gradient (0,0,1)",
      "sim.elements.initial_stress(xz=1, yz=2, gradient={'yz': (0, 0, 1)})"),
+    ("pcdc element c-model mech-bur property density 2500 bulk 2e9 m-s 1e9 k-s-zz 0 k-s-xz 1e-5 k-s-yz 2e-5",
+     "sim.elements.model('mech-bur', density=2500, bulk=2e9, maxwell_shear=1e9, kelvin_strain_zz=0, "
+     "kelvin_strain_xz=1e-5, kelvin_strain_yz=2e-5)"),
+    ("pcdc element c-model mech-m-c property density 25 young 1e9 p-r 0.2 tensile 0 coh table 'c' over plastic-strain",
+     "sim.elements.model('mech-m-c', density=25, young=1e9, poisson_ratio=0.2, tensile=0, "
+     "cohesion=sim.tables.over('c', 'plastic-strain'))"),
     ("pcdc history create 'h' node nearest (0,0,1) value displacement-z",
      "sim.histories.create('h', 'node', 'displacement-z', nearest=(0, 0, 1))"),
     ("pcdc output image 'cut' field 'displacement' eye '-y' section 'y=12.5'",

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.physics.fdem import changes, diagnostics
+from hpcdem.physics.fdem import changes, creep, diagnostics
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
 from tests.parallel.model import Found, Model
 from tests.space.support import ROCK, box
 
@@ -48,6 +49,65 @@ def dig(sim: Blocks) -> None:
     """A piece of the bar is taken out in the middle of the run."""
     if sim.clock.step == 500:
         changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 2.2))
+
+
+def yielding(sim: Blocks) -> None:
+    """The same bar and its flier, of soil that yields: in the middle of the bar it softens, its end is elastic."""
+    swinging(sim)
+    mesh = sim.mesh
+    soil = {"density": 2000.0, "young": 5e7, "poisson_ratio": 0.3, "friction": 25.0, "dilation": 10.0, "tensile": 5e4}
+    sim.table("soft", [(0.0, 1.5e5), (5e-3, 3e4)])
+    sim.table("brittle", [(0.0, 5e4), (2e-3, 1e3)])
+    x = mesh.centroids()[:, 0]
+    changes.element_model(sim, np.flatnonzero(x < 2.1), "mech_mohr_coulomb", {**soil, "cohesion": 1e5})
+    tables: dict[str, Value] = {"cohesion": Over("soft", PLASTIC_STRAIN), "tensile": Over("brittle", PLASTIC_STRAIN)}
+    sim.element_property(np.flatnonzero((x > 0.6) & (x < 1.4)), tables)
+
+
+def dig_soil(sim: Blocks) -> None:
+    """What happens to it: the same piece is taken out; some of it has not yielded, or becomes elastic."""
+    dig(sim)
+    if sim.clock.step == 300:
+        changes.reset_state(sim, np.arange(30))
+    if sim.clock.step == 600:
+        changes.element_model(sim, np.arange(20, 40), "mech_iso_elastic", {**ROCK, "young": 5e7})
+
+
+def creeping(sim: Blocks) -> None:
+    """A bar at rest under its weight and pressure, of which the left part creeps."""
+    sim.take_mesh(box((12, 2, 2), (2.4, 0.3, 0.3), 5, shaken=0.2))
+    mesh = sim.mesh
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "damp_factor": 0.05})
+    soft = {**ROCK, "maxwell_viscosity": 4e6, "kelvin_shear": 1e10, "kelvin_viscosity": 1e6, "damp_factor": 0.05}
+    left = np.flatnonzero(mesh.centroids()[:, 0] < 1.6)
+    changes.element_model(sim, left, "mech_burgers", {**soft, "kelvin_strain_xz": 1e-6, "kelvin_strain_zz": 0.0})
+    sim.option(dynamic=False, collision=False)
+    sim.initial_stress(None, xx=-1e4, yy=-2e4, yz=5e3)
+    sim.move_constraint(np.unique(mesh.layers["left"]), 1)
+    edges = mesh.edges()
+    for side, stress in (("right", 8e5), ("top", -2e5)):
+        sim.stress_condition(edges.faces[mesh.find_edges(edges, mesh.layers[side]), 0], normal=stress)
+    creep.switch(sim, True, dt=2e-5, change=0.2)
+
+
+def creep_more(sim: Blocks) -> None:
+    """What happens to it: creep steps at rest, one of them under way at step 401; then motion in which it creeps."""
+    step = sim.clock.step
+    if step % 100 == 50 and step < 600:
+        if sim.creep.passed > 0.0:
+            creep.finish(sim, 1.0)
+        creep.begin(sim, 1.0)
+    if step == 600:
+        creep.finish(sim, 1.0)
+        sim.option(dynamic=True)
+        creep.switch(sim, True)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] > 1.5), 2.0, 1.0, -3.0)
+    if step == 700:
+        soft = np.flatnonzero(sim.creeping())
+        changes.reset_kelvin_strain(sim, soft[:40])
+        sim.element_property(soft[20:60], {"kelvin_viscosity": 3e6})
+    if step == 800:
+        changes.element_model(sim, np.flatnonzero(sim.creeping())[:10], "mech_iso_elastic", ROCK)
 
 
 def settling(sim: Blocks) -> None:
@@ -152,6 +212,32 @@ def it_swings(found: Found) -> None:
     assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
 
 
+def flow(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with what elements remember of yielding."""
+    names = ("plastic_state", "plastic_shear_strain", "plastic_volume_strain", "plastic_work")
+    return result(sim, notes) | {name: diagnostics.values(sim, name) for name in names}
+
+
+def it_flows(found: Found) -> None:
+    assert np.nanmax(found["displacement_x"]) > 1.5
+    assert (found["plastic_shear_strain"] > 1e-3).sum() > 40
+    assert len({int(state) for state in found["plastic_state"] if not np.isnan(state)}) > 4
+    assert np.isnan(found["stress_xx"]).sum() == 20  # dug out
+
+
+def crept(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with what elements remember of creep."""
+    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy", "zz", "xz", "yz")]
+    found = {name: diagnostics.values(sim, name) for name in (*names, "creep_work")}
+    return result(sim, notes) | found | {"creep_time": np.array([sim.creep.time, sim.creep.dt])}
+
+
+def it_creeps(found: Found) -> None:
+    assert (np.abs(found["creep_strain_xx"]) > 1e-6).sum() > 100
+    assert (found["creep_work"] > 0.0).sum() > 100 and found["creep_time"][0] > 1e-4
+    assert np.abs(found["kelvin_strain_xz"]).max() > 1e-7
+
+
 def touching(sim: Blocks, notes: dict[str, Any]) -> Found:
     """The same, with the contacts in the order of their pairs."""
     found = result(sim, notes)
@@ -190,6 +276,8 @@ def it_settles(found: Found) -> None:
 
 MODELS = {
     "swinging": Model(swinging, result, it_swings, dig, steps=1000, middle=401, come=10),
+    "soil that swings": Model(yielding, flow, it_flows, dig_soil, steps=1000, middle=401, come=10),
+    "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),

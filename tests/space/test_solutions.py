@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
-from hpcdem.physics.fdem import convergence, diagnostics
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.mesh import Mesh
+from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import fill, solids
 from tests.space.support import LAME, ROCK, SHEAR, body, box, faces_on, nodes_on
 
@@ -109,32 +112,104 @@ def test_a_hollow_sphere_under_pressure() -> None:
     r 1.5 s_r -2.69231, s_t 1.92308, at 2 -0.91346, 1.03365."""
     mesh = octant(1.0, 3.0, 0.3, 0.045)
     sim = body(mesh, dynamic=False)
-    for k, axis in enumerate("xyz"):
-        sim.velocity_condition(np.flatnonzero(np.abs(mesh.points[:, k]) < 1e-9), **{f"v{axis}": 0.0})
-    edges = mesh.edges()
-    free = edges.faces[~edges.inner, 0]
-    r = np.linalg.norm(mesh.points[mesh.face_points(free)], axis=2)
-    sim.stress_condition(free[(np.abs(r - 1.0) < 1e-6).all(axis=1)], normal=-10e6)
+    inner = held_by_symmetry(sim)
+    sim.stress_condition(inner, normal=-10e6)
     assert convergence.solve(sim, ratio=1e-6).reason == "ratio"
-    place = np.linalg.norm(mesh.points, axis=1)
-    out = (vector(sim, "displacement") * mesh.points).sum(axis=1) / place
-    assert out[np.abs(place - 1.0) < 1e-6].mean() == pytest.approx(1.33654e-4, rel=0.01)
-    assert out[np.abs(place - 3.0) < 1e-6].mean() == pytest.approx(2.59615e-5, rel=0.01)
-    middle = mesh.centroids()
-    radius = np.linalg.norm(middle, axis=1)
-    n = middle / radius[:, None]
-    s = {c: diagnostics.values(sim, f"stress_{c}") for c in ("xx", "yy", "zz", "xy", "xz", "yz")}
-    rr = sum(s[a + a] * n[:, k] ** 2 for k, a in enumerate("xyz")) + 2.0 * (
-        s["xy"] * n[:, 0] * n[:, 1] + s["xz"] * n[:, 0] * n[:, 2] + s["yz"] * n[:, 1] * n[:, 2]
-    )
-    tt = 0.5 * (s["xx"] + s["yy"] + s["zz"] - rr)
-    volume = diagnostics.values(sim, "volume")
+    walls = wall_displacements(sim)
+    assert walls == pytest.approx([1.33654e-4, 2.59615e-5], rel=0.01)
+    radius, rr, tt, volume = spherical_stresses(sim)
     for at, radial, tangential in ((1.5, -2.69231e6, 1.92308e6), (2.0, -0.91346e6, 1.03365e6)):
         shell = np.abs(radius - at) < 0.1
         cube = (radius[shell] / at) ** 3  # both stresses are a constant and a part that falls with r^-3
         exact = [np.average(a + b / cube, weights=volume[shell]) for a, b in _parts(at, radial, tangential)]
         found = [np.average(part[shell], weights=volume[shell]) for part in (rr, tt)]
         assert np.allclose(found, exact, rtol=0.02)
+
+
+def held_by_symmetry(sim: Blocks) -> np.ndarray:
+    """The planes of an eighth of a hollow sphere of the inner radius 1 stay planes; the faces of its inner wall."""
+    mesh = sim.mesh
+    for k, axis in enumerate("xyz"):
+        sim.velocity_condition(np.flatnonzero(np.abs(mesh.points[:, k]) < 1e-9), **{f"v{axis}": 0.0})
+    edges = mesh.edges()
+    free = edges.faces[~edges.inner, 0]
+    r = np.linalg.norm(mesh.points[mesh.face_points(free)], axis=2)
+    return free[(np.abs(r - 1.0) < 1e-6).all(axis=1)]
+
+
+def wall_displacements(sim: Blocks) -> list[float]:
+    """Mean radial displacements of the walls of radii 1 and 3 [m]."""
+    place = np.linalg.norm(sim.mesh.points, axis=1)
+    out = (vector(sim, "displacement") * sim.mesh.points).sum(axis=1) / place
+    return [float(out[np.abs(place - r) < 1e-6].mean()) for r in (1.0, 3.0)]
+
+
+def spherical_stresses(sim: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Radius [m] of the middle of each element, radial and mean tangential stress [Pa] there, volume [m3]."""
+    middle = sim.mesh.centroids()
+    radius = np.linalg.norm(middle, axis=1)
+    n = middle / radius[:, None]
+    s = {c: diagnostics.values(sim, f"stress_{c}") for c in ("xx", "yy", "zz", "xy", "xz", "yz")}
+    rr = sum(s[a + a] * n[:, k] ** 2 for k, a in enumerate("xyz")) + 2.0 * (
+        s["xy"] * n[:, 0] * n[:, 1] + s["xz"] * n[:, 0] * n[:, 2] + s["yz"] * n[:, 1] * n[:, 2]
+    )
+    return radius, rr, 0.5 * (s["xx"] + s["yy"] + s["zz"] - rr), diagnostics.values(sim, "volume")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dilation", [0.0, 20.0])
+def test_a_hollow_sphere_that_yields(dilation: float) -> None:
+    """Pressure inside a sphere of radii 1 and 3 that yields after Mohr and Coulomb up to the radius c = 1.6. There
+    N s_t - s_r = k, so s_r = Y - (p + Y) r^(-2 (N - 1) / N), Y = k / (N - 1); outside Lame's stresses, which reach the
+    strength at c. Both tangential plastic strains are half of m times the radial one without its sign, so m u' +
+    2 u / r is that of the elastic strains. (Compare Hill 1950, V.2; Yu 2000, Cavity Expansion Methods, 3.2.)"""
+    young, poisson, friction, cohesion, c, b = 10e9, 0.25, 30.0, 5e6, 1.6, 3.0
+    n, m = (np.tan(np.pi / 4.0 + 0.5 * np.radians(angle)) ** 2 for angle in (friction, dilation))
+    k = 2.0 * cohesion * np.sqrt(n)
+    y, power = k / (n - 1.0), 2.0 * (n - 1.0) / n
+    a = k / (n - 1.0 + (b / c) ** 3 * (1.0 + 0.5 * n))
+    pressure = (y - a * (1.0 - (b / c) ** 3)) * c**power - y
+
+    def stresses(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Radial and tangential [Pa]."""
+        inside = y - (pressure + y) * r**-power
+        radial = np.where(r < c, inside, a * (1.0 - (b / r) ** 3))
+        return radial, np.where(r < c, (k + inside) / n, a * (1.0 + 0.5 * (b / r) ** 3))
+
+    def way(r: float) -> float:
+        """Elastic displacement [m]."""
+        radial, tangential = stresses(np.array(r))
+        return float(r * (tangential * (1.0 - poisson) - poisson * radial) / young)
+
+    r = np.linspace(1.0, c, 20001)
+    radial, tangential = stresses(r)
+    strains = (radial - 2.0 * poisson * tangential) / young, (tangential * (1.0 - poisson) - poisson * radial) / young
+    rest = (m * strains[0] + 2.0 * strains[1]) * r ** (2.0 / m) / m
+    exact = [c ** (2.0 / m) * way(c * (1.0 + 1e-12)) - float(trapezoid(rest, r)), way(b)]
+
+    mesh = octant(1.0, b, 0.3, 0.06)
+    sim = Blocks(SerialComm())
+    sim.take_mesh(mesh)
+    soil = {"density": DENSITY, "young": young, "poisson_ratio": poisson, "tensile": 1e12}
+    changes.element_model(
+        sim, None, "mech_mohr_coulomb", {**soil, "friction": friction, "cohesion": cohesion, "dilation": dilation}
+    )
+    sim.option(collision=False, dynamic=False)
+    inner = held_by_symmetry(sim)
+    for part in np.linspace(0.1, 1.0, 10):
+        sim.stress_condition(inner, normal=-part * pressure)
+        assert convergence.solve(sim, ratio=1e-5).reason == "ratio"
+    walls = wall_displacements(sim)
+    assert walls == pytest.approx(exact, rel=0.02)
+    radius, rr, tt, volume = spherical_stresses(sim)
+    yields = diagnostics.values(sim, "plastic_shear_strain") > 1e-7
+    front = (1.0 + 6.0 / np.pi * volume[yields].sum()) ** (1.0 / 3.0)
+    assert front == pytest.approx(c, rel=0.02)
+    for at in (1.15, 1.35, 1.8, 2.2):
+        shell = np.abs(radius - at) < 0.1
+        expected = [np.average(part, weights=volume[shell]) for part in stresses(radius[shell])]
+        found = [np.average(part[shell], weights=volume[shell]) for part in (rr, tt)]
+        assert np.abs(np.array(found) - expected).max() < 0.02 * pressure
 
 
 def _parts(at: float, radial: float, tangential: float) -> list[tuple[float, float]]:

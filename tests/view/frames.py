@@ -11,6 +11,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import MeshFrame, write_mesh_frame
+from hpcdem.physics.fdem import tetrahedra
 from hpcdem.pre.mesh import structured_space
 
 
@@ -109,6 +110,8 @@ def write_discs(folder: Path, step: int = 3, **values: int) -> Path:
     return path
 
 
+CORNERS = "first", "second", "last"
+"""Columns of joints in space."""
 SIZE = (4.0, 3.0, 2.0)
 """Of the body [m]."""
 
@@ -133,12 +136,13 @@ def body(step: int = 5, cells: tuple[int, int, int] = (4, 3, 2), grown: float = 
     volume = np.full(count, np.prod(SIZE) / count)
     elements = {"number": number, "corners": np.full(count, 4), **stress, "stress_max": 0.0 * zz, "stress_min": zz,
                 "volume": volume, "strain_energy": 0.5 * volume, "group_rock": roof.astype(np.int32)}  # fmt: skip
-    joints = {name: np.zeros(0, np.int64) for name in ("number", "first", "last")} | {"state": np.zeros(0)}
+    joints = {name: np.zeros(0, np.int64) for name in ("number", *CORNERS)} | {"state": np.zeros(0)}
     if broken:
         pairs = mesh.edges().faces
         lower, upper = pairs[pairs[:, 1] >= 0].T
         apart = roof[lower // 4] != roof[upper // 4]
-        joints = {"number": lower, "first": lower, "last": lower, "state": np.where(apart, 3.0, 1.0),
+        corner_of = dict(zip(CORNERS, tetrahedra.face_corners(lower).T, strict=True))
+        joints = {"number": lower, **corner_of, "state": np.where(apart, 3.0, 1.0),
                   "mode": np.where(apart, 2.0, 0.0)}  # fmt: skip
     tables = (Table(columns, 0, len(columns["number"])) for columns in (corners, elements, joints))
     return MeshFrame(step, 1e-3 * step, 1e-6, *tables, {"group_rock": ["base", "roof"]})

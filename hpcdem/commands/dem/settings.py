@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from hpcdem.commands import units
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem.kernels.mass import SPHERES
 from hpcdem.physics.dem.simulation import Simulation
@@ -48,6 +49,8 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         if value < 0:
             raise CommandError(f"SET seed must not be negative, got {value}")
         s.seed = int(value)
+    elif name == "units":
+        s.units = units.declared(s.units, value, sim.log, late=bool(len(sim.walls) or sim.count(len(sim.particles))))
     elif name == "outdir":
         sim.outdir, sim.folder_made = Path(value), False
     else:

@@ -14,6 +14,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import Chart, Curve
 from hpcdem.commands.fdem.values import figure_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.units import label as unit_label
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, Range
@@ -153,7 +154,7 @@ def _y_label(project: Project, chart: Chart) -> str:
 
 def _named(project: Project, name: str) -> str:
     history = find(project, name)
-    return f"{name}: {history.value.replace('_', ' ')} [{history.unit}]"
+    return f"{name}: {history.value.replace('_', ' ')} [{unit_label(project.units, history.unit)}]"
 
 
 def _chart(project: Project, name: str) -> Chart:

@@ -160,6 +160,7 @@ def _state(project: Project) -> dict[str, Any]:
         "adapts": project.adapts,
         "in_use": project.in_use,
         "networks": project.networks,
+        "units": project.units,
         "solved": {name: None if value != value else value for name, value in project.solved.items()},
     }
 
@@ -187,7 +188,7 @@ def _take(project: Project, state: dict[str, Any]) -> None:
     project.groups.update(groups)
     project.histories, project.charts, project.frames = histories, charts, dict(state["frames"])
     project.framed, project.cracks_filed = dict(state["framed"]), None
-    project.networks = int(state["networks"])
+    project.networks, project.units = int(state["networks"]), str(state.get("units", ""))
     solved = state.get("solved", {})  # versions before did not keep it
     project.solved = {name: math.nan if value is None else value for name, value in solved.items()}
     project.adapts = bool(state["adapts"])

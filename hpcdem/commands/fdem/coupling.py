@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.units import CHOICES
 from hpcdem.physics.fdem import convergence
 from hpcdem.physics.fdem import saved_state as of_blocks
 
@@ -37,6 +38,11 @@ def couple(project: Project, particles: Simulation, friction: float | None = Non
         raise CommandError(
             f"particles and blocks would both write into {project.outdir}: give the particles a folder of their own, "
             'hpcdem.Simulation(outdir="...")'
+        )
+    if project.units != particles.settings.units and project.units and particles.settings.units:
+        raise CommandError(
+            f"the units of the blocks are {CHOICES[project.units]}, those of the particles "
+            f"{CHOICES[particles.settings.units]}"
         )
     if dt < 0.0:
         raise CommandError(f"the time step must be positive, got {dt:g}")

@@ -11,6 +11,7 @@ from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.records import ENERGIES, LAW_STATE, MODEL, UNITS, WELL, History
 from hpcdem.commands.fdem.values import history_name
 from hpcdem.core.errors import CommandError
+from hpcdem.core.units import label
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
 from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
@@ -147,7 +148,7 @@ def _write(project: Project) -> None:
         if not new:
             continue
         path = project.folder() / f"history_{history_name(name)}.csv"
-        header = f"step,time [s],{history.value} [{history.unit}]"
+        header = f"step,time [s],{history.value} [{label(project.units, history.unit)}]"
         if not history.filed:  # a new model, or a restored one: the file holds what is in memory, no more
             append_rows(path, header, [_line(row) for row in history.rows], 0, project.comm)
         else:
@@ -171,7 +172,7 @@ def export(project: Project, path: str, names: Sequence[str] = ()) -> None:
         for step, time, value in history.rows:
             times[step] = time
             by_step.setdefault(step, {})[name] = value
-    titles = [_quoted(f"{name} {h.value} [{h.unit}]") for name, h in wanted.items()]
+    titles = [_quoted(f"{name} {h.value} [{label(project.units, h.unit)}]") for name, h in wanted.items()]
     lines = [",".join(["step", "time [s]", *titles])]
     for step in sorted(by_step):
         cells = [repr(by_step[step][name]) if name in by_step[step] else "" for name in wanted]

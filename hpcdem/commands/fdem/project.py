@@ -33,7 +33,8 @@ class Project:
     up; cracks_filed: broken joints that are in their file, None: the file is not of this model yet; framed: step of the
     last frame by name;
     dynamic: motion in time, not towards equilibrium; adapts: the time step may change during a run; networks: sets of
-    fractures made so far; solved: how the last `model solve` ended, reason, ratio and steps; line:
+    fractures made so far; units: that were declared (core.units.SYSTEMS), "" none;
+    solved: how the last `model solve` ended, reason, ratio and steps; line:
     of the script, for the log; names: gives what a checkpoint shall hold of the script's own variables, place: and of
     the way to where the script is; progress: of the command that steps at this moment, see running.py; resumed: this
     run goes on from a checkpoint of the folder; restored: the checkpoint that the script named, and its step; told:
@@ -122,6 +123,7 @@ class Project:
         self.dynamic = True
         self.adapts = False
         self.networks = 0
+        self.units = ""
         self.solved: dict[str, Any] = {}
         self.taken = False
         self.in_use = False

@@ -37,7 +37,9 @@ UNITS = {
         "stress_yz": "Pa", "plastic_state": "1",
         "plastic_shear_strain": "1", "plastic_volume_strain": "1", "plastic_work": "J/m",
         "creep_strain_xx": "1", "creep_strain_yy": "1", "creep_strain_xy": "1", "kelvin_strain_xx": "1",
-        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_work": "J/m", "mean_temperature": "K",
+        "kelvin_strain_yy": "1", "kelvin_strain_xy": "1", "creep_strain_zz": "1", "creep_strain_xz": "1",
+        "creep_strain_yz": "1", "kelvin_strain_zz": "1", "kelvin_strain_xz": "1", "kelvin_strain_yz": "1",
+        "creep_work": "J/m", "mean_temperature": "K",
         LAW_STATE: "that of the law",
     },
     JOINT: {

@@ -1,9 +1,10 @@
-"""model new, gravity, option, time-step, rayleigh, creep; reset."""
+"""model new, gravity, units, option, time-step, rayleigh, creep; reset."""
 
 from __future__ import annotations
 
 from typing import Any
 
+from hpcdem.commands import units as of_values
 from hpcdem.commands.fdem import coupling
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
@@ -26,6 +27,11 @@ def gravity(project: Project, g: tuple[float, ...]) -> None:
     if len(g) != project.dim:
         raise CommandError(f"gravity: a vector of {project.dim} numbers is needed, got {len(g)}")
     project.blocks.gravity(*g)
+
+
+def units(project: Project, system: str) -> None:
+    """The units of all that is given from here on, see `commands.units`; they change no value."""
+    project.units = of_values.declared(project.units, system, project.log, late=project.in_use)
 
 
 def option(

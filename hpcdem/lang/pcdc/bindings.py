@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from hpcdem.commands import fdem
+from hpcdem.commands import fdem, units
 from hpcdem.core.errors import CommandError
 from hpcdem.lang.pcdc import trial
 from hpcdem.lang.pcdc.kinds import FunctionName, TableName
@@ -19,6 +19,7 @@ from hpcdem.lang.pcdc.table import (
     PROPPANT,
     PROPPANT_CONDITION,
     TEMPERATURE,
+    Command,
 )
 from hpcdem.lang.pcdc.trial import python
 from hpcdem.physics.fdem import groups as g
@@ -380,6 +381,7 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "model save": lambda c: fdem.checkpoints.save(c.project, c["file"]),
     "model restore": _restore,
     "model gravity": lambda c: fdem.settings.gravity(c.project, c["gravity"]),
+    "model units": lambda c: fdem.settings.units(c.project, c["system"]),
     "model option": lambda c: fdem.settings.option(c.project, **c.given()),
     "model time-step": lambda c: fdem.settings.time_step(c.project, **c.given()),
     "model sub-step": lambda c: fdem.flow.sub_step(c.project, **c.given()),
@@ -470,6 +472,25 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "output vtk": _output,
     "output image": _image,
 }
+
+
+def carry_out(command: Command, call: Call) -> None:
+    """The function of a command, then a look at its values in the units declared."""
+    BINDINGS[command.name](call)
+    if call.project.units:
+        units.look(call.project.units, call.project.log, _measured(command, call.arguments))
+
+
+def _measured(command: Command, arguments: Mapping[str, Any]) -> Iterator[units.Given]:
+    """Values of a command and of its model that have a unit."""
+    named = arguments.get("model")
+    models = [model for model in command.models if model.keyword.name == named]
+    options = [option for model in models for option in (*model.leading, *model.options)]
+    given = {**arguments, **arguments.get("properties", {})}
+    for option in (*command.leading, *command.options, *options):
+        if option.unit and option.name in given:
+            yield option.name, option.unit, given[option.name]
+
 
 PASSED_OVER: dict[str, Callable[[Any, str], Any]] = {
     "model save": lambda project, file: project.to_write(project.path(file)),

@@ -23,7 +23,7 @@ import numpy as np
 from hpcdem.commands import fdem
 from hpcdem.core.errors import CommandError, EquilibriumError, HpcdemError, ScriptError, UsageError
 from hpcdem.lang.pcdc import names, source
-from hpcdem.lang.pcdc.bindings import BINDINGS, PASSED_OVER, Call
+from hpcdem.lang.pcdc.bindings import PASSED_OVER, Call, carry_out
 from hpcdem.lang.pcdc.journal import COMMAND, MOST, NAMES, Journal, described
 from hpcdem.lang.pcdc.kinds import FunctionName
 from hpcdem.lang.pcdc.source import CALL, Source
@@ -193,7 +193,7 @@ class Interpreter:
         if asked and self.journal is not None:
             fdem.steps.stop_here(self.project, asked)
         try:
-            BINDINGS[statement.command.name](Call(self.project, arguments, terms, self.restore_names))
+            carry_out(statement.command, Call(self.project, arguments, terms, self.restore_names))
         except HpcdemError as error:
             known = self._told_with_line(error, statement)
             if self.journal is not None:

@@ -13,7 +13,7 @@ from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.physics.fdem.tables import AXES, Drawn, Over
+from hpcdem.physics.fdem.tables import AXES, TEMPERATURE, Drawn, Over
 
 
 def parse(
@@ -282,7 +282,10 @@ class _Line:
             over = " or ".join(f"'over {axis}'" for axis in kind.axes)
             word = self.next(over)
             raise ValueError(f"read {word}, expected {over} after the name of the table")
-        return _later(lambda name, axis: Over(name, AXES.index(axis)), name, self.one(kinds.choice(*kind.axes), _OVER))
+        axis = self.one(kinds.choice(*kind.axes), _OVER)
+        if axis == AXES[TEMPERATURE]:
+            self.refuse_elsewhere("over temperature", (2,))
+        return _later(lambda name, axis: Over(name, AXES.index(axis)), name, axis)
 
     def _value_follows(self, ahead: int = 0) -> bool:
         at = self.at + ahead

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from hpcdem.core.looks import COLOURS, OBJECTS
+from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.pcdc.keywords import Keyword
 from hpcdem.lang.pcdc.kinds import (
     BOOL,
@@ -191,7 +192,10 @@ def declared(
         kind = limited(one.low, one.high, one.low_itself, one.unit)
         kind = kind if uniform else varied(kind, one.softens, one.warms)
         required = not (default or one.optional)
-        options.append(Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ())))
+        options.append(
+            Option(notation, (kind,), one.doc, one.unit, default, required, also=(also or {}).get(name, ()),
+                   dims=one.dims)
+        )  # fmt: skip
     return tuple(options)
 
 
@@ -220,7 +224,7 @@ MOHR_COULOMB = Model(
         properties.MECH_MOHR_COULOMB, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "s{hear}", "b{ulk}", "fri{ction}",
         "coh{esion}", "ten{sile}", "di{lation}", "d{amp}-f{actor}",
     ),
-    one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB,
+    one_of=_PAIRS, of=properties.MECH_MOHR_COULOMB, dims=BOTH,
 )  # fmt: skip
 _FUNCTION = Option("function", (FILE,), "'file.py:function', beside the script; plain text", required=True)
 _LAW = Option("law", (FILE,), "'file.py:law': the file, beside the script, and the name of the law in it; plain text",
@@ -244,9 +248,10 @@ BURGERS = Model(
     declared(
         properties.MECH_BURGERS, "den{sity}", "y{oung}", "p{oisson}-r{atio}", "b{ulk}", "k{elvin}-s{hear}",
         "k{elvin}-v{iscosity}", "m{axwell}-s{hear}", "m{axwell}-v{iscosity}", "k{elvin}-s{train}-xx",
-        "k{elvin}-s{train}-yy", "k{elvin}-s{train}-xy", "d{amp}-f{actor}", "fri{ction}",
+        "k{elvin}-s{train}-yy", "k{elvin}-s{train}-xy", "k{elvin}-s{train}-zz", "k{elvin}-s{train}-xz",
+        "k{elvin}-s{train}-yz", "d{amp}-f{actor}", "fri{ction}",
     ),
-    one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS,
+    one_of=(("young", "poisson-ratio"), ("bulk", "maxwell-shear")), of=properties.MECH_BURGERS, dims=BOTH,
 )  # fmt: skip
 _COEFFICIENTS = {
     "transfer-coeficient": ("t{ransfer}-c{oefficient}",), "expansion-coeficient": ("e{xpansion}-c{oefficient}",),
@@ -507,7 +512,9 @@ RECORDED = {
         "stress-yz": "Pa", "plastic-state": "1",
         "plastic-shear-strain": "1", "plastic-volume-strain": "1", "plastic-work": "J/m", "creep-strain-xx": "1",
         "creep-strain-yy": "1", "creep-strain-xy": "1", "kelvin-strain-xx": "1", "kelvin-strain-yy": "1",
-        "kelvin-strain-xy": "1", "creep-work": "J/m", "mean-temperature": "K", "law-state": "that of the law",
+        "kelvin-strain-xy": "1", "creep-strain-zz": "1", "creep-strain-xz": "1", "creep-strain-yz": "1",
+        "kelvin-strain-zz": "1", "kelvin-strain-xz": "1", "kelvin-strain-yz": "1", "creep-work": "J/m",
+        "mean-temperature": "K", "law-state": "that of the law",
     },
     "joint": {
         "opening": "m", "slip": "m", "damage": "1", "normal-stress": "Pa", "shear-stress": "Pa", "state": "1",
@@ -568,7 +575,10 @@ def _group_command(kind: str, notation: str) -> Command:
 
 def _properties(model: Model) -> tuple[Option, ...]:
     """Those of a model, none of them compulsory, for commands that change some."""
-    return tuple(Option(o.notation, o.values, o.doc, o.unit, also=o.also) for o in model.options if o.name != "np")
+    return tuple(
+        Option(o.notation, o.values, o.doc, o.unit, also=o.also, dims=tuple(d for d in o.dims if d in model.dims))
+        for o in model.options if o.name != "np"
+    )  # fmt: skip
 
 
 _FRICTION = next(o.values for o in MOHR_COULOMB.options if o.name == "friction")
@@ -578,14 +588,14 @@ _OF_SOLIDS = (
     *(o for o in _properties(MOHR_COULOMB) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *(o for o in _properties(BURGERS) if o.name not in {one.name for one in ISO_ELASTIC.options}),
     *_properties(ISO_HEAT),
-    _PARAMETER,
+    replace(_PARAMETER, dims=PLANE),
 )  # fmt: skip
 
 _MODEL = (
     Command("mod{el} new", "A new model: nothing of the one before is kept, except variables of Python.",
             ("pcdc model new", "pcdc model new dim 3"),
-            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three this version computes bodies of "
-                            "tetrahedra, whole or with joints", "", "2"),), manual=True, dims=BOTH),
+            options=(Option("dim", (DIMENSIONS,), "dimensions of space; in three not everything is there, see "
+                            "the end of the reference", "", "2"),), manual=True, dims=BOTH),
     Command("mod{el} save", "The whole state to a file: mesh, models, motion, cracks, histories; and the variables and "
             "functions of Python whose names begin with m_.", ("pcdc model save 'test.sav'",),
             (_leading("file", FILE, "name of the file, beside the script"),), manual=True, dims=BOTH),
@@ -593,6 +603,10 @@ _MODEL = (
             ("pcdc model restore 'test.sav'",), (_leading("file", FILE, "name of the file"),), manual=True, dims=BOTH),
     Command("mod{el} grav{ity}", "Gravity from now on.", ("pcdc model gravity (0,-9.81)",),
             (_leading("gravity", VECTOR, "acceleration", "m/s2"),), dims=BOTH),
+    Command("mod{el} units", "The units of all values that follow: those that are unlikely in them are warned of, once "
+            "per property and with the factor that looks missing; histories and charts are labelled with them. No "
+            "value is changed.", ("pcdc model units SI", "pcdc model units mm-MPa-s"),
+            (_leading("system", choice(*UNITS), ", ".join(UNITS.values())),), dims=BOTH),
     Command("mod{el} opt{ion}", "Switches of the calculation.",
             ("pcdc model option dynamic off", "pcdc model option collision on"),
             options=(
@@ -713,7 +727,7 @@ _MODEL = (
                     "of elements and of their Kelvin dashpots in a creep step, over the largest deviator of all; from "
                     "one to the next it halves or doubles at most", "1", "dt stays"),
              Option("least", (POSITIVE,), "with change: shortest creep step", "s", "dt / 100"),
-             Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt"))),
+             Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt")), dims=BOTH),
 )  # fmt: skip
 
 _GEOMETRY = (
@@ -882,9 +896,10 @@ _OBJECTS = (
                 for c in ("xz", "yz")), ranged="element", needs_option=True, dims=BOTH),
     Command("el{ement} res{et} state", "The plastic state of elements is forgotten. Elastic elements have none: the "
             "log says that nothing was changed. Stresses stay; plastic strain is counted from here on.",
-            ("pcdc element reset state",), ranged="element", manual=True),
+            ("pcdc element reset state",), ranged="element", manual=True, dims=BOTH),
     Command("el{ement} res{et} k{elvin}-s{train}", "The Kelvin units of elements that creep are without strain from "
-            "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element"),
+            "here on. Stresses and displacements stay.", ("pcdc element reset kelvin-strain",), ranged="element",
+            dims=BOTH),
     _group_command("element-face", "element-f{ace}"),
     Command("element-f{ace} c-m{odel}", "The contact model of surfaces.",
             ("pcdc element-face c-model contact-m-c property pen-shear 5e11 pen-normal 5e11 friction 30",),

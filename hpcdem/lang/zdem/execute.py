@@ -6,17 +6,18 @@ The commands know nothing of lines and files; an error of theirs leaves here wit
 from __future__ import annotations
 
 import os.path
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hpcdem.commands import dem
+from hpcdem.commands import dem, units
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.core.selection import Selection, has_expressions, number
 from hpcdem.lang.zdem.parser import Script, parse_text
 from hpcdem.lang.zdem.rules import BOND_KEYS, BOND_MODEL_1, BOND_MODEL_2, recorded
 from hpcdem.lang.zdem.statement import Statement, find
+from hpcdem.lang.zdem.table import ZDEM
 
 
 def refuse_unexecuted(statements: Sequence[Statement]) -> None:
@@ -166,7 +167,12 @@ class Interpreter:
     def carry_out(self, sim: Any, index: int) -> None:
         statement = self.script.statements[index]
         sim.position, sim.line = index, statement.line
-        self._guarded(statement, lambda: _COMMANDS[statement.command](_Call(self, sim, statement)))
+        self._guarded(statement, lambda: self._command(_Call(self, sim, statement)))
+
+    @staticmethod
+    def _command(call: _Call) -> None:
+        _COMMANDS[call.statement.command](call)
+        look_at_units(call.sim, call.statement.command, call.arguments)
 
     @staticmethod
     def _guarded(statement: Statement, work: Callable[[], object]) -> None:
@@ -179,6 +185,15 @@ class Interpreter:
                 raise
             # A file that could not be written: the line is not wrong, the exit code is that of a run that failed.
             raise HpcdemError(str(statement.error(str(error)))) from error
+
+
+def look_at_units(sim: Any, command: str, given: Mapping[str, Any]) -> None:
+    """Warn of arguments of a command of the table that are unlikely in the units declared."""
+    row = ZDEM.command(command.lower())
+    settings = getattr(sim, "settings", None)
+    if row is not None and settings is not None and settings.units:
+        of = {option.key: option.unit for option in (*row.leading, *row.options) if option.unit}
+        units.look(settings.units, sim.log, ((name, of[name], given[name]) for name in of if name in given))
 
 
 def check_same_beginning(script: Script, saved_text: str, position: int) -> None:

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.zdem.nearest import hint
 
 SOURCES = {
@@ -415,6 +416,10 @@ _SETTINGS = (
     Option("gentry", "attempts of GEN per particle asked for; not set: GEN gives up after 1000 failures in a row",
            kind=POSITIVE, source="X"),
     Option("outdir", "folder of the results", kind=FILE, default="data", source="X"),
+    Option("units", "units of all that follows: values that are unlikely in them are warned of, histories and curves "
+           "are labelled with them; no value is changed",
+           kind=Choice("|".join(UNITS.values()), ", ".join(UNITS.values()), tuple((name, name) for name in UNITS)),
+           source="X"),
 )  # fmt: skip
 
 COMMANDS = (
@@ -602,7 +607,8 @@ COMMANDS = (
         "SET",
         "Settings; several on one line. Intervals of 0 or less switch that output off.",
         options=_SETTINGS,
-        example=("SET DT 5e-2, GRAVITY 0.0, -9.8", "SET disk off", "SET print 1000 ps 5000", "SET damp lsm 0.04"),
+        example=("SET DT 5e-2, GRAVITY 0.0, -9.8", "SET disk off", "SET print 1000 ps 5000", "SET damp lsm 0.04",
+                 "SET units SI"),
     ),
     # ---- running
     Command(

@@ -75,6 +75,17 @@ class Window {
     return [this.camera.x - half, this.camera.x + half, this.camera.y - half * h / w, this.camera.y + half * h / w];
   }
 
+  /** Right, up and towards the eye in space; null in the plane. */
+  get turn() { return about.box ? turnOf(directionOf(this.view.eye)) : null; }
+
+  /** Where the middle of the model lies in the picture. */
+  get origin() {
+    const { turn } = this;
+    if (!turn) return [0, 0];
+    const middle = about.box[0].map((low, k) => (low + about.box[1][k]) / 2);
+    return [dot(turn[0], middle), dot(turn[1], middle)];
+  }
+
   request(fine) {
     const [width, height] = this.size;
     return { source: this.source, frame: this.frame, view: { ...this.view, camera: this.box }, width, height, fine,
@@ -95,11 +106,11 @@ class Window {
     this.busy = true;
     this.stretch();
     const began = performance.now();
-    const wanted = this.request(fine);
+    const wanted = this.request(fine), origin = this.origin;
     try {
       const header = await unpacked(await ask("picture", wanted));
       const image = await createImageBitmap(header.image);
-      this.shown = { header, image, box: wanted.view.camera };
+      this.shown = { header, image, box: wanted.view.camera, origin };
       this.put();
       $("pictures").textContent = say("picture", { ms: Math.round(performance.now() - began) });
       document.body.dataset.pictures = ++drawn;
@@ -117,7 +128,9 @@ class Window {
     const [w, h] = this.size;
     if (this.canvas.width !== w || this.canvas.height !== h) { this.canvas.width = w; this.canvas.height = h; }
     const [left, right, bottom, top] = this.box;
-    const [l, r, b, t] = this.shown.box;
+    const now = this.origin;
+    const [dx, dy] = this.shown.origin.map((v, k) => now[k] - v);
+    const [l, r, b, t] = this.shown.box.map((v, k) => v + (k < 2 ? dx : dy));
     const pen = this.canvas.getContext("2d");
     pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
     pen.fillRect(0, 0, w, h);
@@ -161,10 +174,58 @@ class Window {
   }
 
   fit() {
-    const [left, right, bottom, top] = about.whole;
-    const [w, h] = this.size;
+    let [left, right, bottom, top] = about.whole;
+    const [w, h] = this.size, { turn } = this;
+    if (turn) {
+      const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [0, 1, 2].map((k) => about.box[(n >> k) & 1][k]));
+      const [x, y] = [0, 1].map((k) => corners.map((corner) => dot(turn[k], corner)));
+      const air = 0.03 * Math.max(Math.max(...x) - Math.min(...x), Math.max(...y) - Math.min(...y));
+      [left, right, bottom, top] = [Math.min(...x) - air, Math.max(...x) + air, Math.min(...y) - air, Math.max(...y) + air];
+    }
     this.camera = { x: (left + right) / 2, y: (bottom + top) / 2, width: Math.max(right - left, (top - bottom) * w / h) };
   }
+}
+
+// ---- space -----------------------------------------------------------------------------------------------------------
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const directionOf = (text) => about.eyes[text] ?? text.split(",").map(Number);
+
+function turnOf(eye) {
+  const size = Math.hypot(...eye), out = eye.map((v) => v / size), level = Math.hypot(out[0], out[1]);
+  const right = level < 1e-12 ? [1, 0, 0] : [-out[1] / level, out[0] / level, 0];
+  const up = [0, 1, 2].map((k) => out[(k + 1) % 3] * right[(k + 2) % 3] - out[(k + 2) % 3] * right[(k + 1) % 3]);
+  return [right, up, out];
+}
+
+/** Look from elsewhere, at the same place of the picture. */
+function looked(one, eye) {
+  const some = $("linked").checked ? windows.filter((other) => other.source === one.source) : [one];
+  for (const other of some) {
+    const before = other.origin;
+    other.view.eye = eye;
+    const after = other.origin;
+    other.camera.x += after[0] - before[0];
+    other.camera.y += after[1] - before[1];
+    other.points = [];
+    other.redraw();
+  }
+  if (one === current) eyes();
+}
+
+/** The direction turned by so many radians about the vertical, and up. */
+function turned(eye, about_z, up) {
+  const out = turnOf(eye)[2], most = Math.PI / 2 - 1e-3;
+  const height = Math.min(Math.max(Math.asin(out[2]) + up, -most), most), way = Math.atan2(out[1], out[0]) + about_z;
+  return [Math.cos(height) * Math.cos(way), Math.cos(height) * Math.sin(way), Math.sin(height)].map((v) => v.toFixed(6)).join(",");
+}
+
+function eyes() {
+  for (const part of document.querySelectorAll("[data-space]")) part.hidden = !about.box;
+  if (!about.box) return;
+  const names = Object.keys(about.eyes), { eye } = current.view;
+  options($("eye"), [...names, ...(names.includes(eye) ? [] : [eye])].map((name) => [name, name]), eye);
+  $("section").value = current.view.section;
 }
 
 function moved(one) {
@@ -188,15 +249,20 @@ function listen(one) {
     canvas.focus({ preventScroll: true });
     if (event.button === 0 && $("mode").value === "query") { query(one, one.at(event)); return; }
     if (event.button === 0 && $("mode").value === "distance") { measure(one, one.at(event)); return; }
-    drag = { x: event.clientX, y: event.clientY, camera: { ...one.camera } };
+    drag = { x: event.clientX, y: event.clientY, camera: { ...one.camera },
+      eye: about.box && event.button === 0 && !event.shiftKey ? directionOf(one.view.eye) : null };
     canvas.setPointerCapture(event.pointerId);
   });
   canvas.addEventListener("pointermove", (event) => {
     const { x, y } = one.at(event);
-    $("place").textContent = `x ${short(x)}  y ${short(y)} m`;
+    $("place").textContent = about.box ? `→ ${short(x)}  ↑ ${short(y)} m` : `x ${short(x)}  y ${short(y)} m`;
     if (!drag) return;
     const k = one.camera.width / canvas.clientWidth;
     if (event.clientX === drag.x && event.clientY === drag.y) return;
+    if (drag.eye) {
+      looked(one, turned(drag.eye, (drag.x - event.clientX) * 0.008, (event.clientY - drag.y) * 0.008));
+      return;
+    }
     one.camera.x = drag.camera.x - (event.clientX - drag.x) * k;
     one.camera.y = drag.camera.y + (event.clientY - drag.y) * k;
     moved(one);
@@ -393,13 +459,15 @@ function shift(step) {
 async function query(one, at) {
   try {
     const found = await json("pick", { ...one.request(false), column: at.column, row: at.row });
-    one.points = found.object ? [[found.x, found.y]] : [];
+    const { turn } = one, place = [found.x, found.y, found.z];
+    one.points = found.object ? [turn ? [dot(turn[0], place), dot(turn[1], place)] : [found.x, found.y]] : [];
     one.marks();
     $("answer").hidden = !found.object;
     if (!found.object) { told(say("nothing")); return; }
     told("");
     $("answer-title").textContent = say("number", { object: found.label === found.object ? say(found.object) : found.label, number: found.number });
-    const rows = [["x", short(found.x), "m"], ["y", short(found.y), "m"], ...found.values.filter(([name]) => name !== "x" && name !== "y")];
+    const rows = [["x", short(found.x), "m"], ["y", short(found.y), "m"], ...(turn ? [["z", short(found.z), "m"]] : []),
+      ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name))];
     $("values").replaceChildren(...rows.map(([name, value, unit]) => {
       const row = document.createElement("tr");
       for (const text of [name, `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
@@ -417,7 +485,7 @@ function measure(one, at) {
   if (one.points.length !== 1) { one.points = [[at.x, at.y]]; told(say("first_point")); one.marks(); return; }
   one.points.push([at.x, at.y]);
   const [[x0, y0], [x1, y1]] = one.points;
-  told(say("distance", { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) }));
+  told(say(about.box ? "distance_flat" : "distance", { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) }));
   one.marks();
 }
 
@@ -467,6 +535,7 @@ function controls() {
   $("deformed").value = current.view.deformed;
   $("deformed").disabled = !about.displaced;
   $("title").value = current.view.title;
+  eyes();
 }
 
 function moment() {
@@ -681,6 +750,7 @@ async function begin() {
   if (camera) windows[0].camera = { x: (camera[0] + camera[1]) / 2, y: (camera[2] + camera[3]) / 2, width: camera[1] - camera[0] };
   choose(windows[0]);
   speak();
+  if (about.box) told(say("keys_space"));
   connect();
   new ResizeObserver(() => { for (const one of windows) one.redraw(); }).observe($("windows"));
 }
@@ -702,6 +772,7 @@ function key(event) {
   if (event.target.matches("input:not([type=checkbox]):not([type=range]), select, textarea") || event.ctrlKey || event.metaKey) return;
   const step = current ? current.camera.width / 10 : 0;
   const pan = (dx, dy) => { current.camera.x += dx; current.camera.y += dy; moved(current); };
+  const turn = (a, b) => looked(current, turned(directionOf(current.view.eye), a, b));
   const mode = (name) => { $("mode").value = name; modes(); };
   const actions = {
     "+": () => zoomed(current, 0.8), "=": () => zoomed(current, 0.8), "-": () => zoomed(current, 1.25),
@@ -709,6 +780,11 @@ function key(event) {
     " ": play, q: () => mode("query"), d: () => mode("distance"), m: () => mode("move"), Escape: () => mode("move"),
     ArrowLeft: () => pan(-step, 0), ArrowRight: () => pan(step, 0), ArrowUp: () => pan(0, step), ArrowDown: () => pan(0, -step),
   };
+  if (about?.box && event.shiftKey) {
+    const by = Math.PI / 12;
+    Object.assign(actions, { ArrowLeft: () => turn(-by, 0), ArrowRight: () => turn(by, 0), ArrowUp: () => turn(0, by),
+      ArrowDown: () => turn(0, -by) });
+  }
   const onSlider = event.target.matches("input[type=range]") && event.key.startsWith("Arrow");
   const onButton = event.target.matches("button, input") && event.key === " ";
   if (!current || !(event.key in actions) || onSlider || onButton) return;
@@ -733,6 +809,8 @@ function connect() {
   on("apply", "click", () => change({ filter: $("filter").value }));
   on("filter", "keydown", (event) => { if (event.key === "Enter") change({ filter: $("filter").value }); });
   on("deformed", "change", () => { current.view.deformed = Number($("deformed").value) || 0; current.redraw(); });
+  on("eye", "change", () => { looked(current, $("eye").value); current.fit(); moved(current); });
+  on("section", "change", () => { current.view.section = $("section").value.trim(); current.redraw(); });
   on("title", "change", () => { current.view.title = $("title").value; current.redraw(); });
   on("up", "click", () => shift(-1));
   on("down", "click", () => shift(1));

@@ -10,11 +10,10 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import backfill, build, connectivity, diagnostics, user_laws
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.definition import Numbers, Relaxation, finite
-from hpcdem.physics.fdem.kernels.creep import K11, K12, K22
-from hpcdem.physics.fdem.kernels.creep import MEMORY as CREEP_MEMORY
-from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, MEMORY, SHEAR, VOLUME
+from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
+from hpcdem.physics.fdem.kernels.plasticity import IN_SHEAR, IN_TENSION, SHEAR, VOLUME
 from hpcdem.physics.fdem.local import element_table
-from hpcdem.physics.fdem.properties import ELEMENT, MECH_BURGERS, model
+from hpcdem.physics.fdem.properties import ELEMENT, KELVIN_STRAIN, MECH_BURGERS, model
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.fdem.user_laws import MARK
@@ -306,7 +305,7 @@ def reset_state(sim: Blocks, elements: Numbers = None) -> None:
         sim.before_change()
         mine = np.isin(sim.number, at)
         plastic = sim.cold["plastic"]
-        for part in range(0, plastic.shape[1], MEMORY):
+        for part in range(0, plastic.shape[1], sim.memory("plastic")):
             for column in (SHEAR, VOLUME, IN_SHEAR, IN_TENSION):
                 plastic[mine, part + column] = 0.0
         sim.changed(stiffness=False)
@@ -337,8 +336,8 @@ def reset_kelvin_strain(sim: Blocks, elements: Numbers = None) -> None:
     sim.before_change()
     if "creep" in sim.cold:
         mine, memory = np.isin(sim.number, at), sim.cold["creep"]
-        for part in range(0, memory.shape[1], CREEP_MEMORY):
-            for column in (K11, K22, K12):
+        for part in range(0, memory.shape[1], sim.memory("creep")):
+            for column in IN_KELVIN[: len(KELVIN_STRAIN[sim.dim])]:
                 memory[mine, part + column] = 0.0
     sim.changed(stiffness=False)
 

@@ -16,6 +16,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.definition import finite
 from hpcdem.physics.fdem.kernels import creep as kernels
+from hpcdem.physics.fdem.kernels import creep_tets as space
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels import nodes as moving
 
@@ -26,6 +27,8 @@ RANGE = 100.0
 """Creep steps that adapt stay within the given one over and times this, unless other bounds are given."""
 FASTEST = 2.0
 """Most by which one creep step differs from the one before."""
+STRESS, STRAIN = (kernels.S11, kernels.S22, kernels.S12), (kernels.K11, kernels.K22, kernels.K12)
+"""In the plane: columns of stress and of strain of the Kelvin unit, of what elements remember."""
 FULL = 1.0 - 1e-9
 """A creep step this near to the end goes there."""
 
@@ -84,7 +87,8 @@ def check(sim: Blocks, time: float) -> None:
         raise CommandError(f"time must be positive, got {time}")
     for row in np.unique(sim.point_row[sim.node_exists()]).tolist():
         one = sim.conditions[row]
-        for axis, does, at in (("x", one.does_x, one.at_x), ("y", one.does_y, one.at_y)):
+        for axis in "xyz"[: sim.dim]:
+            does, at = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
             if does == moving.VELOCITY and at != 0.0 and one.constraint != moving.FIXED:
                 point = int(np.flatnonzero(sim.point_row == row)[0])
                 raise CommandError(
@@ -126,16 +130,11 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
     that is done, over the largest deviator of all. Equal on all ranks. Collective."""
     local, after = sim.local, sim.cold["creep"]
     found = np.zeros(2)
-    for rows, parts, law in (
-        (local.triangle_rows[local.creeping], 1, local.creep_law[local.creeping]),
-        (local.quad_rows[local.creeping_quads], 4, local.quad_creep_law[local.creeping_quads]),
-    ):
-        if not len(rows):
+    stress, kelvin = map(list, (space.BEFORE, space.IN_KELVIN) if sim.dim == 3 else (STRESS, STRAIN))
+    for (old, law), (new, _) in zip(local.creep_memory(before), local.creep_memory(after)):
+        if not len(law):
             continue
-        at, columns = rows - sim.n_left, parts * kernels.MEMORY
-        old, new = (memory[at, :columns].reshape(-1, kernels.MEMORY) for memory in (before, after))
-        table = np.repeat(local.creep_table[law], parts, axis=0)
-        stress, kelvin = slice(kernels.S11, kernels.S12 + 1), slice(kernels.K11, kernels.K12 + 1)
+        table = local.creep_table[law]
         way = new[:, stress] - old[:, stress]
         unit = table[:, kernels.PER_KELVIN, None] > 0.0
         rest = np.where(unit, way - 2.0 * table[:, kernels.KELVIN, None] * (new[:, kelvin] - old[:, kelvin]), 0.0)
@@ -146,8 +145,9 @@ def _change(sim: Blocks, before: np.ndarray) -> float:
 
 
 def _size(s: np.ndarray) -> np.ndarray:
-    """sqrt(s : s) of deviators (n, 3)."""
-    return np.sqrt(s[:, 0] ** 2 + s[:, 1] ** 2 + (s[:, 0] + s[:, 1]) ** 2 + 2.0 * s[:, 2] ** 2)
+    """sqrt(s : s) of deviators (n, 3) 11, 22, 12, in space (n, 5) with 13, 23."""
+    shear = s[:, 2] ** 2 if s.shape[1] == 3 else (s[:, 2:] ** 2).sum(axis=1)
+    return np.sqrt(s[:, 0] ** 2 + s[:, 1] ** 2 + (s[:, 0] + s[:, 1]) ** 2 + 2.0 * shear)
 
 
 def _warn_of_long_step(sim: Blocks) -> None:

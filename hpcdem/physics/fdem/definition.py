@@ -338,7 +338,7 @@ class ModelDefinition:
 
     def set_element_model(self, elements: Numbers, name: str, properties: Mapping[str, Value]) -> None:
         """Assign a model (model.blocks.properties) with all its properties to elements."""
-        if name != MECH_ISO_ELASTIC.name:
+        if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
             self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
@@ -470,7 +470,8 @@ class ModelDefinition:
         each = {name: self._spread(on, of, name, v) for name, v in given.items() if not _is_number(v)}
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
-            model.property(name)
+            if self.dim not in model.property(name).dims:
+                raise CommandError(f"in two dimensions there is no {name}")
         wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
         if not each and not before:
             return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
@@ -505,6 +506,7 @@ class ModelDefinition:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
                 out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
             elif isinstance(value, Over) and value.axis == TEMPERATURE:
+                self.refuse_in_space("tables over temperature")
                 if not model.has(temperature_table(name)):
                     raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
                 number = self._kept(model, name, value.table)
@@ -1097,4 +1099,5 @@ def _keep_moduli(old: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any
         pair = ["young", "poisson_ratio"] if changed[0] in ("young", "poisson_ratio") else rigidities
     else:
         pair = []
+    stays.pop("kelvin_strain_zz", None)  # it follows
     return {**stays, **{name: old[name] for name in pair}, **given}

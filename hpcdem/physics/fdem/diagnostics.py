@@ -18,7 +18,7 @@ from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
-from hpcdem.physics.fdem.properties import COHESIVE, KELVIN_STRAIN, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
+from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.state import Crack
 
@@ -73,16 +73,26 @@ QUANTITIES: dict[str, Quantity] = {
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
     "plastic_state": Quantity(
-        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8"
+        "element", "1", "yields in shear 1, in tension 2; did so before in shear 4, in tension 8", dims=BOTH
     ),
     "plastic_shear_strain": Quantity(
-        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator"
+        "element", "1", "shear of the plastic strain along its way, sqrt(e : e / 2) of the deviator", dims=BOTH
     ),
-    "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain"),
-    "plastic_work": Quantity("element", "J/m", "work of plastic flow"),
-    **{f"creep_strain_{c}": Quantity("element", "1", f"creep strain {c}, without volume") for c in ("xx", "yy", "xy")},
-    **{f"kelvin_strain_{c}": Quantity("element", "1", f"strain {c} of the Kelvin unit") for c in ("xx", "yy", "xy")},
-    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep"),
+    "plastic_volume_strain": Quantity("element", "1", "volume of the plastic strain", dims=BOTH),
+    "plastic_work": Quantity("element", "J/m", "work of plastic flow", dims=BOTH),
+    **{
+        f"creep_strain_{c}": Quantity(
+            "element", "1", f"creep strain {c}, without volume", dims=BOTH if c in ("xx", "yy", "xy") else (3,)
+        )
+        for c in COMPONENTS[3]
+    },
+    **{
+        f"kelvin_strain_{c}": Quantity(
+            "element", "1", f"strain {c} of the Kelvin unit", dims=BOTH if c in ("xx", "yy", "xy") else (3,)
+        )
+        for c in COMPONENTS[3]
+    },
+    "creep_work": Quantity("element", "J/m", "work lost in the dashpots of creep", dims=BOTH),
     **_vector("position", "node", "m", "position"),
     **_vector("displacement", "node", "m", "displacement"),
     **_vector("velocity", "node", "m/s", "velocity"),
@@ -132,7 +142,7 @@ PROPERTIES = {
         _STRENGTH.get(p.name, p.name): p.name
         for m in (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURGERS)
         for p in m.properties
-        if p.name not in KELVIN_STRAIN and not p.internal  # that strain at a time is a quantity
+        if not p.name.startswith("kelvin_strain") and not p.internal  # that strain at a time is a quantity
     },
     "joint": {{"friction": "joint_friction"}.get(p.name, p.name): p.name for p in COHESIVE.properties},
 }
@@ -142,7 +152,7 @@ for _on, _models in (("element", (MECH_ISO_ELASTIC, MECH_MOHR_COULOMB, MECH_BURG
         _model = next(m for m in _models if m.has(_name))
         QUANTITIES[_quantity] = Quantity(
             _on, _model.property(_name).unit, _model.property(_name).doc, False,
-            BOTH if _on == "joint" or MECH_ISO_ELASTIC.has(_name) else (2,),
+            BOTH,
         )  # fmt: skip
 
 JOINT_SIZE = {2: "length", 3: "joint_area"}
@@ -304,10 +314,11 @@ def _plastic_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndar
 
 def _creep_columns(sim: Blocks, some: slice | np.ndarray) -> dict[str, np.ndarray]:
     """What elements remember of creep, at the present positions; zero for those that never had a model that creeps."""
-    strains, lost = np.zeros((sim.n_own, 6)), np.zeros(sim.n_own)
+    components = COMPONENTS[3] if sim.dim == 3 else ("xx", "yy", "xy")
+    strains, lost = np.zeros((sim.n_own, 2 * len(components))), np.zeros(sim.n_own)
     if "creep" in sim.cold:
         strains, lost = sim.local.creep_strains(), sim.local.lost_by_creep()
-    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in ("xx", "yy", "xy")]
+    names = [f"{name}_{c}" for name in ("creep_strain", "kelvin_strain") for c in components]
     return {**dict(zip(names, strains[some].T.copy())), "creep_work": lost[some].copy()}
 
 
@@ -435,13 +446,13 @@ def homes(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
     mesh = sim.the_mesh()
     cells = mesh.cells[sim.number[sim.owned][some]]
     found = np.where((cells >= 0)[:, :, None], mesh.points[cells], 0.0)
-    return np.pad(found, ((0, 0), (0, 0), (0, found.shape[2] - 2))).reshape(len(cells), -1)
+    return np.pad(found, ((0, 0), (0, 0), (0, sim.stride - sim.dim))).reshape(len(cells), 4 * sim.stride)
 
 
 def home_corners(sim: Blocks, at: np.ndarray | None = None) -> np.ndarray:
     """The same by corners, (n_own, 4, 2) or (n_own, 4, 3)."""
     found = homes(sim, at)
-    return found.reshape(len(found), 4, -1)[:, :, : sim.dim]
+    return found.reshape(len(found), 4, sim.stride)[:, :, : sim.dim]
 
 
 def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -541,7 +552,7 @@ def unbalanced_ratio(sim: Blocks) -> float:
     """Sum of |unbalanced| over sum of |contributing| forces at the nodes, of the present positions. Collective."""
     seen, local, own = sim.evaluate(), sim.local, sim.owned
     felt, outside = seen.felt[local.my_nodes], seen.outside[local.my_nodes]
-    alone = seen.force[own].reshape(sim.n_own, 4, -1)[local.alone()].reshape(-1)
+    alone = seen.force[own].reshape(sim.n_own, 4, sim.stride)[local.alone()].reshape(-1)
     of_loads = sim.surface_loads.balance()[0]
     unbalanced = np.concatenate([np.abs(felt[:, : sim.dim] + outside).reshape(-1), np.abs(alone), *of_loads])
     total = exact_sum(contributing(sim, seen), sim.comm)

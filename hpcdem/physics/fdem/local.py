@@ -316,8 +316,13 @@ class Local:
             rows, self.quad_rows, sim.n_left, *self._of_initial, np.zeros(0) if heat is None else heat, self.s0,
             self.quad_s0,
         )  # fmt: skip
+        self._relieve()
+        return heat is not None
+
+    def _relieve(self) -> None:
+        """Stress without strain, with that of what elements remember."""
         if not (self.plastic or self.creeps):
-            return heat is not None
+            return
         self.said[:] = self.uncrept[:] = self.s0[: self.count]
         self.quad_said[:] = self.quad_uncrept[:] = self.quad_s0
         if self.creeps:
@@ -328,7 +333,6 @@ class Local:
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
             self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
             self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
-        return heat is not None
 
     def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
         """Stress without strain of these triangles and quads, less that of their creep strain."""
@@ -909,7 +913,20 @@ class Local:
 
     def lost_by_creep(self) -> np.ndarray:
         """What owned elements have lost by creep (n_own,) [J/m]."""
-        return self.crept()[0].reshape(self.sim.n_own, -1, creep.MEMORY)[:, :, creep.LOST].sum(axis=1)
+        parts = self.crept()[0].reshape(self.sim.n_own, self.sim.element_parts, -1)
+        return parts[:, :, creep.LOST].sum(axis=1)
+
+    def creep_memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """What the triangles that creep, and those of quads, remember in memory (n_own, 10 or 40): (n, 10), and the
+        rows (n,) of their models in the table."""
+        found = []
+        for rows, parts, law in (
+            (self.triangle_rows[self.creeping], 1, self.creep_law[self.creeping]),
+            (self.quad_rows[self.creeping_quads], 4, self.quad_creep_law[self.creeping_quads]),
+        ):
+            of = memory[rows - self.sim.n_left, : parts * creep.MEMORY]
+            found.append((of.reshape(-1, creep.MEMORY), np.repeat(law, parts)))
+        return found
 
     def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Constants (count + 3, 12) and stress without strain (count + 3, 4) [Pa] of the elastic triangles that those

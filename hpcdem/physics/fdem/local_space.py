@@ -12,7 +12,8 @@ from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels.joints import BROKEN, HISTORY, INTACT, NONE
-from hpcdem.physics.fdem.local import ALPHA, Evaluation, Local, element_table
+from hpcdem.physics.fdem.laws_space import LawsSpace
+from hpcdem.physics.fdem.local import ALPHA, Evaluation, element_table
 from hpcdem.physics.fdem.pairs import Surfaces
 from hpcdem.physics.fdem.pairs_space import ContactSpace, ShapesSpace
 from hpcdem.physics.fdem.tetrahedra import FACES
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
     from hpcdem.physics.fdem.state import State
 
 
-class LocalSpace(Local):
+class LocalSpace(LawsSpace):
     """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
 
     dim, force_width, stride = 3, tets.ROW, tets.STRIDE
-    plastic = creeps = yields = warms = False
+    warms = False
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -38,6 +39,7 @@ class LocalSpace(Local):
         self.passes = 0
         self.laws: list = []
         self._make_constants()
+        self._make_memories()
         self._make_joints()
         self._put_histories()
         self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
@@ -183,16 +185,20 @@ class LocalSpace(Local):
                 self.pairs.forces(sim.x, sim.v, sim.clock.dt)
         with timers("force"):
             self._fill(self.force, self.of_joints, sim.budget is not None)
+        if sim.options.dynamic:
+            sim.creep.passed = 0.0
         with timers("node"):
             self.move_nodes()
 
     def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
         sim, o = self.sim, self.sim.options
+        self.obey()
+        stressed = sim.stress0 is not None or self.plastic or self.creeps
         self._forces(
-            sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, sim.stress0 is not None,
-            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping, self.jointed,
-            self.slot_size, self.slot_link, self.slot_law, self.slot_kind, self.slot_state, self.slot_history,
-            self.head, self.follow, self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
+            sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, stressed, not o.large_strain, force,
+            o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping, self.jointed, self.slot_size, self.slot_link,
+            self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
+            self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
         self.pairs.add_to(force)
 
@@ -246,7 +252,7 @@ class LocalSpace(Local):
             (table, table.copy())
             for table in (
                 sim.v, self.outside, self.felt, pairs.history, pairs.touching, self.slot_law, self.slot_state,
-                self.head, self.follow, self.tally,
+                self.head, self.follow, self.tally, *self.obeyed_state(),
             )
         ]  # fmt: skip
         behind = np.flatnonzero(self.slot_state > INTACT)  # the others remember nothing
@@ -276,12 +282,15 @@ class LocalSpace(Local):
         """Stress (n_own, 6) [Pa] and, unless they are not wanted, elastic energies (n_own,) [J] of the owned elements,
         or of some of them (at: the how-manieth)."""
         sim = self.sim
+        s0, plastic, crept = self.remembered(flow)
         at = np.arange(sim.n_own) if at is None else at
         n = len(at)
         stress, energy = np.zeros((n, 6)), np.zeros(n if energies else 0)
         small = not sim.options.large_strain
         x = sim.x[at + sim.n_left]
-        tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], self.s0[at], small, 0, stress, energy)
+        tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], s0[at], small, 0, stress, energy)
+        if energies:
+            energy += self.remembered_energy(plastic, crept)[at]
         return stress, energy
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:

@@ -41,6 +41,8 @@ class Property:
     """Given by the program, not by name."""
     otherwise: str = ""
     """What counts where it is left out, if that is no number; commands see to what does not follow from others."""
+    dims: tuple[int, ...] = (2, 3)
+    """Dimensions of space in which it is there."""
     follows: str = ""
     """The property whose value it has where it is left out; it goes with that one as long as both are equal."""
 
@@ -229,6 +231,7 @@ def _agree(values: dict[str, Any]) -> bool:
 def _burgers(values: dict[str, Any]) -> None:
     """All four moduli from Young's modulus and Poisson's ratio, of which a bulk or Maxwell shear modulus that is given
     takes the place of what they give, or from two of the four."""
+    _kelvin_zz(values)
     own = ("young", "poisson_ratio", "maxwell_shear", "bulk")
     given = [name for name in own if name in values]
     if len(given) < 2:
@@ -304,7 +307,24 @@ USER = Model(
     _elastic,
 )  # fmt: skip
 
-KELVIN_STRAIN = ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy")
+
+def _kelvin_zz(values: dict[str, Any]) -> None:
+    """The strain of a Kelvin unit has no volume: zz is -xx - yy, also where it is said."""
+    xx, yy = (np.asarray(values[name]) for name in ("kelvin_strain_xx", "kelvin_strain_yy"))
+    zz = np.asarray(values.setdefault("kelvin_strain_zz", 0.0 - xx - yy))
+    wrong = np.abs(xx + yy + zz) > 1e-9 * np.maximum(np.maximum(np.abs(xx), np.abs(yy)), np.abs(zz))
+    if np.any(wrong):
+        one, other, third = (float(np.broadcast_to(v, wrong.shape)[wrong].flat[0]) for v in (xx, yy, zz))
+        raise CommandError(
+            f"kelvin_strain_zz must be -xx - yy = {-one - other:g}, as that strain has no volume, got {third:g}"
+        )
+
+
+KELVIN_STRAIN = {
+    2: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy"),
+    3: ("kelvin_strain_xx", "kelvin_strain_yy", "kelvin_strain_xy", "kelvin_strain_xz", "kelvin_strain_yz"),
+}
+"""Of them elements are told, in the plane and in space; zz follows."""
 MECH_BURGERS = Model(
     "mech_burgers",
     ELEMENT,
@@ -320,8 +340,12 @@ MECH_BURGERS = Model(
         Property("kelvin_viscosity", "Pa s", "viscosity of the Kelvin unit; 0: no Kelvin unit", 0.0),
         *(Property(name, "1", f"strain {name[-2:]} of the Kelvin unit at that moment; its zz is -xx - yy", 0.0,
                    low=-math.inf)
-          for name in KELVIN_STRAIN),
+          for name in KELVIN_STRAIN[2]),
         _friction("friction angle of its surfaces where they have no contact model"),
+        Property("kelvin_strain_zz", "1", "strain zz of the Kelvin unit at that moment, to be said of all three",
+                 low=-math.inf, optional=True, otherwise="-xx - yy", dims=(3,)),
+        *(Property(name, "1", f"strain {name[-2:]} of the Kelvin unit at that moment", 0.0, low=-math.inf, dims=(3,))
+          for name in KELVIN_STRAIN[3][3:]),
     ),
     _burgers,
     {"shear": "maxwell_shear"},

@@ -1,5 +1,6 @@
-"""What elements.py, tets.py, plasticity.py, joints.py, joints_space.py and nodes.py compute, written plainly for one
-element, joint or node, in small matrices. To be read beside them; tests hold the two against each other."""
+"""What elements.py, tets.py, plasticity.py, creep_tets.py, joints.py, joints_space.py and nodes.py compute, for one
+element, joint or node and in small matrices, written plainly. To be read beside them; tests hold the two against each
+other."""
 
 from __future__ import annotations
 
@@ -149,6 +150,19 @@ def returned_stress(trial: np.ndarray, rock: MohrCoulomb) -> np.ndarray:
     return (turn * best) @ turn.T
 
 
+def yielded_tetrahedron(
+    mesh: np.ndarray, x: np.ndarray, solid: Solid, rock: MohrCoulomb
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Forces (4, 3) [N] and stress (3, 3) [Pa] of a tetrahedron that has not flowed before, after its flow, and whether
+    it flowed; moduli are those of `rock`."""
+    d = deformation(mesh, x, np.zeros((4, 3)), solid.small)
+    lame = rock.bulk - 2.0 / 3.0 * rock.shear
+    trial = solid.stress0 + lame * np.trace(d.strain) * np.eye(3) + 2.0 * rock.shear * d.strain
+    stress = d.rotation @ returned_stress(trial, rock) @ d.rotation.T
+    flows = bool(yield_functions(np.linalg.eigvalsh(trial), rock).max() > 0.0)
+    return -d.area * d.gradients @ stress, stress, flows
+
+
 def yielded_quad(
     mesh: np.ndarray, x: np.ndarray, stress0: np.ndarray, zz: float, rock: MohrCoulomb, small: bool
 ) -> list[tuple[Deformation, np.ndarray, bool]]:
@@ -177,6 +191,37 @@ def yielded_quad(
             s = s + more * np.diag([1.0, 1.0, lame / (lame + rock.shear)])
             found.append((d, s, yes))
     return found
+
+
+def burgers_step(
+    strain: np.ndarray,
+    stress0: np.ndarray,
+    crept: np.ndarray,
+    kelvin: np.ndarray,
+    before: np.ndarray,
+    dt: float,
+    two_mu: float,
+    kelvin_shear: float,
+    per_kelvin: float,
+    per_maxwell: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Deviator of the stress [Pa], creep strain and strain of the Kelvin unit (3, 3) at the end of a creep step dt [s],
+    and what was lost [J/m3]: both rates with the mean of the ends of the step, see kernels/creep.py.
+
+    strain, stress0: at the end, and at zero strain; crept, kelvin, before: creep strain, strain of the Kelvin unit and
+    deviator of the stress at the beginning; two_mu: 2 G_M [Pa]; G_K [Pa], 1 / eta_K, 1 / eta_M [1/(Pa s)].
+    """
+    one = np.eye(3)
+    e, s0 = (a - np.trace(a) / 3.0 * one for a in (strain, stress0))
+    # S+ = s0 + 2 G_M (e - crept+), crept+ = crept + (kelvin+ - kelvin) + dt (S + S+) / (4 eta_M),
+    # kelvin+ (1 + h) = kelvin (1 - h) + dt (S + S+) / (4 eta_K), h = dt G_K / (2 eta_K): linear in (S+, kelvin+).
+    h, k, m = 0.5 * dt * kelvin_shear * per_kelvin, 0.25 * dt * per_kelvin, 0.25 * dt * per_maxwell
+    matrix = np.array([[1.0 / two_mu + m, 1.0], [-k, 1.0 + h]])
+    right = np.array([s0 / two_mu + e - crept + kelvin - m * before, (1.0 - h) * kelvin + k * before])
+    then, kelvin_then = np.linalg.solve(matrix, right.reshape(2, -1)).reshape(2, 3, 3)
+    rate = kelvin_then - kelvin
+    lost = 0.5 * m * ((before + then) ** 2).sum() + (2.0 / (per_kelvin * dt) * (rate**2).sum() if per_kelvin else 0.0)
+    return then, crept + rate + m * (before + then), kelvin_then, lost
 
 
 def joint_forces(

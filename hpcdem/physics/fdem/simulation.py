@@ -31,8 +31,8 @@ from hpcdem.halo.ownership import Ownership
 from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, user_laws
 from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
-from hpcdem.physics.fdem.kernels import creep as creeping
-from hpcdem.physics.fdem.kernels import elements, joints_space, plasticity, space, tets
+from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
+from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
 from hpcdem.physics.fdem.kernels.joints import BROKEN, MODE
 from hpcdem.physics.fdem.kernels.laws import SOFTENING_AREA
 from hpcdem.physics.fdem.kernels.strength import HISTORY as STRENGTH_HISTORY
@@ -150,7 +150,7 @@ class Blocks(State):
         before = self.element_row.copy()
         super().set_element_model(elements, name, properties)
         if name == MECH_BURGERS.name:
-            self._take_kelvin_strain(elements, KELVIN_STRAIN)
+            self._take_kelvin_strain(elements, KELVIN_STRAIN[self.dim])
         if self.log is None or self.stress0 is None:
             return
         at = np.flatnonzero((before != self.element_row) & (before > 0))
@@ -165,7 +165,7 @@ class Blocks(State):
 
     def element_property(self, elements: Numbers, properties: Mapping[str, Value]) -> None:
         super().element_property(elements, properties)
-        self._take_kelvin_strain(elements, [name for name in KELVIN_STRAIN if name in properties])
+        self._take_kelvin_strain(elements, [name for name in KELVIN_STRAIN[self.dim] if name in properties])
 
     def _take_kelvin_strain(self, elements: Numbers, names: Sequence[str]) -> None:
         """The strain of the Kelvin units becomes what their properties say, in these components; the model is open."""
@@ -175,9 +175,10 @@ class Blocks(State):
             if "creep" not in self.cold:
                 if not value[at].any():
                     continue
-                self.cold["creep"] = np.zeros((len(self.number), creeping.MEMORY * self.element_parts))
+                self.cold["creep"] = np.zeros((len(self.number), self.memory("creep") * self.element_parts))
             mine, memory = np.isin(self.number, at), self.cold["creep"]
-            for column in range(creeping.K11 + KELVIN_STRAIN.index(name), memory.shape[1], creeping.MEMORY):
+            first = IN_KELVIN[KELVIN_STRAIN[self.dim].index(name)]
+            for column in range(first, memory.shape[1], self.memory("creep")):
                 memory[mine, column] = value[self.number[mine]]
 
     def remove_table(self, name: str) -> None:
@@ -523,17 +524,17 @@ class Blocks(State):
         """From open to closed. frozen: keep the rebuild_state as it is (restart)."""
         self._check_ready()
         if self.yielding().any():
-            self._remember("plastic", plasticity.MEMORY)
+            self._remember("plastic", self.memory("plastic"))
             if self.softens():
                 self._remember("softening", STRENGTH_HISTORY)
         creeps = self.creeping().any()
         if self.creep.on and not creeps and self.log is not None:
             self.log.warn_once("no creep", "creep is on, but no element can creep: element c-model mech-burgers can")
         if creeps or "creep" in self.cold:
-            self._remember("creep", creeping.MEMORY)
+            self._remember("creep", self.memory("creep"))
         for kind, needed in (("yielding", "plastic" in self.cold), ("creep", "creep" in self.cold)):
             if needed:
-                self.prepare_kernels(kind)
+                self.prepare_kernels(f"{kind}-space" if self.dim == 3 else kind)
         for load in self.surface_loads:
             if load.kernel_kind:
                 self.prepare_kernels(load.kernel_kind)

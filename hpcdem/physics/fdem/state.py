@@ -15,6 +15,7 @@ import numpy as np
 from hpcdem.core.rebuild import RebuildState
 from hpcdem.physics.fdem.definition import ModelDefinition, Relaxation
 from hpcdem.physics.fdem.histories import Histories
+from hpcdem.physics.fdem.kernels import creep, creep_tets, plastic_tets, plasticity
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.surface_loads import SurfaceLoads
 from hpcdem.physics.model import Model
@@ -161,6 +162,11 @@ class State(ModelDefinition, Model):
     def element_parts(self) -> int:
         """Triangles for which a row of what elements remember has columns: quads have four."""
         return 4 if self.wide else 1
+
+    def memory(self, name: str) -> int:
+        """Columns of what an element, of a quad each triangle, remembers of yielding ("plastic") or of "creep"."""
+        of = {"plastic": (plasticity, plastic_tets), "creep": (creep, creep_tets)}[name]
+        return of[self.dim == 3].MEMORY
 
     def the_mesh(self) -> Mesh:
         """The mesh; CommandError if there is none."""

@@ -137,14 +137,39 @@ def _creep(mesh: Mesh, threads: int) -> None:
     creep.finish(sim, 1.0)
 
 
-def in_space(threads: int = 1) -> None:
-    """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
+def _in_space(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
     points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     below = [(x, y, z - 1.001) for x, y, z in points[:4]]
-    mesh = Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)])
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(mesh)
-    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.take_mesh(Mesh.of(points + below, [(0, 1, 2, 3), (1, 4, 2, 3), (5, 6, 7, 8)]))
+    changes.element_model(sim, None, law, {**ROCK, **properties})
+    return sim
+
+
+def yielding_in_space(threads: int = 1) -> None:
+    """Those of tetrahedra that yield."""
+    sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
+    sim.element_property([0], {"cohesion": Over("c", PLASTIC_STRAIN)})
+    sim.initial_stress(None, yy=1e3)
+    convergence.advance(sim, 2)
+    for name in ("strain_energy", "plastic_work"):
+        diagnostics.values(sim, name)
+
+
+def creeping_in_space(threads: int = 1) -> None:
+    """Those of tetrahedra that creep."""
+    sim = _in_space(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    sim.initial_stress(None, yy=1e3)
+    creep.switch(sim, True)
+    convergence.advance(sim, 2)
+    for name in ("strain_energy", "creep_strain_xx"):
+        diagnostics.values(sim, name)
+
+
+def in_space(threads: int = 1) -> None:
+    """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
+    sim = _in_space(threads, "mech_iso_elastic", {})
     sim.face_model([0], "contact_mohr_coulomb", {"penalty_normal": 1e10})
     sim.initial_stress(None, yy=1e3)
     sim.velocity_condition([0], vx=0.0, vz=0.0)

@@ -70,7 +70,14 @@ def skin(
     if plane is not None:
         far = (points - plane[0]) @ plane[1]
         points, made, owner, cut = _clipped(points, cells, far, rows, three, owner)
-    return Skin(points, made, np.searchsorted(rows, owner), cut)
+    return _bare(points, made, np.searchsorted(rows, owner), cut)
+
+
+def _bare(points: np.ndarray, cells: np.ndarray, of: np.ndarray, cut: np.ndarray) -> Skin:
+    """With those points only that are corners."""
+    used, corner = np.unique(np.where(cells < 0, cells[:, :1], cells), return_inverse=True)
+    corner = corner.reshape(cells.shape)
+    return Skin(points[used], np.where(cells < 0, -1, corner), of, cut)
 
 
 def middles(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -85,7 +92,7 @@ def cut_faces(points: np.ndarray, three: np.ndarray, plane: tuple[np.ndarray, np
     nobody = np.zeros(0, np.int64)
     far = np.zeros(len(points)) if plane is None else (points - plane[0]) @ plane[1]
     found = _clipped(points, np.zeros((0, 4), np.int64), far, nobody, three, np.arange(len(three)))
-    return Skin(*found)
+    return _bare(*found)
 
 
 def _clipped(

@@ -90,15 +90,26 @@ def renew_all(rows, first, parts, law, strength, table):
 @njit(cache=True, error_model="numpy")
 def flowed(row, j, part, bits, e11, e22, e12, e33, shear, volume, strength, table):
     """A triangle has flowed by this plastic strain, `shear` and `volume` of it: its strength afterwards."""
+    shortened = 0.0
+    if bits != SHEAR_NOW and bits != TENSION_NOW:
+        mean, half = 0.5 * (e11 + e22), 0.5 * (e11 - e22)
+        radius = math.sqrt(half * half + e12 * e12)
+        low, high = mean - radius, mean + radius
+        shortened = -(min(low, 0.0) + min(high, 0.0) + min(e33, 0.0))
+    grown(row, j, part, bits, shear, volume, shortened, strength, table)
+
+
+@njit(cache=True, error_model="numpy")
+def grown(row, j, part, bits, shear, volume, shortened, strength, table):
+    """The same from `shear` and `volume` of the plastic strain and, where it flowed in both ways, what its negative
+    principal values sum up to, without sign."""
     if bits == SHEAR_NOW:
         tension = 0.0
     elif bits == TENSION_NOW:
         shear, tension = 0.0, volume
     else:
-        mean, half = 0.5 * (e11 + e22), 0.5 * (e11 - e22)
-        radius = math.sqrt(half * half + e12 * e12)
-        low, high, m = mean - radius, mean + radius, table[row, 1]
-        l_s = -(min(low, 0.0) + min(high, 0.0) + min(e33, 0.0))
+        m = table[row, 1]
+        l_s = shortened
         shear, tension = l_s * math.sqrt((1.0 + m + m * m) / 3.0), max(volume - (m - 1.0) * l_s, 0.0)
     strength.history[j, 2 * part] += shear
     strength.history[j, 2 * part + 1] += tension

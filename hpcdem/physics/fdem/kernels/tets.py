@@ -68,7 +68,7 @@ def _product(a1, a2, a3, b1, b2, b3):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _turned(s11, s22, s12, s33, s13, s23, r):
+def turned(s11, s22, s12, s33, s13, s23, r):
     """R S R^T: 11, 22, 12, 33, 13, 23."""
     a11, a12, a13 = (
         _product(r[0], r[1], r[2], s11, s12, s13),
@@ -133,6 +133,22 @@ def _frame(f, small):
     )  # fmt: skip
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def strain(x, at, c11, c12, c13, c21, c22, c23, c31, c32, c33, small):
+    """Strain U - 1 (11, 22, 12, 33, 13, 23) of a tetrahedron in the frame that turns with it, and that frame; arguments
+    as for `gradient`."""
+    f = gradient(x, at, c11, c12, c13, c21, c22, c23, c31, c32, c33)
+    r = _frame(f, small)
+    e11, e22, e12, e33, e13, e23 = _in_frame(r, f)
+    return e11 - 1.0, e22 - 1.0, e12, e33 - 1.0, e13, e23, r
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def per_volume(c11, c12, c13, c21, c22, c23, c31, c32, c33):
+    """One over the volume of a tetrahedron in the mesh [1/m3], by the inverse of its sides."""
+    return 6.0 * _product(c11, c12, c13, c22 * c33 - c23 * c32, c23 * c31 - c21 * c33, c21 * c32 - c22 * c31)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _stress(n, small, beta, lanes):
     """Corner forces of stress, viscous parts included: f_l = -V sigma grad N_l, with the present shape functions, or
@@ -154,7 +170,7 @@ def _stress(n, small, beta, lanes):
         s12 = lanes[S12 + e] + (m * e12 + eta * d12)
         s13 = lanes[S13 + e] + (m * e13 + eta * d13)
         s23 = lanes[S23 + e] + (m * e23 + eta * d23)
-        xx, yy, xy, zz, xz, yz = _turned(s11, s22, s12, s33, s13, s23, r)
+        xx, yy, xy, zz, xz, yz = turned(s11, s22, s12, s33, s13, s23, r)
         # V grad N of the corners 2, 3, 4 in the mesh: rows of C over 6 det C; now: cof(F) times that.
         k11, k12, k13 = f[4] * f[8] - f[5] * f[7], f[5] * f[6] - f[3] * f[8], f[3] * f[7] - f[4] * f[6]
         k21, k22, k23 = f[7] * f[2] - f[8] * f[1], f[8] * f[0] - f[6] * f[2], f[6] * f[1] - f[7] * f[0]
@@ -356,24 +372,19 @@ def stresses(x, rows, c, s0, small, first, stress, energy):
         for k in range(16):
             lanes[X + U(k) * _PER_LANE] = x[rows[i], k]
         q = c[i]
-        f = gradient(lanes, X, q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8])
-        r = _frame(f, small)
-        e11, e22, e12, e33, e13, e23 = _in_frame(r, f)
-        e11, e22, e33 = e11 - 1.0, e22 - 1.0, e33 - 1.0
+        e11, e22, e12, e33, e13, e23, r = strain(lanes, X, q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], small)
         p, m = q[LAMBDA] * (e11 + (e22 + e33)), q[TWO_MU]
         s11, s22, s33 = p + m * e11, p + m * e22, p + m * e33
         s12, s13, s23 = m * e12, m * e13, m * e23
         out = stress[rows[i] - first]
-        out[0], out[1], out[2], out[3], out[4], out[5] = _turned(
+        out[0], out[1], out[2], out[3], out[4], out[5] = turned(
             s0[i, 0] + s11, s0[i, 1] + s22, s0[i, 2] + s12, s0[i, 3] + s33, s0[i, 4] + s13, s0[i, 5] + s23, r
         )
         if len(energy):
-            det = _product(
-                q[0], q[1], q[2], q[4] * q[8] - q[5] * q[7], q[5] * q[6] - q[3] * q[8], q[3] * q[7] - q[4] * q[6]
-            )
+            per = per_volume(q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8])
             normal = (s0[i, 0] + 0.5 * s11) * e11 + (s0[i, 1] + 0.5 * s22) * e22 + (s0[i, 3] + 0.5 * s33) * e33
             shear = (s0[i, 2] + 0.5 * s12) * e12 + (s0[i, 4] + 0.5 * s13) * e13 + (s0[i, 5] + 0.5 * s23) * e23
-            energy[rows[i] - first] = (normal + 2.0 * shear) / (6.0 * det)
+            energy[rows[i] - first] = (normal + 2.0 * shear) / per
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

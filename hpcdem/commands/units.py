@@ -1,0 +1,56 @@
+"""Declared units: what a value is measured against when a command gives it. Values are never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+
+from hpcdem.core import units
+from hpcdem.core.errors import CommandError
+
+Given = tuple[str, str, Any]
+"""Name of a property, its unit in SI, its value or values."""
+
+
+def declared(before: str, name: str, log: Any, late: bool) -> str:
+    """The system that a model has from here on. before: the one it has, "" none; late: values were given already.
+    CommandError for an unknown one, or if another one was declared before."""
+    new = units.system(name).name
+    if before not in ("", new):
+        raise CommandError(f"the units of this model are {units.CHOICES[before]} already; a new model can have others")
+    if log is not None and not before:
+        if late:
+            log.warn("units: values that were given before this line were not looked at")
+        if new != units.SI.name:
+            log.warn_once(
+                f"units {new}",
+                f"units {units.CHOICES[new]}: histories, charts and the energy table have these units; pictures and "
+                "tables that are made of frames name those of SI, and so do defaults in the reference: their numbers "
+                "count in the units declared",
+            )
+    return new
+
+
+def look(name: str, log: Any, given: Iterable[Given]) -> None:
+    """Warn of values that are unlikely in these units, "" none, once per property."""
+    if not name or log is None:
+        return
+    where = units.system(name)
+    for called, unit, value in given:
+        doubts = (units.doubt(where, called, unit, number) for number in _numbers(value))
+        found = next(filter(None, doubts), "")
+        if found:
+            log.warn_once(f"units of {called}", f"units {units.CHOICES[name]}: {found}")
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """All numbers in a value: a number, an array, or several of them."""
+    if isinstance(value, (bool, np.bool_, str)):
+        return
+    if isinstance(value, (int, float, np.integer, np.floating)):
+        yield float(value)
+    elif isinstance(value, (list, tuple, np.ndarray)):
+        for item in value:
+            yield from _numbers(item)

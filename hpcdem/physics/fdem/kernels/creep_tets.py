@@ -1,0 +1,156 @@
+"""Creep of tetrahedra after Burgers: what creep.py is in the plane, with its formulas, for the five components of a
+deviator: 11, 22, 12, 13, 23 (33 = -11 - 22)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from hpcdem.numerics.lanes import CAPACITY, U, lane
+from hpcdem.physics.fdem.kernels import creep as plane
+from hpcdem.physics.fdem.kernels import tets
+from hpcdem.physics.fdem.kernels.creep import KELVIN, LOST, PER_KELVIN, PER_MAXWELL, factors, stress_then
+from hpcdem.physics.fdem.kernels.tets import TWO_MU
+
+C13, C23, K13, K23, S13, S23 = range(plane.MEMORY, plane.MEMORY + 6)
+MEMORY = plane.MEMORY + 6
+"""Columns of what an element remembers (n, 16): those of the plane, then the two other shear components; lost [J]."""
+CREPT = (plane.C11, plane.C22, plane.C12, C13, C23)
+IN_KELVIN = (plane.K11, plane.K22, plane.K12, K13, K23)
+BEFORE = (plane.S11, plane.S22, plane.S12, S13, S23)
+"""Columns of creep strain, strain of the Kelvin unit, stress at the beginning of the creep step, by component."""
+PLACES = (0, 1, 2, 4, 5)
+"""Columns of the components in tables of stresses, see `tets.STRESSES`."""
+_PER = lane(1)
+
+
+@njit(cache=True, error_model="numpy")
+def squares(a):
+    """a : a of a deviator."""
+    a33 = a[0] + a[1]
+    return a[0] * a[0] + a[1] * a[1] + a33 * a33 + 2.0 * (a[2] * a[2] + a[3] * a[3] + a[4] * a[4])
+
+
+@njit(cache=True, error_model="numpy")
+def relieve(i, two_mu, base, crept, s0):
+    """Into row i of s0 the stress [Pa] of a tetrahedron without strain: base less 2 G_M times its creep strain (5,)."""
+    for k in range(5):
+        s0[i, PLACES[k]] = base[i, PLACES[k]] - two_mu * crept[k]
+    s0[i, 3] = base[i, 3] + two_mu * (crept[0] + crept[1])
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _deviator(a11, a22, a12, a33, a13, a23):
+    third = (a11 + (a22 + a33)) / 3.0
+    return a11 - third, a22 - third, a12, a13, a23
+
+
+@njit(cache=True, error_model="numpy")
+def _strain(x, c, small, lanes):
+    """Strain (11, 22, 12, 33, 13, 23) of a tetrahedron and its frame, by its rows of x and c; lanes: scratch."""
+    for k in range(16):
+        lanes[tets.X + U(k) * _PER] = x[k]
+    return tets.strain(lanes, tets.X, c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], small)
+
+
+@njit(cache=True, error_model="numpy")
+def _per_volume(q):
+    return tets.per_volume(q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0):
+    n, lanes = len(who), np.zeros(tets.LANES * CAPACITY)
+    crept, way, both_ends = np.empty(5), np.empty(5), np.empty(5)
+    for m in range(n * t // threads, n * (t + 1) // threads):
+        i = who[m]
+        j, row, two_mu = rows[i] - first_row, law[i], c[i, TWO_MU]
+        e11, e22, e12, e33, e13, e23, _ = _strain(x[rows[i]], c[i], small, lanes)
+        e = _deviator(e11, e22, e12, e33, e13, e23)
+        b = _deviator(base[i, 0], base[i, 1], base[i, 2], base[i, 3], base[i, 4], base[i, 5])
+        per_kelvin = table[row, PER_KELVIN]
+        back, kelvin, maxwell, div, ratio = factors(dt, two_mu, table[row, KELVIN], per_kelvin, table[row, PER_MAXWELL])
+        for k in range(5):
+            before, stress = memory[j, IN_KELVIN[k]], memory[j, BEFORE[k]]
+            old = memory[j, CREPT[k]]
+            both_ends[k] = stress + stress_then(e[k], b[k], old, before, stress, two_mu, back, kelvin + maxwell, div)
+            then = ratio * before + both_ends[k] * kelvin
+            way[k] = then - before
+            crept[k] = old + (way[k] + both_ends[k] * maxwell)
+            if keep:
+                memory[j, CREPT[k]], memory[j, IN_KELVIN[k]] = crept[k], then
+                # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
+                memory[j, BEFORE[k]] = b[k] + two_mu * (e[k] - crept[k])
+        relieve(i, two_mu, base, crept, s0)
+        if keep and dt > 0.0:
+            lost = 0.5 * squares(both_ends) * maxwell
+            if per_kelvin > 0.0:
+                lost += 2.0 * squares(way) / (per_kelvin * dt)
+            memory[j, LOST] += lost / _per_volume(c[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def creep(threads, *args):
+    """Let tetrahedra creep for dt [s], at the end of which they are at the present positions, see `creep.creep`.
+
+    who (m,): which; rows (n + 3,) i4: storage rows of all, of which the first owned one is `first_row`; x (n, 16);
+    c (n + 3, 16), see `tets.TET`; base (n, 8) [Pa]: stress without strain and creep; law (n + 3,): row of the table
+    (rows, 3) of models, see `creep.LAW`; small: small strains; keep: they remember it; memory (n_own, 16), see
+    `MEMORY`; s0 (n + 3, 8) [Pa]: stress without strain now.
+    """
+    for t in range(threads):
+        _creep(t, threads, *args)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def creep_threaded(threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0):
+    """The same on several threads."""
+    for t in prange(threads):
+        _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0)
+
+
+@njit(cache=True, error_model="numpy")
+def _columns(j, of, memory, out):
+    for k in range(5):
+        out[k] = memory[j, of[k]]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def relieve_all(who, rows, first, c, base, memory, s0):
+    """`relieve` for the tetrahedra `who` (m,)."""
+    crept = np.empty(5)
+    for m in range(len(who)):
+        i = who[m]
+        _columns(rows[i] - first, CREPT, memory, crept)
+        relieve(i, c[i, TWO_MU], base, crept, s0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def stored(rows, first, c, base, law, table, memory, out):
+    """Add to out (n_own,) what the elastic energy [J] differs by from that of an element with the initial stress s0 =
+    base - 2 G_M e_c, and what the springs of the Kelvin units store, see `creep.stored`."""
+    a = np.empty(5)
+    for i in range(len(rows)):
+        j, row = rows[i] - first, law[i]
+        _columns(j, CREPT, memory, a)
+        density = 0.5 * c[i, TWO_MU] * squares(a) + base[i, 3] * (a[0] + a[1])
+        density -= base[i, 0] * a[0] + base[i, 1] * a[1]
+        density -= 2.0 * (base[i, 2] * a[2] + base[i, 4] * a[3] + base[i, 5] * a[4])
+        if table[row, PER_KELVIN] > 0.0:
+            _columns(j, IN_KELVIN, memory, a)
+            density += table[row, KELVIN] * squares(a)
+        out[j] += density / _per_volume(c[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def strains(rows, first, x, c, small, memory, out):
+    """Creep strain and Kelvin strain, xx, yy, xy, zz, xz, yz each, along the axes of space: into out (n_own, 12)."""
+    lanes, a = np.zeros(tets.LANES * CAPACITY), np.empty(5)
+    for i in range(len(rows)):
+        j = rows[i] - first
+        _, _, _, _, _, _, r = _strain(x[rows[i]], c[i], small, lanes)
+        for part in range(2):
+            _columns(j, IN_KELVIN if part else CREPT, memory, a)
+            found = tets.turned(a[0], a[1], a[2], -(a[0] + a[1]), a[3], a[4], r)
+            for k in range(6):
+                out[j, 6 * part + k] = found[k]

@@ -1,0 +1,310 @@
+"""Tetrahedra that creep after Burgers: closed forms of creep and relaxation, the plain step, restarts, refusals.
+
+J(t) and what it becomes in the Laplace domain: see tests/blocks/test_creep.py."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hpcdem.core.errors import CommandError
+from hpcdem.halo.comm import SerialComm
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, reference, saved_state
+from hpcdem.physics.fdem.kernels import creep_tets
+from hpcdem.physics.fdem.simulation import Blocks
+from tests.blocks.test_creep import LOAD, ROCK, SALT, after_step, compliance, transform
+from tests.space.support import box, faces_on, nodes_on
+
+BURGERS = "mech_burgers"
+COMPONENTS = ("xx", "yy", "xy", "zz", "xz", "yz")
+
+
+def body(**other: float) -> Blocks:
+    """A cube of a metre that creeps, at rest, without conditions."""
+    sim = Blocks(SerialComm())
+    sim.take_mesh(box((2, 2, 2), (1.0, 1.0, 1.0), shaken=0.2))
+    changes.element_model(sim, None, BURGERS, {**SALT, **other})
+    sim.option(dynamic=False, collision=False)
+    return sim
+
+
+def loaded(xx: float, yy: float, zz: float, **other: float) -> Blocks:
+    """The cube on rollers on three sides, with these stresses on the others, in balance."""
+    sim = body(**other)
+    mesh = sim.mesh
+    for side, axis in (("left", "x"), ("front", "y"), ("bottom", "z")):
+        sim.velocity_condition(nodes_on(mesh, side), **{f"v{axis}": 0.0})
+    for side, stress in (("right", xx), ("back", yy), ("top", zz)):
+        sim.stress_condition(faces_on(mesh, side), normal=stress)
+    balanced(sim)
+    return sim
+
+
+def balanced(sim: Blocks) -> None:
+    assert convergence.solve(sim, ratio=1e-8).reason == "ratio"
+
+
+def crept(sim: Blocks, time: float, steps: int) -> None:
+    """So much creep time, in equal creep steps."""
+    end = sim.creep.time + time
+    creep.switch(sim, True, dt=time / steps)
+    for _ in range(steps):
+        creep.begin(sim, end)
+        balanced(sim)
+        creep.finish(sim, end)
+    assert sim.creep.time == end
+
+
+def waited(sim: Blocks, time: float, steps: int) -> None:
+    """The same where all nodes are held."""
+    end = sim.creep.time + time
+    creep.switch(sim, True, dt=time / steps)
+    for _ in range(steps):
+        creep.begin(sim, end)
+        creep.finish(sim, end)
+
+
+def held(sim: Blocks, gradient: np.ndarray) -> None:
+    """All nodes go to their places in the mesh times this deformation gradient (3, 3), and stay."""
+    sim.velocity_condition(None, vx=0.0, vy=0.0, vz=0.0)
+    sim.open_model()
+    places = sim.mesh.points @ np.asarray(gradient).T
+    sim.x.reshape(-1, 4, 4)[:, :, :3] = places[sim.mesh.cells[sim.number]]
+    sim.close_model()
+
+
+def matrices(sim: Blocks, name: str = "stress") -> np.ndarray:
+    """(ne, 3, 3) of the stress, the creep strain or that of the Kelvin units."""
+    s = np.array([diagnostics.values(sim, f"{name}_{c}") for c in COMPONENTS])
+    return s[[0, 2, 4, 2, 1, 5, 4, 5, 3]].T.reshape(-1, 3, 3)
+
+
+def width(sim: Blocks) -> np.ndarray:
+    """Strain xx, yy, zz of the cube."""
+    corner = [int(np.flatnonzero((sim.mesh.points == 1.0).all(axis=1))[0])]
+    return np.array([diagnostics.values(sim, f"displacement_{axis}", corner)[0] for axis in "xyz"])
+
+
+def test_uniaxial_stress() -> None:
+    """10 MPa along z: strain sigma [1 / 9K + J(t) / 3], 3.8889e-4 at once, 1.084397e-3 after 1e5 s; across it sigma
+    [1 / 9K - J(t) / 6]."""
+    sim = loaded(0.0, 0.0, 1e7)
+    assert width(sim)[2] == pytest.approx(3.8889e-4, rel=1e-3)
+    for time in (2e4, 8e4):
+        crept(sim, time, 20)
+        j = compliance(sim.creep.time) / 3.0
+        along, across = (1e7 * (1.0 / (9.0 * SALT["bulk"]) + part) for part in (j, -0.5 * j))
+        assert width(sim) == pytest.approx([across, across, along], rel=1e-3)
+    assert along == pytest.approx(1.084397e-3, rel=1e-5)
+    want = np.diag([-0.5, -0.5, 1.0]) * 1e7 / 3.0 * (compliance(1e5) - compliance(0.0))
+    assert np.abs(matrices(sim, "creep_strain") - want).max() < 2e-3 * np.abs(want).max()
+    assert np.abs(matrices(sim) - np.diag([0.0, 0.0, 1e7])).max() < 1e-4 * 1e7
+
+
+def test_true_triaxial_stress() -> None:
+    """Three stresses, by superposition; the energy that is given is stored or lost."""
+    stress = np.array([2e6, -5e6, 9e6])
+    sim = loaded(*stress)
+    given = 0.5 * float(stress @ width(sim))
+    before = width(sim)
+    crept(sim, 5e4, 25)
+    deviator = stress - stress.mean()
+    want = stress.mean() / (3.0 * SALT["bulk"]) + 0.5 * compliance(5e4) * deviator
+    assert width(sim) == pytest.approx(want, rel=1e-3)
+    given += float(stress @ (width(sim) - before))
+    lost, stored = (diagnostics.total(sim, name) for name in ("creep_work", "strain_energy"))
+    assert lost > 0.2 * given and stored + lost == pytest.approx(given, rel=1e-3)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_relaxation_at_fixed_strain(turned: bool) -> None:
+    """S(t) = 2 e D / N after a step of strain with all components, the mean stress stays; second order in the creep
+    step; turned with the body by any angle."""
+    n, d = transform(ROCK)
+    turn = Rotation.from_euler("zxy", (20.0, -50.0, 35.0), degrees=True).as_matrix() if turned else np.eye(3)
+    strain = np.array([[1e-4, 2e-5, -3e-5], [2e-5, -2e-4, 4e-5], [-3e-5, 4e-5, 5e-5]])
+    errors = []
+    for steps in (20, 200):
+        sim = body(**ROCK)
+        held(sim, turn @ (np.eye(3) + strain))
+        before = matrices(sim)
+        waited(sim, 3e5, steps)
+        left = after_step(d, n, 3e5) / ROCK["maxwell_shear"]
+        mean = np.trace(before, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+        errors.append(np.abs(matrices(sim) - (mean + left * (before - mean))).max() / np.abs(before).max())
+    assert left < 0.7 and errors[0] < 1e-3 and 80.0 < errors[0] / errors[1] < 120.0
+
+
+def test_a_creep_step_is_the_plain_one() -> None:
+    """Of random elements, strains, turns and memories: reference.burgers_step; in one part and in three, and a look at
+    it (keep) changes nothing."""
+    rng, n = np.random.default_rng(4), 23
+    sim = body()
+    held(sim, Rotation.random(random_state=2).as_matrix() @ (np.eye(3) + rng.uniform(-1e-3, 1e-3, (3, 3))))
+    local = sim.local
+    who = np.arange(0, 2 * n, 2)
+    memory = rng.uniform(-1e-4, 1e-4, (sim.n_own, creep_tets.MEMORY))
+    memory[:, creep_tets.BEFORE] *= 1e11
+    memory[:, 9] = 0.0
+    base = rng.uniform(-1e6, 1e6, (local.count, 8))
+    law = np.array([[5e9, 1e-14, 1e-16], [0.0, 0.0, 2e-16], [8e9, 1e-13, 0.0]])
+    row = rng.integers(0, 3, local.count + 3).astype(np.int32)
+    found = []
+    for threads, keep in ((1, True), (3, True), (1, False)):
+        mine, s0 = memory.copy(), np.zeros((local.count + 3, 8))
+        creep_tets.creep.py_func(
+            threads, who, local.rows, sim.n_left, sim.x, local.c, base, row, law, False, 1e4, keep, mine, s0
+        )
+        found.append((mine, s0))
+    assert all(np.array_equal(a, b) for a, b in zip(found[0], found[1]))
+    assert np.array_equal(found[2][0], memory) and np.array_equal(found[2][1], found[0][1])
+
+    def tensor(components: np.ndarray) -> np.ndarray:
+        a, b, c, d, e = components
+        return np.array([[a, c, d], [c, b, e], [d, e, -a - b]])
+
+    for i in who:
+        at = sim.mesh.cells[sim.number[i]]
+        corners = sim.x[i].reshape(4, 4)[:, :3]
+        strain = reference.deformation(sim.mesh.points[at], corners, np.zeros((4, 3)), False).strain
+        xx, yy, xy, zz, xz, yz = base[i, :6]
+        initial = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        parts = (tensor(memory[i, list(k)]) for k in (creep_tets.CREPT, creep_tets.IN_KELVIN, creep_tets.BEFORE))
+        stress, crept_, kelvin, lost = reference.burgers_step(
+            strain, initial, *parts, 1e4, local.c[i, creep_tets.TWO_MU], *law[row[i]]
+        )
+        mine, s0 = found[0][0][i], found[0][1][i]
+        assert tensor(mine[list(creep_tets.CREPT)]) == pytest.approx(crept_, abs=1e-15)
+        assert tensor(mine[list(creep_tets.IN_KELVIN)]) == pytest.approx(kelvin, abs=1e-15)
+        assert tensor(mine[list(creep_tets.BEFORE)]) == pytest.approx(stress, abs=1e-3)
+        assert mine[9] == pytest.approx(lost * sim.areas[sim.number[i]], rel=1e-9)
+        relieved = initial - local.c[i, creep_tets.TWO_MU] * crept_
+        assert s0[:6] == pytest.approx(relieved[[0, 1, 0, 2, 0, 1], [0, 1, 1, 2, 2, 2]], abs=1e-3)
+
+
+@pytest.mark.parametrize("component", ["xx", "yy", "xy", "xz", "yz"])
+def test_strain_of_the_kelvin_unit(component: str) -> None:
+    """Free of load, a Kelvin unit with the strain e_0 comes back to none, and the body deforms by
+    -e_0 (1 - exp(-G_K t / eta_K)). Each component alone; zz is -xx - yy."""
+    strain, axis = 1e-4, ["xyz".index(c) for c in component]
+    sim = body(maxwell_viscosity=0.0, **{f"kelvin_strain_{component}": strain})
+    e0 = np.zeros((3, 3))
+    e0[axis[0], axis[1]] = e0[axis[1], axis[0]] = strain
+    if axis[0] == axis[1]:
+        e0[2, 2] = -strain
+    sim.close_model()
+    assert np.abs(matrices(sim, "kelvin_strain") - e0).max() < 1e-12 * strain
+    balanced_at(sim, 4e4, 40)
+    gone = 1.0 - math.exp(-SALT["kelvin_shear"] * 4e4 / SALT["kelvin_viscosity"])
+    assert np.abs(matrices(sim, "creep_strain") + gone * e0).max() < 1e-3 * strain
+    assert np.abs(matrices(sim, "kelvin_strain") - (1.0 - gone) * e0).max() < 1e-3 * strain
+    move = np.array([diagnostics.values(sim, f"displacement_{a}") for a in "xyz"]).T
+    points = sim.mesh.points - sim.mesh.points.mean(axis=0)
+    gradient = np.linalg.lstsq(points, move - move.mean(axis=0), rcond=None)[0]
+    assert np.abs(0.5 * (gradient + gradient.T) + gone * e0).max() < 1e-3 * strain
+
+
+def balanced_at(sim: Blocks, time: float, steps: int) -> None:
+    """Creep of a body that nothing loads: the ratio of no forces is none, so steps are counted."""
+    end = time
+    creep.switch(sim, True, dt=time / steps)
+    for _ in range(steps):
+        creep.begin(sim, end)
+        convergence.advance(sim, 60)
+        creep.finish(sim, end)
+
+
+def test_zz_of_the_kelvin_unit() -> None:
+    """It may be said, of a strain without volume; then it follows again."""
+    sim = body()
+    sim.element_property(None, {"kelvin_strain_xx": 1e-4, "kelvin_strain_zz": -1e-4})
+    sim.element_property(None, {"kelvin_strain_yy": -3e-4})
+    sim.close_model()
+    assert np.abs(matrices(sim, "kelvin_strain") - np.diag([1e-4, -3e-4, 2e-4])).max() < 1e-15
+    with pytest.raises(CommandError, match=r"kelvin_strain_zz must be -xx - yy = 0.0002, as .* no volume, got 0.0001"):
+        sim.element_property(None, {"kelvin_strain_zz": 1e-4})
+    changes.reset_kelvin_strain(sim, np.arange(5))
+    assert not matrices(sim, "kelvin_strain")[:5].any() and matrices(sim, "kelvin_strain")[5:].all(axis=0)[0, 0]
+
+
+def test_components_of_space_are_refused_in_the_plane() -> None:
+    from tests.blocks.test_creep import body as plane
+
+    for name in ("kelvin_strain_zz", "kelvin_strain_xz", "kelvin_strain_yz"):
+        sim = plane()
+        with pytest.raises(CommandError, match=f"in two dimensions there is no {name}"):
+            sim.element_property(None, {name: 1e-4})
+        with pytest.raises(CommandError, match=f"there is no quantity {name} in two dimensions"):
+            diagnostics.values(sim, name)
+
+
+def test_elastic_as_long_as_creep_is_off() -> None:
+    """The bits of an elastic element, in motion."""
+    ends = []
+    for name in (BURGERS, "mech_iso_elastic"):
+        sim = Blocks(SerialComm())
+        sim.take_mesh(box((3, 2, 2), (1.0, 0.7, 0.5), shaken=0.2))
+        rock = {"density": 2500.0, "young": 30e9, "poisson_ratio": 0.3, "damp_factor": 0.1}
+        more = {"kelvin_shear": 1e9, "kelvin_viscosity": 1e5, "maxwell_viscosity": 1e5} if name == BURGERS else {}
+        changes.element_model(sim, None, name, {**rock, **more})
+        sim.option(collision=False)
+        sim.initial_stress(None, xx=1e6, yy=-2e6, zz=1e5, yz=3e5)
+        changes.set_velocity(sim, np.arange(4), 1.0, -2.0, 0.5)
+        convergence.advance(sim, 50)
+        ends.append(np.concatenate([diagnostics.values(sim, "position_x"), diagnostics.values(sim, "strain_energy")]))
+    assert np.array_equal(*ends)
+
+
+def test_creep_in_motion() -> None:
+    """In dynamic runs elements creep by the time of the model: all nodes held, the stress relaxes as in creep steps."""
+    fast = {**ROCK, "maxwell_viscosity": 6e7, "kelvin_viscosity": 4e6}
+    n, d = transform(fast)
+    sim = body(**fast)
+    held(sim, np.eye(3) + np.array([[1e-4, 2e-5, 0.0], [2e-5, -2e-4, 4e-5], [0.0, 4e-5, 0.0]]))
+    before = matrices(sim)
+    sim.option(dynamic=True)
+    creep.switch(sim, True)
+    convergence.advance(sim, 300)
+    left = after_step(d, n, sim.clock.time) / fast["maxwell_shear"]
+    mean = np.trace(before, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    assert 0.05 < left < 0.95 and sim.creep.time == sim.clock.time
+    assert np.abs(matrices(sim) - (mean + left * (before - mean))).max() < 1e-3 * np.abs(before).max()
+
+
+def test_creep_steps_that_follow_the_change() -> None:
+    """model creep ... change: the step grows while less and less changes."""
+    sim = loaded(0.0, 0.0, LOAD, maxwell_viscosity=0.0)
+    creep.switch(sim, True, dt=100.0, change=0.05)
+    grown = [sim.creep.dt]
+    for _ in range(12):
+        creep.begin(sim, 1e7)
+        balanced(sim)
+        creep.finish(sim, 1e7)
+        grown.append(sim.creep.dt)
+    assert grown[-1] > 10.0 * grown[0] and all(b >= a for a, b in itertools.pairwise(grown))
+
+
+def test_it_goes_on_in_mid_creep(tmp_path: Path) -> None:
+    """Saved within a creep step, and gone on from: the same bits."""
+    ends = []
+    for again in (False, True):
+        sim = loaded(1e6, 0.0, -LOAD)
+        creep.switch(sim, True, dt=2e3)
+        creep.begin(sim, 1e5)
+        convergence.advance(sim, 7)
+        if again:
+            saved_state.save(sim, tmp_path / "a.sav")
+            sim = Blocks(SerialComm())
+            saved_state.restore(sim, tmp_path / "a.sav")
+        convergence.advance(sim, 30)
+        creep.finish(sim, 1e5)
+        creep.begin(sim, 1e5)
+        convergence.advance(sim, 20)
+        names = ("position_z", "stress_zz", "creep_strain_zz", "kelvin_strain_xz", "creep_work", "strain_energy")
+        ends.append(np.concatenate([diagnostics.values(sim, name) for name in names]))
+    assert np.array_equal(*ends)
