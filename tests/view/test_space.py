@@ -111,6 +111,13 @@ def test_eyes_are_right_handed_with_z_up():
     assert space.axes_of(space.turn_of(EYES["iso"])) is None
 
 
+def test_the_picture_holds_the_deformed_shape(rock: Moment):
+    """The upper end, 0.2 m higher, with a factor of 5 at 3 m; in the mesh at 2 m."""
+    for deformed, top in ((0.0, 2.0), (1.0, 2.2), (5.0, 3.0)):
+        seen = scene(rock, default_view(rock).changed(eye="-y", deformed=deformed)).seen
+        assert seen.top == pytest.approx(top + 0.03 * 4.0)
+
+
 # ---- pixels ----------------------------------------------------------------------------------------------------------
 
 

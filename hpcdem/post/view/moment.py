@@ -152,14 +152,18 @@ class Moment:
             raise HpcdemError(f"this frame has no {name}; it has {', '.join(self.objects) or 'nothing'}")
         return self.objects[name]
 
-    def extent(self, turn: np.ndarray | None = None) -> tuple[float, float, float, float]:
-        """Left, right, bottom, top of what is there [m]; turn (3, 3): right, up and towards the eye, in space."""
+    def extent(
+        self, turn: np.ndarray | None = None, shifted: np.ndarray | None = None
+    ) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top of what is there [m]; turn (3, 3): right, up and towards the eye, in space; shifted
+        (k, dim): by which the points of elements are moved for the picture [m]."""
         low, high = np.full(2, np.inf), np.full(2, -np.inf)
         for name, objects in self.objects.items():
             if not objects.count or name in INSIDE:
                 continue
             shape = objects.read()
-            at = shape[0].reshape(-1, 2) if turn is None else shape[0] @ turn[:2].T
+            at = shape[0] if shifted is None or name != "elements" else shape[0] + shifted
+            at = at.reshape(-1, 2) if turn is None else at @ turn[:2].T
             around = shape[1][:, None] if objects.kind == DISCS else 0.0
             low = np.fmin(low, np.nanmin(np.where(np.isfinite(at), at, np.nan) - around, axis=0))
             high = np.fmax(high, np.nanmax(np.where(np.isfinite(at), at, np.nan) + around, axis=0))

@@ -152,10 +152,10 @@ def adjusted(
 
 
 def seen_of(moment: Moment, view: ModelView) -> View:
-    """The part of the plane: that of the view, else all that is there, with some air."""
+    """The part of the plane: that of the view, else all that is there, as it is drawn, with some air."""
     if view.camera is not None:
         return View(*view.camera)
-    left, right, bottom, top = moment.extent(turn_of(moment, view))
+    left, right, bottom, top = moment.extent(turn_of(moment, view), shift_of(moment, view.deformed))
     air = 0.03 * max(right - left, top - bottom, 1e-12)
     return View(left - air, right + air, bottom - air, top + air)
 
