@@ -127,6 +127,19 @@ def test_a_turned_mesh_does_the_same() -> None:
     assert np.abs(found[1] - found[0]).max() < 1e-12 * np.abs(found[0]).max() * 10.0
 
 
+def test_principal_stresses_of_a_last_frame() -> None:
+    """Elements that are not finite have none; the others have theirs."""
+    sim = body(box((1, 1, 1), (1.0, 1.0, 1.0)))
+    sim.initial_stress(None, xx=-3e6, yy=1e6, zz=2e6, xy=1.5e6)
+    sim.close_model()
+    whole = [diagnostics.values(sim, name) for name in ("stress_max", "stress_min")]
+    assert whole[0] == pytest.approx(np.full(6, 2e6)) and whole[1] == pytest.approx(np.full(6, -3.5e6))
+    sim.x[2] = np.nan
+    for one, before in zip(("stress_max", "stress_min"), whole):
+        assert np.isnan(diagnostics.values(sim, one)[sim.number[2]])
+        assert np.array_equal(np.delete(diagnostics.values(sim, one), sim.number[2]), np.delete(before, sim.number[2]))
+
+
 def test_what_is_stored_is_given_back() -> None:
     """Kinetic and elastic energy of a body that rings freely: without damping their sum stays."""
     sim = body(box((4, 3, 3), (1.0, 0.75, 0.75), split=12))

@@ -461,7 +461,8 @@ def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
         radius = np.hypot(half, stress[:, 2])
         return mean + radius, mean - radius
-    found = np.linalg.eigvalsh(stress[:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
+    found, good = np.full((len(stress), 3), np.nan), np.isfinite(stress).all(axis=1)  # not all are in a last frame
+    found[good] = np.linalg.eigvalsh(stress[good][:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
     return found[:, 2].copy(), found[:, 0].copy()
 
 
