@@ -19,7 +19,7 @@ SAMPLES: dict[str, tuple[str, object]] = {
     "<f>|table <s> over x|y|plastic-strain|temperature|field <s>": ("0.25", 0.25),
     "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
     "0|1|2": ("2", 2), "5|6|12": ("6", 6), "2|3": ("2", 2), "<s>": ("'a'", "a"),
-    "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),
+    "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "(<f>,<f>)": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),
     "<v> <v> ...": ("(0,0) (1,0) (1,1)", [(0, 0), (1, 0), (1, 1)]), "<s> ...": ("'a' 'b'", ["a", "b"]),
 }  # fmt: skip
 """By the pattern of a kind: as it is written, and as an expression gives it."""
@@ -54,6 +54,9 @@ class Writer:
         text, value = SAMPLES[kind.pattern] if kind.pattern in SAMPLES else (kind.words[0], kind.words[0])
         if text == "0.25" and not fits(kind, value):
             return "1.5", 1.5
+        if text == "'a'" and not fits(kind, value):
+            word = next(one for one in ("iso", "x=1.5") if fits(kind, one))
+            return f"'{word}'", word
         return text, value
 
     def option(self, option: Option) -> str:
