@@ -216,7 +216,7 @@ def test_what_cannot_creep_is_refused(tmp_path, lines, told):
 
 def test_coupled_blocks_do_not_creep(tmp_path):
     rock = Rock(tmp_path, SHEAR + "pcdc model creep on dt 1\n")
-    particles = SimpleNamespace(outdir=tmp_path / "particles")
+    particles = SimpleNamespace(outdir=tmp_path / "particles", settings=SimpleNamespace(units=""))
     with pytest.raises(CommandError, match="do not creep: model creep off comes first"):
         coupling.couple(rock.project, particles)
     rock("pcdc model creep off\n")
