@@ -72,7 +72,7 @@ class LocalSpace(LawsSpace):
     def _make_joints(self) -> None:
         """Slots of the faces, four per tetrahedron."""
         sim, mesh = self.sim, self.sim.the_mesh()
-        self.slots = self.slots_of_triangles = 4 * self.count
+        self.slots = 4 * self.count
         padded = self.slots + 12  # lanes are filled four tetrahedra at a time
         self.slot_face, self.slot_link = np.zeros(padded, np.int64), np.zeros((padded, 3), np.int32)
         self.slot_size, self.slot_state = np.ones(padded), np.zeros(padded, np.uint8)

@@ -721,11 +721,12 @@ class Blocks(State):
                 continue
             worst = np.argmin(softening / elastic)
             row = rows[worst]
+            where = "a face" if self.dim == 3 else "an edge"
             others = f", and {int(brittle.sum()) - 1} other sets of properties," if brittle.sum() > 1 else ""
             self.log.warn_once(
                 f"snap back {row} {energy}",
                 f"joints with {strength} {t[row]:g} Pa, {energy} {g[row]:g} N/m{others} break within a tenth of their "
-                f"elastic way, {elastic[worst]:.3g} m at a face of {longest[row]:.3g} m: what the body stores is set "
+                f"elastic way, {elastic[worst]:.3g} m at {where} of {longest[row]:.3g} m: what the body stores is set "
                 "free at once; smaller elements or a higher penalty help",
             )
 
