@@ -1,7 +1,7 @@
-# A disc of rock, 50 mm wide and 20 mm thick, is pressed across between two flat strips until it splits (Brazilian test),
-# in three dimensions: tetrahedra with a joint on every inner face. The crack begins where the strips end wedges of crushed
-# rock and runs through the middle; 2 P / (pi D t) at the peak is the indirect tensile strength, above that of the joints
-# (5 MPa), as they soften over a length that is not small beside the disc and the test is a fast one. Some minutes on one
+# A disc of rock, 50 mm wide and 20 mm thick, is pressed across between two strips until it splits (Brazilian test),
+# in three dimensions: tetrahedra with a joint on every inner face. The crack runs through the middle, between wedges of
+# crushed rock under the strips; 2 P / (pi D t) at the peak is the indirect tensile strength, above that of the joints
+# (5 MPa), as they soften over a length that is not small beside the disc and the test is a fast one. A minute on one
 # core. Needs the extra [mesh].
 #
 #   hpcdem brazilian_disc.sc      data/split_<step>.png: the halves; brazilian_disc.png: force over shortening
