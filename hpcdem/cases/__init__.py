@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
-    "tunnel": "Tunnel", "stability": "SlopeStability", "support": "Support", "pillar": "Pillar", "creep": "Creep",
+    "tunnel": "Tunnel", "stability": "SlopeStability", "wedge": "Wedge", "support": "Support", "pillar": "Pillar", "creep": "Creep",
     "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",

@@ -37,11 +37,15 @@ def fracture_set(
 ) -> FractureSet:
     """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
     greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see FractureSet."""
-    longest = math.inf if length[4] is None else length[4]
     return FractureSet(
-        Orientation(*orientation), Length(*length[:4], longest), *density, scanline,
+        Orientation(*orientation), length_law(length), *density, scanline,
         "reached" if reached else "random", ends_at,
     )  # fmt: skip
+
+
+def length_law(given: tuple[str, float, float, float, float | None]) -> Length:
+    """(kind, value, spread, least, greatest or None) [m]."""
+    return Length(*given[:4], math.inf if given[4] is None else given[4])
 
 
 def history_name(name: str) -> str:

@@ -216,11 +216,11 @@ THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSI
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
 _IN_SPACE = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
-    for kind in (VECTOR, OPTIONAL_VECTOR)
+    for kind in (VECTOR, OPTIONAL_VECTOR, VECTORS)
 }
 _IN_ANY = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
-    for kind in (VECTOR, OPTIONAL_VECTOR)
+    for kind in (VECTOR, OPTIONAL_VECTOR, VECTORS)
 }
 
 

@@ -33,6 +33,7 @@ from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
+from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles
 
 MODELS = {
     model.keyword.name: model.of
@@ -198,7 +199,31 @@ def _bolt(arguments: Mapping[str, Any]) -> None:
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
+    if "radius" in arguments:
+        disc_set(arguments).check("fractures")
+        return
     values.fracture_set(**fracture_words(arguments)).check("fractures")
+
+
+def disc_set(arguments: Mapping[str, Any]) -> DiscSet:
+    """The statistics of `geometry create fractures` in three dimensions."""
+    densities = [name for name in ("p10", "p30", "p32") if name in arguments]
+    if len(densities) != 1:
+        raise CommandError("fractures need one density: p10, p30 or p32")
+    orientation, radius = arguments["orientation"], _given_word(arguments, "radius")
+    kind, dip = orientation["value"]
+    return DiscSet(
+        Poles(kind, dip, orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
+        values.length_law((*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest"))),
+        densities[0], arguments[densities[0]], arguments.get("scan-direction", (0.0, 0.0, 1.0)),
+        arguments.get("reached", False),
+    )  # fmt: skip
+
+
+def _given_word(arguments: Mapping[str, Any], name: str) -> Any:
+    if name not in arguments:  # it was not known yet how many dimensions there are
+        raise CommandError(f"fractures in {'three' if name == 'radius' else 'two'} dimensions need a {name}")
+    return arguments[name]
 
 
 def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -206,7 +231,7 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
     densities = [name for name in ("p10", "p20", "p21") if name in arguments]
     if len(densities) != 1:
         raise CommandError("fractures need one density: p10, p20 or p21")
-    orientation, length = arguments["orientation"], arguments["length"]
+    orientation, length = arguments["orientation"], _given_word(arguments, "length")
     return {
         "orientation": (*orientation["value"], orientation.get("spread", 0.0)),
         "length": (*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
@@ -217,7 +242,8 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     **{f"geometry create {name}": _make_shape(name) for name in
-       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder")},
+       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
+        "plane")},
     "geometry create fractures": _fractures,
     "bolt create polyline": _bolt,
     "mesh structured": _rectangle,
