@@ -677,7 +677,7 @@ _MODEL = (
                             default="static runs 1 000 000, dynamic ones 10 000 000; beside time: 0"),
                      Option("on-f{ailure}", (choice("stop", "continue"),), "stop: with exit code 3; continue: with a "
                             "warning, the script looks at pcdc.solved", default="stop"),
-                     Option("ela{stic}", (), "at once, without steps", dims=PLANE),
+                     Option("ela{stic}", (), "at once, without steps"),
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
                             "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
@@ -694,10 +694,10 @@ _MODEL = (
                             "passes", dims=PLANE),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
                             "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
-                            "it is there, from 400 000 unknowns on", default="auto", dims=PLANE),
+                            "it is there, from 400 000 unknowns on, in space from 20 000", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
-                            "halved", "", "1", dims=PLANE)), dims=BOTH),
+                            "halved", "", "1")), dims=BOTH),
     Command("mod{el} sub-s{tep}", "Steps of the parts of a coupled calculation.",
             ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
