@@ -249,8 +249,8 @@ def test_pressure_pushes_walls_apart_and_the_aperture_follows() -> None:
     sim, flow = _sandwich()
     convergence.advance(sim, 1500)
     wanted = 1e-4 + 2.0 * 2e6 * 0.1 / 1.2e9
-    assert flow.values("flow-channel", "aperture") == pytest.approx(wanted, rel=5e-3)
-    assert flow.values("flow-node", "volume").sum() == pytest.approx(wanted * 0.06, rel=5e-3)
+    assert flow.values("flow-channel", "aperture") == pytest.approx(wanted, rel=1e-6)
+    assert flow.values("flow-node", "volume").sum() == pytest.approx(wanted * 0.06, rel=1e-6)
     assert flow.account()["relative"] < 1e-12
     still, flow = _sandwich(one_way=True)
     convergence.advance(still, 300)

@@ -512,12 +512,11 @@ class Flow(SurfaceLoad):
         one, two = blocks.where[faces // 4], blocks.where[other // 4]
         lost = faces[(one < 0) | (two < 0)]
         stride = blocks.local.stride
-        if blocks.dim == 2:
-            corners = faces % 4, other % 4
-        else:
-            corners = tuple(blocks.the_mesh().face_corners(of) % 4 for of in (faces, other))
+        near, far = faces % 4, other % 4
+        if blocks.dim == 3:
+            near, far = (blocks.the_mesh().face_corners(of) % 4 for of in (faces, other))
             one, two = one[:, None], two[:, None]
-        sides = np.maximum(one, 0) * width + stride * corners[0], np.maximum(two, 0) * width + stride * corners[1]
+        sides = np.maximum(one, 0) * width + stride * near, np.maximum(two, 0) * width + stride * far
         law = np.repeat((self.row[np.minimum(faces, other)] - 1).astype(np.int64), LINKS[blocks.dim])
         return sides, law, int(lost[0]) if len(lost) else -1
 
