@@ -140,7 +140,7 @@ class Geometry(Words):
         self._shape("cylinder", as_layer, first=first, second=second, radius=radius)
 
     def cone(self, first: Point, second: Point, radius: float, other: float, as_layer: str) -> None:
-        """In three dimensions: a round cone, or a part of one, between the middles of its ends, with a radius at each."""
+        """In three dimensions: a round cone, or a part of one, by the middles and radii of its ends."""
         self._shape("cone", as_layer, first=first, second=second, radius=radius, other=other)
 
     def disc(self, centre: Point, normal: Point, radius: float, as_layer: str) -> None:

@@ -141,13 +141,14 @@ EQUILIBRIUM = """
 line = np.cross(joint_a[0], joint_b[0])
 line *= -np.sign(line[2]) / np.linalg.norm(line)
 press_a, press_b, pull = np.linalg.solve(np.column_stack([joint_a[0], joint_b[0], -line]), np.array([0.0, 0.0, 1.0]))
-equilibrium = float((press_a * math.tan(math.radians(friction_a)) + press_b * math.tan(math.radians(friction_b))) / pull)
+tan_a, tan_b = math.tan(math.radians(friction_a)), math.tan(math.radians(friction_b))
+equilibrium = float((press_a * tan_a + press_b * tan_b) / pull)
 plunge = math.degrees(math.asin(-float(line[2])))
 trend = math.degrees(math.atan2(float(line[0]), float(line[1])))
 """
 SEARCH = """
-# Each trial begins with the settled slope; tan(friction) is that of the joints over the factor. Up or down by a quarter,
-# then by halves, until the range in which the wedge slides is small enough. The last one shows how.
+# Each trial begins with the settled slope; tan(friction) is that of the joints over the factor. Up or down by a
+# quarter, then by halves, until the range in which the wedge slides is small enough. The last one shows how.
 trials, stands, slides, shown, trend_moved = [], 0.0, math.inf, 0.0, math.nan
 while math.isinf(slides) or slides - stands > precision * slides or shown != slides:
     if not math.isinf(slides) and slides - stands <= precision * slides:
@@ -178,7 +179,8 @@ while math.isinf(slides) or slides - stands > precision * slides or shown != sli
             stands = factor
         else:
             slides, trend_moved = factor, math.degrees(math.atan2(way.X, way.Y))
-        print('factor %.4g: %s, moved by %.4g mm, %d steps' % (factor, 'stays' if stays else 'slides', 1e3*moved, steps))
+        what = 'stays' if stays else 'slides'
+        print('factor %.4g: %s, moved by %.4g mm, %d steps' % (factor, what, 1e3 * moved, steps))
 factor = 0.5 * (stands + slides)
 error = factor / equilibrium - 1
 print('factor of safety %.4g, by limit equilibrium %.4g: %.2g %% off' % (factor, equilibrium, 100 * error))

@@ -155,7 +155,7 @@ def test_faces_of_a_drawing_become_a_body(tmp_path: Path) -> None:
     assert len(body.triangles()) == 12 and body.distance(np.array([[0.5, 0.5, 0.25]])) == pytest.approx([-0.25])
     with pytest.raises(HpcdemError, match=r"ore\.dxf: the shell is not closed"):
         cad.read(tmp_path / "ore.dxf")
-    with pytest.raises(HpcdemError, match="no 3DFACE in layer 'gold' .layers with some: 'else', 'ore'"):
+    with pytest.raises(HpcdemError, match=r"no 3DFACE in layer 'gold' .layers with some: 'else', 'ore'"):
         cad.read(tmp_path / "ore.dxf", "gold")
 
 

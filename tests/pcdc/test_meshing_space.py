@@ -32,7 +32,7 @@ pcdc geometry create plane (0,0,0.5) (0,0.1,1) as-layer 'fault'
 """
 JOINTS = """
 pcdc element c-model mech-iso-e property density 2700 young 50e9 poisson-ratio 0.25
-pcdc face-joint c-model c-i-c-i property friction 30 cohesion 8e6 tensile-strength 2e6 gf1 50 gf2 200 penalty-normal 5e11
+pcdc face-joint c-model c-i-c-i property friction 30 cohesion 8e6 tensile-strength 2e6 gf1 50 gf2 200 p-n 5e11
 pcdc face-joint group 'set 1' range geometry 'set 1'
 pcdc face-joint group 'fault' range geometry 'fault'
 pcdc face-joint property friction 12 range group 'fault'

@@ -46,8 +46,8 @@ def create(
 
     refine: (layer, size there [m], distance over which it grows [m] or None); holes: layers whose inside stays empty;
     regions: (layer, group) of parts with a group of their own; embedded: layers that become edges; cracks: layers that
-    become edges with a crack. In space embedded and cracks are layers of surfaces, which become faces; bodies: each body
-    of the outline is a group of its own, by its name in the file it is of, else by the layer and its number.
+    become edges with a crack. In space embedded and cracks are layers of surfaces, which become faces; bodies: each
+    body of the outline is a group of its own, by its name in the file it is of, else by the layer and its number.
     """
     for layer in (outline, *(name for name, *_ in refine), *holes, *(name for name, _ in regions), *embedded, *cracks):
         _ = project.layers[layer]

@@ -780,7 +780,7 @@ _GEOMETRY = (
                 Option("p32", (POSITIVE,), "density: area of fractures per volume", "1/m", dims=SPACE),
                 Option("scan-l{ine}", (FLOAT,), "direction of the line of p10", "degrees", "0", dims=PLANE),
                 Option("scan-dir{ection}", (VECTOR,), "direction of the line of p10", "", "(0,0,1)", dims=SPACE),
-                Option("reached", (), "p20 or p21, p30 or p32 is met as nearly as whole fractures can, not in the mean"),
+                Option("reached", (), "p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean"),
                 Option("ends-at", (NOT_NEGATIVE,), "share of the crossings with earlier fractures at which one ends",
                        "1", "0", dims=PLANE),
                 Option("ins{ide}", (STRING,), "the layer that bounds them", required=True),
@@ -821,8 +821,8 @@ _GEOMETRY = (
                      Option("axis", (VECTOR,), "direction of the axis", required=True),
                      Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
                      Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE),
-    Command("geom{etry} imp{ort}", "Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or what "
-            "the triangles of an STL or DXF file (3DFACE) enclose.",
+    Command("geom{etry} imp{ort}", "Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or "
+            "what the triangles of an STL or DXF file (3DFACE) enclose.",
             ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
             (_leading("file", FILE, "name of the file"),),
             (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all")), dims=BOTH),

@@ -214,7 +214,9 @@ def disc_set(arguments: Mapping[str, Any]) -> DiscSet:
     kind, dip = orientation["value"]
     return DiscSet(
         Poles(kind, dip, orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
-        values.length_law((*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest"))),
+        values.length_law(
+            (*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest"))
+        ),
         densities[0], arguments[densities[0]], arguments.get("scan-direction", (0.0, 0.0, 1.0)),
         arguments.get("reached", False),
     )  # fmt: skip

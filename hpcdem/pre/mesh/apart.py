@@ -1,4 +1,4 @@
-"""Gmsh in a process of its own: a crash of the library (its optimisers, damaged files) does not take the run with it."""
+"""Gmsh in a process of its own: a crash of the library (its optimisers, damaged files) does not end the run."""
 
 from __future__ import annotations
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh import apart, optional
+from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.solids import Brep, Shell
 
 MOST_TRIANGLES = 20_000
@@ -63,9 +63,7 @@ def _shell(path: Path, triangles: np.ndarray) -> Shell:
     except CommandError as error:
         raise HpcdemError(f"{path}: {error}") from None
     if pieces > 1:
-        raise HpcdemError(
-            f"{path}: the triangles make {pieces} shells, expected one; a DXF file can have a layer for each"
-        )
+        raise HpcdemError(f"{path}: the triangles make {pieces} shells, expected one; DXF files have layers")
     return shell
 
 

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh import apart, optional, snap
+from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.sizes import GROWTH, not_too_many
 from hpcdem.pre.mesh.solids import restored, state
 

@@ -83,8 +83,8 @@ class Poles:
 @dataclass(frozen=True)
 class DiscSet:
     """One set of discs: measure "p10", "p30" or "p32" with its density; along: direction of the scan line of p10;
-    reached: discs are made until p30 or p32 is met in the bodies, as nearly as whole discs can, instead of a number from
-    the Poisson distribution."""
+    reached: discs are made until p30 or p32 is met in the bodies, as nearly as whole discs can, instead of a number
+    from the Poisson distribution."""
 
     poles: Poles
     radius: Length
