@@ -58,6 +58,8 @@ class Brazilian(Rock):
     def _fits(self) -> Brazilian:
         if self.size > self.diameter / 8:
             raise ValueError(f"size is {self.size:g}, expected at most an eighth of diameter, {self.diameter / 8:g} m")
+        if self.dim == 2 and "thickness" in self.model_fields_set:
+            raise ValueError("thickness: expected dim 3 beside it")
         if self.dim == 3 and self.guided:
             raise ValueError("guided: expected no in three dimensions")
         self.not_too_many(0.25 * math.pi * self.diameter**2, self.thickness if self.dim == 3 else None)

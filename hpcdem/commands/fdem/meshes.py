@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
 from hpcdem.pre.mesh import fill, fracture_discs, fractures, geometry, imported, quality, structured, structured_space
 from hpcdem.pre.mesh import glue as glue_of
-from hpcdem.pre.mesh.fracture_discs import DiscSet
 from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.regions import polygon_of
 from hpcdem.pre.mesh.sizes import Refinement
@@ -270,9 +270,10 @@ def fracture_network(
     _say(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
 
 
-def disc_network(project: Project, layer: str, inside: str, one: DiscSet, seed: int) -> None:
-    """A set of discs with given statistics about the bodies of a layer becomes surfaces of another. Collective."""
-    bodies = project.layers[inside]
+def disc_network(project: Project, layer: str, inside: str, *, seed: int, **statistics: Any) -> None:
+    """A set of discs with given statistics (see `values.disc_set`) about the bodies of a layer becomes surfaces of
+    another. Collective."""
+    bodies, one = project.layers[inside], values.disc_set(**statistics)
     number, project.networks = project.networks, project.networks + 1
     found = made_once(project.comm, lambda: fracture_discs.discs(one, bodies, seed, number))
     project.layers.add(layer, *found)

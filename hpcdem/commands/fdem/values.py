@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.sizes import spaced
 
@@ -41,6 +42,18 @@ def fracture_set(
         Orientation(*orientation), length_law(length), *density, scanline,
         "reached" if reached else "random", ends_at,
     )  # fmt: skip
+
+
+def disc_set(
+    orientation: tuple[str, float, float, float],
+    radius: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    along: tuple[float, ...],
+    reached: bool,
+) -> DiscSet:
+    """Statistics of discs. orientation: (kind, dip, dip direction, spread) [degrees], radius: (kind, value, spread,
+    least, greatest) [m], density: (p10, p30 or p32, value), along: direction of the scan line, reached: see DiscSet."""
+    return DiscSet(Poles(*orientation), length_law(radius), *density, along, reached)
 
 
 def length_law(given: tuple[str, float, float, float, float | None]) -> Length:

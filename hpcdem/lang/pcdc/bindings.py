@@ -126,7 +126,7 @@ def _shape(kind: str, *names: str) -> Callable[[Call], None]:
 def _fractures(call: Call) -> None:
     if call.project.dim == 3:
         fdem.meshes.disc_network(
-            call.project, call["as-layer"], call["inside"], trial.disc_set(call.arguments), seed=call["seed"]
+            call.project, call["as-layer"], call["inside"], **trial.disc_words(call.arguments), seed=call["seed"]
         )
         return
     fdem.meshes.fracture_network(

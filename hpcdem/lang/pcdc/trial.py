@@ -33,7 +33,6 @@ from hpcdem.physics.flow.properties import POROUS as FLUID
 from hpcdem.physics.heat.properties import FLUID_HEAT as HEAT_OF_FLUID
 from hpcdem.physics.heat.properties import ISO_HEAT as HEAT
 from hpcdem.physics.proppant.properties import PROPPANT as GRAINS
-from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles
 
 MODELS = {
     model.keyword.name: model.of
@@ -200,26 +199,23 @@ def _bolt(arguments: Mapping[str, Any]) -> None:
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
     if "radius" in arguments:
-        disc_set(arguments).check("fractures")
+        values.disc_set(**disc_words(arguments)).check("fractures")
         return
     values.fracture_set(**fracture_words(arguments)).check("fractures")
 
 
-def disc_set(arguments: Mapping[str, Any]) -> DiscSet:
-    """The statistics of `geometry create fractures` in three dimensions."""
+def disc_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The statistics of `geometry create fractures` in three dimensions, as `values.disc_set` takes them."""
     densities = [name for name in ("p10", "p30", "p32") if name in arguments]
     if len(densities) != 1:
         raise CommandError("fractures need one density: p10, p30 or p32")
     orientation, radius = arguments["orientation"], _given_word(arguments, "radius")
-    kind, dip = orientation["value"]
-    return DiscSet(
-        Poles(kind, dip, orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
-        values.length_law(
-            (*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest"))
-        ),
-        densities[0], arguments[densities[0]], arguments.get("scan-direction", (0.0, 0.0, 1.0)),
-        arguments.get("reached", False),
-    )  # fmt: skip
+    return {
+        "orientation": (*orientation["value"], orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
+        "radius": (*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest")),
+        "density": (densities[0], arguments[densities[0]]),
+        "along": arguments.get("scan-direction", (0.0, 0.0, 1.0)), "reached": arguments.get("reached", False),
+    }  # fmt: skip
 
 
 def _given_word(arguments: Mapping[str, Any], name: str) -> Any:
