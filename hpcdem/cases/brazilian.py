@@ -196,7 +196,7 @@ pcdc chart add 'brazilian' values [points] label 'disc'
 pcdc chart export 'brazilian' 'brazilian.png' cracks
 """
 PICTURE = """\
-pcdc output image 'brazilian' field 'mode' object joints filter 'state > 2.5' size 2
+pcdc output image 'brazilian' deformed 10
 pcdc output image 'section' section 'z=[thickness/2]' eye '0,0,1'
 """
-"""What broke, and the middle of the disc."""
+"""The disc, and its middle with what broke."""

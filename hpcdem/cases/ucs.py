@@ -173,7 +173,7 @@ pcdc chart add 'ucs' values [points] label 'specimen'
 pcdc chart export 'ucs' 'ucs.png' cracks
 """
 PICTURE = """\
-pcdc output image 'ucs' field 'mode' object joints filter 'state > 2.5' size 2
+pcdc output image 'ucs' deformed 10
 pcdc output image 'section' section 'y=0' eye '0,-1,0'
 """
-"""What broke, and the middle of the specimen."""
+"""The specimen, and its middle with what broke."""

@@ -92,7 +92,7 @@ def test_bodies_are_groups(bench, tmp_path: Path):
          "fractures need one density: p10, p30 or p32"),
         ("geometry create fractures orientation fisher 3 length fixed 1 p32 1 inside 'rock' seed 1 as-layer 'd'",
          "'length' is for two dimensions"),
-        ("geometry create fractures orientation fisher 3 p32 1 inside 'rock' seed 1 as-layer 'd'", "lacks rad{ius}"),
+        ("geometry create fractures orientation fisher 3 p32 1 inside 'rock' seed 1 as-layer 'd'", r"lacks rad\{ius\}"),
         ("geometry create fractures orientation normal 3 radius fixed 1 p32 1 inside 'rock' seed 1 as-layer 'd'",
          "fixed or fisher, not normal"),
         ("geometry create fractures orientation fixed 3 radius fixed 1 p32 1 inside 'fault' seed 1 as-layer 'd'",
@@ -102,7 +102,7 @@ def test_bodies_are_groups(bench, tmp_path: Path):
         ("geometry create circle (0,0,0) 1 as-layer 'd'", "'geometry create circle' is for two dimensions"),
         ("mesh create from-layer 'fault' size 1", "the outline is a body, but the layer has a plane"),
         ("mesh create from-layer 'rock' size 1 crack 'rock'", "layer 'rock' has bodies"),
-        ("geometry import 'none.step' as-layer 'd'", "none.step"),
+        ("geometry import 'none.step' as-layer 'd'", r"none\.step"),
     ],
 )  # fmt: skip
 def test_what_cannot_be(bench, text, said):
