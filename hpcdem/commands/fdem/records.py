@@ -170,7 +170,8 @@ class History:
     @property
     def unit(self) -> str:
         unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
-        return diagnostics.PER_METRE.get(unit, unit) if self.dim == 3 else unit
+        of_one = self.kind in SUPPORTS  # bolt
+        return diagnostics.PER_METRE.get(unit, unit) if self.dim == 3 and not of_one else unit
 
     @property
     def waits(self) -> bool:
