@@ -43,6 +43,7 @@ class LocalSpace(LawsSpace):
         self._make_joints()
         self._put_histories()
         self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
+        self.relaxing_corner = np.empty(0, np.int64)  # nothing dies down in space
         self._make_loads()
         self._make_nodes()
         self._set_masses()
@@ -135,7 +136,9 @@ class LocalSpace(LawsSpace):
         if not sim.options.collision:
             for k in range(4):
                 springs[:, FACES[k]] += each[:, k, None]
-            return self._with_loads(springs, dashpots)
+            sim.surface_loads.springs(sim, springs)
+            sim.surface_loads.dashpots(sim, dashpots)
+            return springs, dashpots
         length = self.shapes.double_area[own]
         surfaces = Surfaces(sim, self.shapes, faces, np.repeat(np.arange(own.start, own.stop), 4))
         silent = np.isnan(surfaces.overlay) | ~np.isnan(surfaces.normal)
@@ -154,12 +157,8 @@ class LocalSpace(LawsSpace):
             for c in FACES[k]:
                 springs[:, c] += np.maximum(each[:, k], contact[:, k])
                 dashpots[:, c] += drag[:, k]
-        return self._with_loads(springs, dashpots)
-
-    def _with_loads(self, springs: np.ndarray, dashpots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """With what surface loads bring."""
-        self.sim.surface_loads.springs(self.sim, springs)
-        self.sim.surface_loads.dashpots(self.sim, dashpots)
+        sim.surface_loads.springs(sim, springs)
+        sim.surface_loads.dashpots(sim, dashpots)
         return springs, dashpots
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
@@ -208,6 +207,16 @@ class LocalSpace(LawsSpace):
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
         self.pairs.add_to(force)
+
+    def open_joints(self) -> None:
+        """See `Local.open_joints`."""
+        scratch, of_joints = (np.zeros((len(self.sim.number), tets.ROW)) for _ in range(2))
+        self.pairs.pushed[:] = 0.0
+        yields, self.yields = self.yields, False
+        try:
+            self._fill(scratch, of_joints, False)
+        finally:
+            self.yields = yields
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""
