@@ -648,15 +648,25 @@ class BoltNodes(Objects):
         vy: Number | None = None,
         ax: Number | None = None,
         ay: Number | None = None,
+        vz: Number | None = None,
+        az: Number | None = None,
         where: Where = None,
     ) -> None:
         """Velocity [m/s] or acceleration [m/s2] from now on; components left out stay free."""
         given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
+        given |= {"velocity_z": vz, "acceleration_z": az}
         self._carry_out("boundary", given, where, "bolt-node-constrain")
 
-    def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        fz: Number | None = None,
+        where: Where = None,
+    ) -> None:
         """Force on each node of one bolt [N]."""
-        given = {"force_x": fx, "force_y": fy}
+        given = {"force_x": fx, "force_y": fy, "force_z": fz}
         self._carry_out("boundary", given, where, "bolt-node-force-boundary-condition")
 
     def remove_boundary(self, *, where: Where = None) -> None:

@@ -207,7 +207,7 @@ VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
 """In any model, as of tables and charts."""
-PLACES = Kind("<v> <v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True)
 CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2))
 """Of a picture, in space too."""
 EYE = Kind("<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of))

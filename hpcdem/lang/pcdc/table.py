@@ -429,22 +429,23 @@ BOLT = Model(
     "stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per length is "
     "the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan friction-rock-grout) and pi "
     "diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress across the bar in the rock if it is "
-    "pressure. Given again, the force in the bar stays, but for the difference of the pretension.",
+    "pressure, in space the mean in all directions across. Given again, the force in the bar stays, but for the "
+    "difference of the pretension. In space each bolt is there by itself: spacing is 1.",
     declared(
         BOLT_PROPERTIES, "den{sity}", "y{oung}", "d{iameter}", "t{ensile}-y{ield}-f{orce}",
         "c{ompressive}-y{ield}-f{orce}", "t{ension}-f{ailure}-s{train}", "s{hear}-s{tiffness}-r{ock}-b{olt}",
         "g{rout}-t{hickness}", "c{ohesion}-r{ock}-g{rout}", "c{ohesion}-g{rout}-b{olt}", "f{riction}-r{ock}-g{rout}",
         "f{riction}-g{rout}-b{olt}", "spac{ing}", "pre{tension}-f{orce}", "d{amp}-f{actor}", uniform=True,
     ),
-    of=BOLT_PROPERTIES,
+    of=BOLT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 BOLT_VELOCITY = Model(
     "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
-    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True,
+    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True, dims=BOTH,
 )  # fmt: skip
 BOLT_FORCE = Model(
     "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
-    "takes it.", FORCE.options, any_of=True,
+    "takes it.", FORCE.options, any_of=True, dims=BOTH,
 )  # fmt: skip
 
 # ---- liners, beyond the manual -------------------------------------------------------------------------------------
@@ -524,9 +525,10 @@ RECORDED = {
         "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
     },
     "bolt-node": {
-        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
-        "velocity-y": "m/s", "bond-force": "N/m", "slip": "m", "bond-state": "1", "reaction-x": "N",
-        "reaction-y": "N", "host": "1", "distance": "m",
+        "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
+        "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "bond-force": "N/m",
+        "slip": "m", "bond-state": "1", "reaction-x": "N", "reaction-y": "N", "reaction-z": "N", "host": "1",
+        "distance": "m",
     },
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s",
@@ -570,7 +572,7 @@ def _group_command(kind: str, notation: str) -> Command:
         f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
         "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
-        dims=BOTH if kind in ("element", "element-face", "face-joint", "node") else PLANE,
+        dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
     )  # fmt: skip
 
 
@@ -1023,30 +1025,30 @@ _OBJECTS = (
             "Bolts have no weight and no stiffness in bending.",
             ("pcdc bolt create polyline (0,2) (0,5) length 0.1 grout 0.5 3 plate group 'roof'",
              "pcdc bolt create polyline [points]"),
-            (_leading("points", VECTORS, "the points, from the head on; or a list of vectors", "m"),),
+            (_leading("points", PLACES, "the points, from the head on; or a list of vectors", "m"),),
             (Option("seg{ments}", (COUNT,), "elements of each straight part"),
              Option("len{gth}", (POSITIVE,), "of an element, at most", "m", "to the edges of the elements of the mesh"),
              Option("grout", (NOT_NEGATIVE, POSITIVE), "from where to where along the bolt there is grout; without "
                     "the rest is free", "m", "all of it"),
              Option("plate", (), "the first node is tied to the rock: a face plate"),
              Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                    more=(SET,)))),
+                    more=(SET,))), dims=BOTH),
     Command("bolt c-m{odel}", "The properties of elements of bolts, which act from then on.",
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
-            models=(BOLT,), ranged="bolt-element"),
+            models=(BOLT,), ranged="bolt-element", dims=BOTH),
     _group_command("bolt-element", "bolt-e{lement}"),
     _group_command("bolt-node", "bolt-n{ode}"),
     Command("bolt-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
             ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
              "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
-            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node"),
+            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH),
     Command("bolt-n{ode} bou{ndary} rem{ove}", "Takes it back.",
-            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node"),
+            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node", dims=BOTH),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
-            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element"),
+            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH),
     Command("liner cr{eate}",
             "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
             "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "

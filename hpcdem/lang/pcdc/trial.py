@@ -194,7 +194,8 @@ def _frames(arguments: Mapping[str, Any]) -> None:
 
 
 def _bolt(arguments: Mapping[str, Any]) -> None:
-    layout.checked(arguments["points"])
+    points = arguments["points"]
+    layout.checked(points, len(points[0]) if points else 2)
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:

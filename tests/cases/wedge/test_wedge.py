@@ -63,7 +63,7 @@ def test_joints_that_make_no_wedge_are_refused() -> None:
     from hpcdem.cases import Wedge
     from hpcdem.core.errors import ScriptError
 
-    with pytest.raises(ScriptError, match="plunges by .* degrees against the face"):
+    with pytest.raises(ScriptError, match=r"plunges by .* degrees against the face"):
         Wedge(towards_a=135.0, towards_b=-135.0)
     with pytest.raises(ScriptError, match="expected more than 0 and less than face, 20"):
         Wedge(face=20.0)
