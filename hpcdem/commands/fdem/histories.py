@@ -14,12 +14,16 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.units import label
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
 from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
-IN_SPACE = ("time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints")
+IN_SPACE = (
+    "time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints", "flow_time", "fluid_given",
+    "fluid_stored", "fluid_leaked",
+)  # fmt: skip
 """What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""
@@ -75,6 +79,8 @@ def create(
         raise CommandError(f"in three dimensions a history of the model can follow {', '.join(IN_SPACE)}, not {value}")
     if kind in (ELEMENT, NODE, JOINT) and value in diagnostics.QUANTITIES:
         diagnostics.quantity(project.ready(use=False), value)
+    if kind in SUPPORTS:
+        supports.of(project.ready(use=False), kind).check(kind, value)
     project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
 
 
