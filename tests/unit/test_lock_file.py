@@ -161,7 +161,9 @@ fill_from_wheels venv {0}/bin/python mpi
 
 @pytest.mark.parametrize(("code", "steps"), [("exit 0", ["venv --without-pip", "compiled"]), ("exit 1", ["pip"])])
 def test_the_quick_installer_takes_the_lock_or_leaves_it_to_pip(tmp_path, code, steps):
-    done = subprocess.run(["bash", "-c", UV.format(tmp_path, code)], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ["bash", "-c", UV.format(tmp_path, code)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert [line for line in steps if line not in done.stdout.splitlines()] == [], done.stdout + done.stderr
     assert ("pip" in done.stdout.splitlines()) == (code == "exit 1")
     asked = (tmp_path / "asked").read_text()
