@@ -262,6 +262,12 @@ def _flow() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _flow_space() -> WarmUp:
+    from hpcdem.physics.flow import kernels_space, warm_up
+
+    return warm_up.in_space, (kernels_space,)
+
+
 def _proppant() -> WarmUp:
     from hpcdem.physics.proppant import kernels, warm_up
 
@@ -316,6 +322,13 @@ def _creep_space() -> WarmUp:
     return warm_up.creeping_in_space, (creep_tets,)
 
 
+def _tangent_space() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import tet_stiffness
+
+    return warm_up.tangent_in_space, (tet_stiffness,)
+
+
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
     from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
@@ -339,6 +352,7 @@ KINDS = {
     "bolts": Kernels(_bolts),
     "liners": Kernels(_liners),
     "flow": Kernels(_flow),
+    "flow-space": Kernels(_flow_space, after=("space", "flow")),
     "proppant": Kernels(_proppant, after=("flow",)),
     "heat": Kernels(_heat),
     "yielding": Kernels(_yielding),
@@ -348,6 +362,7 @@ KINDS = {
     "space": Kernels(_space),
     "yielding-space": Kernels(_yielding_space, after=("space",)),
     "creep-space": Kernels(_creep_space, after=("space",)),
+    "tangent-space": Kernels(_tangent_space, after=("tangent", "plastic-tangent", "yielding-space")),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
@@ -356,7 +371,7 @@ OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
     "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-    "yielding-space", "creep-space", "pictures",
+    "yielding-space", "creep-space", "tangent-space", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 
