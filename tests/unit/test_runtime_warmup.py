@@ -409,7 +409,9 @@ def hits() -> dict[str, tuple[int, int]]:
 
 def test_several_processes_fill_a_folder(processes, base, tmp_path):
     said = processes("curious")
-    assert said.splitlines() == ["compiling about 96 kernels (first run of this version on this machine)"]
+    first, *later = said.splitlines()
+    assert first == "compiling about 96 kernels (first run of this version on this machine)"
+    assert all(re.match(r"\d of about 96 kernels are compiled", line) for line in later)  # on a busy machine
     # The second call of `twice` depends on what only the compiler can do: it was left to this process.
     assert hits() == {"twice": (1, 1), "of_an_intrinsic": (1, 0)}
     (folder,) = base.iterdir()
