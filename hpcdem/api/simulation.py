@@ -929,7 +929,9 @@ class Simulation(BlockCommands):
 
         assert self._project is not None
         self._project.ready(use=False)
-        return of_blocks(frames.whole(self._project))
+        state = frames.whole(self._project)
+        assert state is not None  # on one rank
+        return of_blocks(state)
 
     def __repr__(self) -> str:
         if self._engine is None and self._project is None:

@@ -148,10 +148,6 @@ def translated(command: click.Command) -> click.Command:
 
 def help_page(command: click.Command, program: str) -> str:
     """What `--help` prints."""
-    if command.name == "hpcdem":  # whose help has the options of -s, too
-        from hpcdem.cli.strain_stress import strain_stress
-
-        translated(strain_stress)
     page = translated(command).get_help(click.Context(command, info_name=program, max_content_width=110))
     page = page.replace("Show this message and exit.", TEXTS["Show this message and exit."])
     for head, chinese in HEADS.items():
