@@ -7,7 +7,7 @@ Words, values, units and defaults are those of the tables, as on the English pag
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from hpcdem.lang import chinese
 from hpcdem.lang.pages import escaped
