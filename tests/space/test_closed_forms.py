@@ -174,8 +174,8 @@ def test_a_cavity_in_a_body_that_is_pulled(pull: str, gmsh: object) -> None:
             near = low & (np.abs(r - place) < 0.1)
             assert goodier(place) == pytest.approx(exact, abs=1e-5)
             assert zz[near].mean() == pytest.approx(goodier(r[near]).mean(), rel=0.03), place
-        wall = low & (r < 1.04)
-        assert zz[wall].mean() == pytest.approx(goodier(r[wall]).mean(), rel=0.03)
+        wall = low & (r < 1.04)  # one layer of elements of constant strain, where it falls by a half in 0.25
+        assert zz[wall].mean() == pytest.approx(goodier(r[wall]).mean(), rel=0.05)
         return
     n = at / r[:, None]
     s = {c: diagnostics.values(sim, f"stress_{c}") / tension for c in ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -185,8 +185,8 @@ def test_a_cavity_in_a_body_that_is_pulled(pull: str, gmsh: object) -> None:
     tt = 0.5 * (s["xx"] + s["yy"] + s["zz"] - rr)
     for place in (1.25, 1.5, 2.0, 3.0):
         near = np.abs(r - place) < 0.05 * place
-        assert rr[near].mean() == pytest.approx((1.0 - r[near] ** -3).mean(), rel=0.02), place
-        assert tt[near].mean() == pytest.approx((1.0 + 0.5 * r[near] ** -3).mean(), rel=0.02), place
+        assert rr[near].mean() == pytest.approx((1.0 - r[near] ** -3).mean(), abs=0.02), place
+        assert tt[near].mean() == pytest.approx((1.0 + 0.5 * r[near] ** -3).mean(), abs=0.02), place
 
 
 def goodier(r: np.ndarray | float) -> np.ndarray | float:
