@@ -345,6 +345,26 @@ IN_SPACE: list[tuple[str, str]] = [
     ("pcdc geometry create sphere (0,1,2) 3 as-layer 'l'", "sim.geometry.sphere((0, 1, 2), 3, 'l')"),
     ("pcdc geometry create cylinder (0,0,0) (0,0,1) 2 as-layer 'l'",
      "sim.geometry.cylinder((0, 0, 0), (0, 0, 1), 2, 'l')"),
+    ("pcdc geometry create cone (0,0,0) (0,0,1) 2 1 as-layer 'l'",
+     "sim.geometry.cone((0, 0, 0), (0, 0, 1), 2, 1, 'l')"),
+    ("pcdc geometry create disc (0,0,0) (0,0,1) 2 as-layer 'l'", "sim.geometry.disc((0, 0, 0), (0, 0, 1), 2, 'l')"),
+    ("pcdc geometry create plane (0,0,0) (0,0,1) as-layer 'l'", "sim.geometry.plane((0, 0, 0), (0, 0, 1), 'l')"),
+    ("pcdc geometry create extrude layer 'p' along (0,0,1) as-layer 'l'",
+     "sim.geometry.extrude('p', (0, 0, 1), 'l')"),
+    ("pcdc geometry create revolve layer 'p' axis (0,0,1) about (1,0,0) angle 90 as-layer 'l'",
+     "sim.geometry.revolve('p', (0, 0, 1), 'l', about=(1, 0, 0), angle=90)"),
+    ("pcdc geometry create fractures orientation fisher 30 spread 9 towards 45 radius power 2.5 least 1 greatest 9 "
+     "p32 1 inside 'o' seed 7 as-layer 'l'",
+     "sim.geometry.fractures('l', 'o', orientation=('fisher', 30), orientation_spread=9, orientation_towards=45, "
+     "radius=('power', 2.5), radius_least=1, radius_greatest=9, p32=1, seed=7)"),
+    ("pcdc geometry create fractures orientation fixed 30 radius lognormal 2 spread 1 p10 1 scan-direction (1,0,0) "
+     "inside 'o' seed 7 as-layer 'l'",
+     "sim.geometry.fractures('l', 'o', orientation=('fixed', 30), radius=('lognormal', 2), radius_spread=1, p10=1, "
+     "scan_direction=(1, 0, 0), seed=7)"),
+    ("pcdc geometry create fractures orientation fixed 30 radius fixed 2 p30 1 inside 'o' seed 7 reached as-layer 'l'",
+     "sim.geometry.fractures('l', 'o', orientation=('fixed', 30), radius=('fixed', 2), p30=1, seed=7, reached=True)"),
+    ("pcdc mesh create from-layer 'l' size 1 crack 'a' embed 'b' bodies",
+     "sim.mesh.create('l', 1, crack=['a'], embed=['b'], bodies=True)"),
     ("pcdc mesh structured (0,0,0) (4,2,1) cells 4 2 1 split 12 ratio 1.5 1 2 group 'rock' set 'd'",
      "sim.mesh.structured((0, 0, 0), (4, 2, 1), (4, 2, 1), split=12, ratio=(1.5, 1, 2), group='rock', set='d')"),
     ("pcdc mesh create from-layer 'o' size 0.5 hole 'h'", "sim.mesh.create('o', 0.5, hole=['h'])"),

@@ -66,7 +66,7 @@ KNOWN = {
     ("sweep/member.py", "subprocess.Popen"),
     ("sweep/array.py", "subprocess.run"),
     # Gmsh, with a description as JSON; it answers with arrays of numbers in a file of a folder made for that.
-    ("pre/mesh/fill.py", "subprocess.run"),
+    ("pre/mesh/apart.py", "subprocess.run"),
     # The same to compile kernels; what is pickled goes from the parent to its child through a pipe.
     ("runtime/compilers.py", "subprocess.Popen"),
     ("runtime/compilers.py", "import pickle"),

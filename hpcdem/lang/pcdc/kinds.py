@@ -206,6 +206,7 @@ BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"
 VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+"""In any model, as of tables and charts."""
 PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True)
 CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2))
 """Of a picture, in space too."""
