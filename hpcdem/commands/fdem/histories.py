@@ -19,7 +19,10 @@ from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
 from hpcdem.physics.flow.model import Flow
 
-IN_SPACE = ("time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints")
+IN_SPACE = (
+    "time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints", "heat_time", "heat_given",
+    "heat_stored",
+)  # fmt: skip
 """What a history of a model in three dimensions can follow."""
 FLUSH = 500
 """Records that wait at most before they go to the file."""

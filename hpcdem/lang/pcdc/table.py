@@ -264,7 +264,7 @@ ISO_HEAT = Model(
     "Temperatures are those of any scale of degrees.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
-    of=HEAT_PROPERTIES,
+    of=HEAT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 
 # ---- boundary conditions of nodes and faces (tables 4 to 7, 11, 14 to 16, 18) --------------------------------------
@@ -325,7 +325,7 @@ FREE_FIELD = Model(
 )  # fmt: skip
 TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
-    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),), dims=BOTH,
 )  # fmt: skip
 FLUID_TEMPERATURE = Model(
     "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
@@ -348,7 +348,7 @@ CONST_HEAT = Model(
     (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
             "that of the elements", also=_COEFFICIENTS["transfer-coeficient"]),
-     Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True,
+     Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True, dims=BOTH,
 )  # fmt: skip
 
 # ---- contact and joints (tables 8, 9, 10, 13, 17) ------------------------------------------------------------------
@@ -619,7 +619,7 @@ _MODEL = (
                        "the nearest side of an element over the usual altitude in its body, or four times the smallest "
                        "of its barycentric coordinates", default="distance", dims=SPACE),
                 Option("mech{anical}", (BOOL,), "motion of blocks; off: they stand still while fluid or heat flows",
-                       default="on", dims=PLANE),
+                       default="on"),
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off", dims=PLANE),
@@ -628,7 +628,7 @@ _MODEL = (
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off",
                        dims=PLANE),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
-                       "the stress that they bring, stay as they are", default="on", dims=PLANE),
+                       "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
                        "where they are", default="on", dims=PLANE)),
             needs_option=True, manual=True, dims=BOTH),
@@ -649,7 +649,7 @@ _MODEL = (
                        "s", "0", dims=PLANE),
                 Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
-                       "0", dims=PLANE)),
+                       "0")),
             needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH),
@@ -683,18 +683,18 @@ _MODEL = (
                             "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
-                            "and joints may pass their peak and break; with mechanical off, heat alone", dims=PLANE),
+                            "and joints may pass their peak and break; with mechanical off (in three dimensions always), "
+                            "heat alone"),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
-                            "shorter where joints break or no balance is found", "s", "a hundredth of the time",
-                            dims=PLANE),
+                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
                             "where an estimate says that these cost less, or where implicit ones are refused; the log "
                             "has both estimates", dims=PLANE),
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
-                            "passes", dims=PLANE),
+                            "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
                             "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
-                            "it is there, from 400 000 unknowns on", default="auto", dims=PLANE),
+                            "it is there, from 400 000 unknowns on", default="auto"),
                      Option("ste{ps}", (COUNT,), "with elastic: what is new in the loads is brought on in so many "
                             "equal increments, in each of which elements flow once; one that finds no balance is "
                             "halved", "", "1", dims=PLANE)), dims=BOTH),
@@ -705,8 +705,8 @@ _MODEL = (
                      Option("therm{al}", (ZERO_OR_MORE,), "sub-steps of a cycle of heat; 0: as many as are stable",
                             default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
-                            default="0")),
-            needs_option=True),
+                            default="0", dims=PLANE)),
+            needs_option=True, dims=BOTH),
     Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
             "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
             "pi beta f.",

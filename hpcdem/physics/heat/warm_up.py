@@ -9,7 +9,7 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
-from hpcdem.physics.heat import friction, kernels
+from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.model import Heat
 
 GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5, "transfer_coeficient": 5.0}
@@ -32,6 +32,22 @@ def warm_up(threads: int = 1) -> None:
         np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
     )  # fmt: skip
     _fluid()
+    _space()
+
+
+def _space() -> None:
+    """Two tetrahedra that touch."""
+    points = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)[2]])
+    cells, number = np.array([[0, 1, 2, 3], [0, 2, 1, 4]]), np.arange(2)
+    kernels_space.conductances(number, points, cells, np.ones((2, 6)), np.empty((2, 6)))
+    x = np.zeros((2, 16))
+    ends, weight, pass_on = np.empty((3, 6), np.int64), np.empty((3, 6)), np.empty(3)
+    kernels_space.touching(number * 4, number * 4 + 4, number, number, x, np.ones(2), 1e-3, 0.1, ends, weight, pass_on)
+    kernels.through_faces(
+        np.zeros((1, 3), np.int64), np.ones(1), np.zeros(1, np.int64), np.zeros((1, 3)), 0, 8, *np.zeros((2, 8)), 0.0,
+        np.zeros(8),
+    )  # fmt: skip
+    kernels.through_contacts(np.zeros((1, 6), np.int64), np.zeros((1, 6)), np.zeros(1), *np.zeros((2, 8)))
 
 
 def _fluid() -> None:
