@@ -60,7 +60,7 @@ def hollow_sphere(r: np.ndarray, inner: float, outer: float) -> np.ndarray:
 
 
 def hollow_sphere_stress(r: np.ndarray, inner: float, outer: float) -> tuple[np.ndarray, np.ndarray]:
-    """Its radial and tangential stress over alpha E T / (1 - nu), with free surfaces. Timoshenko & Goodier 1970, 152."""
+    """Its radial and tangential stress over alpha E T / (1 - nu), free surfaces. Timoshenko & Goodier 1970, 152."""
     a, b = inner, outer
     part = a * b / (b**3 - a**3)
     middle, cube = (a * a + a * b + b * b) / r, a * a * b * b / r**3

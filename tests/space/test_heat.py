@@ -126,7 +126,7 @@ def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(
     mesh = box((6, 2, 2), (1.2, 0.4, 0.5), shaken=0.2)
     sim, heat = standing(mesh, conductivity_across=1.0, conductivity_dip=30.0)
     sim.table("ramp", [(0.0, 10.0), (1e6, 90.0)])
-    left, right = nodes_on(mesh, "left"), nodes_on(mesh, "right")
+    left = nodes_on(mesh, "left")
     heat.prescribe(left, "ramp")
     heat.expose(faces_on(mesh, "right"), environment=40.0, transfer=7.0, flux=12.0)
     sim.close_model()
@@ -172,7 +172,16 @@ def test_kernel_of_touching_faces() -> None:
             faces += [f for f in range(4) if 3 not in mesh.face_points(np.array([f]))[0]]
             corners.append(mesh.points[mesh.face_points(np.array([faces[-1]]))[0]])
         assert face == faces[0]
-        args = np.array(faces[:1]), np.array(faces[1:]), np.array([0]), np.array([1]), x, np.array([2.0, 2.0]), 4e-3, 0.2
+        args = (
+            np.array(faces[:1]),
+            np.array(faces[1:]),
+            np.array([0]),
+            np.array([1]),
+            x,
+            np.array([2.0, 2.0]),
+            4e-3,
+            0.2,
+        )
         nothing = np.empty((0, 6), np.int64), np.empty((0, 6)), np.empty(0)
         many = kernels_space.touching(*args, *nothing)
         corner, weight, pass_on = np.zeros((many, 6), np.int64), np.zeros((many, 6)), np.zeros(many)
@@ -294,7 +303,7 @@ def heated(law: str, held: str, warmer: float = 50.0, dynamic: bool = False) -> 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("held", ["", "x", "xy", "xyz"])
 def test_thermal_stress(law: str, held: str) -> None:
-    """Free: alpha T and no stress. Held along one axis -E alpha T, two -E alpha T / (1 - nu), three ... / (1 - 2 nu)."""
+    """Free: alpha T, no stress. Held along one axis -E alpha T, two -E alpha T / (1 - nu), three ... / (1 - 2 nu)."""
     sim, mesh = heated(law, held)
     convergence.solve(sim, ratio=1e-7)
     level = -YOUNG * ALPHA * 50.0

@@ -683,8 +683,8 @@ _MODEL = (
                             "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
-                            "and joints may pass their peak and break; with mechanical off (in three dimensions always), "
-                            "heat alone"),
+                            "and joints may pass their peak and break; with mechanical off (in three dimensions "
+                            "always), heat alone"),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
                             "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "

@@ -11,7 +11,6 @@ import numpy as np
 from hpcdem.physics.fdem.kernels import creep_tets, plastic_tets, tets
 from hpcdem.physics.fdem.local import Local, creep_table
 
-
 NORMAL = [0, 1, 3]
 """Places of xx, yy and zz in a row of stress."""
 
@@ -52,13 +51,13 @@ class LawsSpace(Local):
         self.warms = any(bool(one.any()) for one in self.sim.warms())
         self.stiff = self.c.copy() if self.warms else self.c
         self.initial_part: np.ndarray | None = None
-        self._said_of_initial = self._of_initial
+        self._stress_said = self._stress
 
     def _moduli(self) -> Iterable[tuple[np.ndarray, np.ndarray, list[int], np.ndarray]]:
         yield self.c, self.stiff, [tets.LAMBDA, tets.TWO_MU], np.arange(self.count)
 
     def _scale_initial(self, ratio: np.ndarray) -> None:
-        self._of_initial = self._said_of_initial * ratio[:, None]
+        self._stress = self._stress_said * ratio[:, None]
 
     def _begin_warm(self) -> None:
         """Moduli, strengths and stress without strain at the temperatures of now."""
@@ -69,7 +68,7 @@ class LawsSpace(Local):
     def _find_stress_without_strain(self) -> bool:
         """As in the plane: what was said of it and what heat brings, less the part of plastic and creep strain."""
         heat = self.sim.surface_loads.eigenstress(self.sim)
-        self.s0[: self.count, :6] = self._of_initial
+        self.s0[: self.count, :6] = self._stress
         if heat is not None:
             self.s0[: self.count, NORMAL] += heat[:, None]
         self._relieve()

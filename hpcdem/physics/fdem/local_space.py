@@ -64,9 +64,9 @@ class LocalSpace(LawsSpace):
         )  # fmt: skip
         self.c[self.count :] = self.c[self.count - 1] if self.count else 1.0
         self.s0 = np.zeros((self.count + 3, tets.STRESSES))
-        self._of_initial = np.zeros((self.count, 6))
+        self._stress = np.zeros((self.count, 6))
         if sim.stress0 is not None:
-            self._of_initial = sim.initial_stresses(sim.number[sim.owned])
+            self._stress = sim.initial_stresses(sim.number[sim.owned])
         self._make_warm()
 
     def _make_joints(self) -> None:

@@ -1,8 +1,8 @@
 """The loops of heat: conduction in elements, exchange at faces, sums at nodes, thermal stress.
 
 Temperatures stand at the corners of elements, rows t (n, w) in storage order, ghosts too; w is 3, with quads in the
-mesh, and in space, 4. Corners that are one node of heat carry equal copies. Sources: Fourier's law with linear triangles (manual,
-7.6.1, (93) to (99)), transfer after Newton ((100), (101)), thermal strain after Duhamel and Neumann.
+mesh, and in space, 4. Corners that are one node of heat carry equal copies. Sources: Fourier's law with linear
+triangles (manual, 7.6.1, (93) to (99)), transfer after Newton ((100), (101)), thermal strain after Duhamel and Neumann.
 """
 
 from __future__ import annotations
@@ -90,8 +90,9 @@ def conduct_threaded(threads, t, g, q):
 def through_faces(corner, half, row, table, first, last, t, q, dt, given):
     """Heat through faces: a flux, and transfer from an environment, an equal part of the face at each of its corners.
 
-    corner (m, 2 or 3): in t, flat; half (m,): half lengths [m], in space thirds of areas [m2]; row (m,), table (rows, 3): conditions; t, q, given:
-    flat; faces first : last are this rank's, what they bring in dt [s] is booked in given [J/m].
+    corner (m, 2 or 3): in t, flat; half (m,): half lengths [m], in space thirds of areas [m2]; row (m,), table (rows,
+    3): conditions; t, q, given: flat; faces first : last are this rank's, what they bring in dt [s] is booked in given
+    [J/m].
     """
     for i in range(len(corner)):
         one = table[row[i]]

@@ -18,7 +18,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, by_temperature, connectivity, said, user_laws
+from hpcdem.physics.fdem import build, by_temperature, said, user_laws
 from hpcdem.physics.fdem.kernels.elements import FORCE
 from hpcdem.physics.fdem.mesh import sizes as sizes_of
 from hpcdem.physics.fdem.pairs_space import Surface
@@ -463,8 +463,8 @@ class Heat(SurfaceLoad):
         if against.any():
             blocks.log.warn_once(
                 "obtuse tetrahedra",
-                f"along {int(against.sum())} of {len(key)} edges heat is conducted from the colder to the warmer end, as "
-                f"angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} tetrahedra): "
+                f"along {int(against.sum())} of {len(key)} edges heat is conducted from the colder to the warmer end, "
+                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} tetrahedra): "
                 "near steep fronts temperatures may leave the range of those around them",
             )
 
@@ -540,8 +540,8 @@ class Heat(SurfaceLoad):
         return at, 4 * (at // 4)[:, None] + ends, transfer
 
     def _exposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Free faces with a condition, of all ranks: numbers (m,), their corners (m, 2), in space (m, 3), and the part of
-        the face of each: half the length [m], in space a third of the area [m2]."""
+        """Free faces with a condition, of all ranks: numbers (m,), their corners (m, 2), in space (m, 3), and the part
+        of the face of each: half the length [m], in space a third of the area [m2]."""
         blocks = self.blocks
         at = np.flatnonzero((self.face > 0) & blocks.face_exists() & ~blocks.closed_faces())
         return at, *self._parts_of(at)
@@ -646,7 +646,9 @@ class Heat(SurfaceLoad):
             corner[:, a] += each[:, pair]
             corner[:, b] += each[:, pair]
         h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
-        np.add.at(corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, self._face_corner.shape[1]))
+        np.add.at(
+            corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, self._face_corner.shape[1])
+        )
         if self.passes:
             self._add_most_of_contacts(corner)
         if (fluid := self.flowing) is not None:

@@ -43,11 +43,10 @@ def _space() -> None:
     x = np.zeros((2, 16))
     ends, weight, pass_on = np.empty((3, 6), np.int64), np.empty((3, 6)), np.empty(3)
     kernels_space.touching(number * 4, number * 4 + 4, number, number, x, np.ones(2), 1e-3, 0.1, ends, weight, pass_on)
-    kernels.through_faces(
-        np.zeros((1, 3), np.int64), np.ones(1), np.zeros(1, np.int64), np.zeros((1, 3)), 0, 8, *np.zeros((2, 8)), 0.0,
-        np.zeros(8),
-    )  # fmt: skip
-    kernels.through_contacts(np.zeros((1, 6), np.int64), np.zeros((1, 6)), np.zeros(1), *np.zeros((2, 8)))
+    t, q, given = (np.zeros(8) for _ in range(3))
+    corner = np.zeros((1, 3), np.int64)
+    kernels.through_faces(corner, np.ones(1), np.zeros(1, np.int64), np.zeros((1, 3)), 0, 8, t, q, 0.0, given)
+    kernels.through_contacts(np.zeros((1, 6), np.int64), np.zeros((1, 6)), np.zeros(1), t, q)
 
 
 def _fluid() -> None:
