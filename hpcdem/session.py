@@ -240,6 +240,12 @@ def _flow() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _flow_space() -> WarmUp:
+    from hpcdem.physics.flow import kernels_space, warm_up
+
+    return warm_up.in_space, (kernels_space,)
+
+
 def _proppant() -> WarmUp:
     from hpcdem.physics.proppant import kernels, warm_up
 
@@ -315,6 +321,7 @@ KINDS = {
     "bolts": Kernels(_bolts),
     "liners": Kernels(_liners),
     "flow": Kernels(_flow),
+    "flow-space": Kernels(_flow_space, after=("space", "flow")),
     "proppant": Kernels(_proppant, after=("flow",)),
     "heat": Kernels(_heat),
     "yielding": Kernels(_yielding),

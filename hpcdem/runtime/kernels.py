@@ -38,7 +38,8 @@ UNUSED_DAYS = 60
 
 KERNELS = {
     "shared": 31, "": 126, "blocks": 195, "coupled": 17, "bolts": 8, "liners": 11, "flow": 10,
-    "proppant": 12, "heat": 21, "yielding": 38, "creep": 11, "tangent": 10, "plastic-tangent": 6, "space": 56,
+    "flow-space": 6, "proppant": 12, "heat": 21,
+    "yielding": 38, "creep": 11, "tangent": 10, "plastic-tangent": 6, "space": 56,
     "yielding-space": 16, "creep-space": 12, "pictures": 8,
 }  # fmt: skip
 """About how many kernels a folder of each kind has."""

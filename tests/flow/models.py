@@ -18,6 +18,7 @@ from tests.blocks.support import ROCK, rectangle, shaken
 from tests.bolts.models import WEAKER
 from tests.flow.support import WATER, inner
 from tests.parallel.model import Found, Model
+from tests.space.support import box
 
 LEAKS = {
     "leak_off": 1.0, "matrix_permeability": 1e-14, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9,
@@ -133,6 +134,63 @@ def dig(sim: Blocks) -> None:
         Flow.of(sim).stage("pump", PRESSURE, 2e4, math.inf, math.inf)
 
 
+def tearing(sim: Blocks) -> None:
+    """A jointed bar of tetrahedra is torn apart by fluid that is pumped into it by a well, held at a pressure, drawn,
+    and stands at a level, while it flies through the strips of the ranks; some of its joints are no channels."""
+    sim.take_mesh(box((16, 2, 2), (1.6, 0.2, 0.2), 6, shaken=0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "friction": 20.0, "damp_factor": 0.05})
+    joints = inner(sim.mesh)
+    sim.joint_model(joints, COHESIVE, WEAK)
+    sim.gravity(3.0, 1.0, -9.81)
+    x, y, z = sim.mesh.points.T
+    for one in np.unique(np.round(x, 1)):
+        at = np.flatnonzero(np.round(x, 1) == one)
+        changes.set_velocity(sim, at, 150.0 + 6.0 * one, 4.0 * one, 2.0)
+    flow = Flow.of(sim)
+    flow.assign(joints[joints % 7 > 0], {**WIDE, **LEAKS, "shear_dilation": 10.0, "shear_dilation_limit": 4e-3})
+    flow.fill(np.flatnonzero(x < 0.4), pressure=3e4)
+    flow.fill(np.flatnonzero(x > 1.1), saturation=0.6)
+    sim.table("pump", [(0.0, 0.0), (2e-3, 2e6), (1.0, 2e6)])
+    flow.prescribe(np.flatnonzero((x > 0.75) & (x < 0.95) & (z < 0.15)), kernels.PRESSURE, "pump")
+    flow.prescribe(np.flatnonzero(x > 1.55), kernels.SURFACE, 0.15)
+    flow.prescribe(np.flatnonzero((x < 0.05) & (y > 0.1)), kernels.RATE, -1e-4)
+    flow.drill("long", np.flatnonzero((np.abs(y - 0.1) < 0.03) & (np.abs(x - 0.4) < 0.35) & (x > 0.06)))
+    flow.stage("long", RATE, 0.4, 4.53e-4, 2e6)
+    flow.stage("long", SHUT, 0.0, 2.1e-4, math.inf)
+    flow.stage("long", RATE, 0.4, math.inf, 1e6)
+
+
+def more_in_space(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 200:
+        changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 2] < 0.05)[3:9])
+    if sim.clock.step == 500:
+        Flow.of(sim).assign(np.flatnonzero(sim.joint_exists())[:60:3], {**WIDE, **LEAKS, "aperature_initial": 1e-4})
+        sim.flow_clock(every=3)
+
+
+def seeping_in_space(sim: Blocks) -> None:
+    """Water rises in tetrahedra that stand still, then are at rest, pushed by it."""
+    sim.take_mesh(box((12, 2, 3), (2.4, 0.4, 0.6), 5, shaken=0.2))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    flow = Flow.of(sim)
+    flow.assign(None, {**WATER, "fluid_bulk": 1e5})
+    sim.gravity(0.0, 0.0, -9.81)
+    x = sim.mesh.points[:, 0]
+    flow.prescribe(np.flatnonzero(x == 0.0), kernels.SURFACE, 0.5)
+    flow.prescribe(np.flatnonzero(x == 2.4), kernels.SURFACE, 0.2)
+    sim.parts(mechanical=False)
+
+
+def move_in_space(sim: Blocks) -> None:
+    """What happens to it."""
+    if sim.clock.step == 400:
+        sim.option(dynamic=False, collision=False)
+        sim.parts(mechanical=True)
+        sim.flow_clock(dt=0.01)
+        sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 2] == 0.0), vx=0.0, vy=0.0, vz=0.0)
+
+
 def all_of_it(sim: Blocks, notes: dict[str, Any]) -> Found:
     """That of the fluid, of bolts and of plastic flow."""
     found = result(sim, notes)
@@ -175,6 +233,13 @@ def water_bursts(found: Found) -> None:
     assert np.ptp(found["flow-channel_aperture"]) > 1e-3
 
 
+def it_tears(found: Found) -> None:
+    water_moves(found)
+    assert found["counts"][2] > 50 and found["account_leaked"] > 0.0 and found["account_removed"] > 0.0
+    assert np.ptp(found["flow-channel_aperture"]) > 1e-3
+    assert found["well_long_stage"] == 3.0 and found["well_long_injected"] > 0.0
+
+
 def wells_pump(found: Found) -> None:
     water_bursts(found)
     assert found["well_long_stage"] == 3.0 and found["well_short_stage"] == 2.0
@@ -194,4 +259,6 @@ MODELS = {
     "pumped": Model(pumped, result, wells_pump, more, steps=1100, middle=703),
     "wet soil with bolts": Model(resting, all_of_it, all_acts, dig, steps=1100, middle=703),
     "seeping": Model(seeping, result, water_moves, move, steps=1100, middle=703),
+    "tearing in space": Model(tearing, result, it_tears, more_in_space, steps=900, middle=603),
+    "seeping in space": Model(seeping_in_space, result, water_moves, move_in_space, steps=600, middle=303),
 }

@@ -22,7 +22,7 @@ from tests.flow.support import WATER, at, hold, inner, line, run, standing, unti
 def test_channels_of_a_node_stand_in_their_order() -> None:
     mesh = rectangle(3, 2, 3.0, 2.0)
     channels = np.sort(inner(mesh))
-    network = Network.of(mesh.cells, len(mesh.points), channels)
+    network = Network.of(mesh, channels)
     assert np.array_equal(network.nodes, np.unique(network.ends)) and network.there.sum() == len(network.nodes)
     rows = np.searchsorted(network.nodes, network.ends)
     begin, channel, side = at_nodes(rows, len(network.nodes))
@@ -48,11 +48,10 @@ def test_kernels_do_what_the_plain_loop_does() -> None:
     w, energy = flow.nodes[:, kernels.W].copy(), -1000.0 * (mesh.points[flow.number] @ np.array([1.3, -9.81]))
     way = mesh.points[flow.network.ends[:, 1]] - mesh.points[flow.network.ends[:, 0]]
     ends, length = np.searchsorted(flow.number, flow.network.ends), np.hypot(way[:, 0], way[:, 1])
+    links = reference.straight(np.full(len(ends), 1e-5), length, 1e-3)
     for _ in range(3):
         sim.step()
-        w, p, s = reference.sub_step(
-            ends, np.full(len(ends), 1e-5), length, 1e-3, 1e5, energy, w, flow.dt, {3: 5e4}
-        )  # fmt: skip
+        w, p, s = reference.sub_step(ends, *links, 1e5, energy, w, flow.dt, {3: 5e4})
         assert flow.nodes[:, kernels.W] == pytest.approx(w, rel=1e-12, abs=1e-18)
         assert flow.state[:n, kernels.P] == pytest.approx(p, rel=1e-9, abs=1e-4)
         assert flow.state[:n, kernels.S] == pytest.approx(s, rel=1e-12)

@@ -11,7 +11,7 @@ import numpy as np
 
 from hpcdem.physics import supports
 from hpcdem.physics.fdem import diagnostics, user_laws
-from hpcdem.physics.fdem.groups import ELEMENT, JOINT, NODE, SUPPORTS
+from hpcdem.physics.fdem.groups import CHANNEL, ELEMENT, JOINT, NODE, SUPPORTS
 from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
@@ -170,7 +170,9 @@ class History:
     @property
     def unit(self) -> str:
         unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
-        return diagnostics.PER_METRE.get(unit, unit) if self.dim == 3 else unit
+        if self.dim == 2 or self.kind == CHANNEL:  # what flows in a channel is that of a metre of it
+            return unit
+        return {**diagnostics.PER_METRE, "m2": "m3"}.get(unit, unit)
 
     @property
     def waits(self) -> bool:

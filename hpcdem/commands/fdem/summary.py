@@ -104,7 +104,11 @@ def close(project: Project, figure: bool = True) -> None:
     flow = Flow.there(blocks)
     if flow is not None:
         found = flow.account()
-        log.table("fluid", ("volume", "m2"), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
+        log.table(
+            "fluid",
+            ("volume", "m2" if blocks.dim == 2 else "m3"),
+            [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS],
+        )
     proppant = Proppant.there(blocks)
     if proppant is not None:
         found = proppant.account()

@@ -314,8 +314,8 @@ FLOW_CONDITION = Model(
      Option("f{low}-s{urface}", (TABLED,), "level of water that stands at the nodes, against gravity: hydrostatic "
             "pressure below it; above it water can leave (seepage)", "m"),
      Option("f{low}-r{ate}", (TABLED,), "volume that comes in at each node; negative: is taken out, as far as there is "
-            "fluid", "m2/s")),
-    any_of=True, also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",),
+            "fluid; in space m3/s", "m2/s")),
+    any_of=True, also=("hydr{aulic}-c{onstant}-f{low}-b{oundary}",), dims=BOTH,
 )  # fmt: skip
 FREE_FIELD = Model(
     "free-f{ield}", "", "Vertical sides beyond which the ground goes on: a column with the elements of the side and "
@@ -385,8 +385,8 @@ POROUS = Model(
     "hydr{aulic}-p{orous}-m{edium}", "10",
     "Fluid in joints: each is a channel between its two nodes, broken or not, of the aperture aperature-initial plus "
     "its mean opening, within the limits. It acts beside the cohesive model of the joint. Given again, fluid that has "
-    "no room any more is gone, and new room is dry.",
-    _POROUS, of=POROUS_PROPERTIES,
+    "no room any more is gone, and new room is dry. In space channels are the triangles of the joints.",
+    _POROUS, of=POROUS_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 FLUID_HEAT = Model(
     "t{hermal}-f{luid}", "13",
@@ -623,10 +623,8 @@ _MODEL = (
                 Option("large-s{train}", (BOOL,), "rotations of elements are taken into account", default="on"),
                 Option("en{ergy}", (BOOL,), "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, "
                        "histories of the model, a table at the end", default="off", dims=PLANE),
-                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on",
-                       dims=PLANE),
-                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off",
-                       dims=PLANE),
+                Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
+                Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
                        "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
@@ -646,7 +644,7 @@ _MODEL = (
                        "and the step is estimated again", "s"),
                 Option("hyd{raulic}", (NOT_NEGATIVE,), "sub-step of flow, which then has a clock of its own; 0: those "
                        "of a cycle take the time of the steps of the blocks, or without motion half of what is stable",
-                       "s", "0", dims=PLANE),
+                       "s", "0"),
                 Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
                        "0")),
@@ -703,9 +701,9 @@ _MODEL = (
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
                             default="1"),
                      Option("therm{al}", (ZERO_OR_MORE,), "sub-steps of a cycle of heat; 0: as many as are stable",
-                            default="0"),
+                            default="0", dims=PLANE),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
-                            default="0", dims=PLANE)),
+                            default="0")),
             needs_option=True, dims=BOTH),
     Command("mod{el} ray{leigh}", "Rayleigh damping of elements in dynamic runs, beside that of their damp-factor: "
             "alpha times the mass, beta times the stiffness. The damping ratio of a vibration is alpha / (4 pi f) + "
@@ -960,23 +958,24 @@ _OBJECTS = (
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
                      Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1"),
-                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
-            ranged="node", needs_option=True),
+                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1",
+                            dims=PLANE)),
+            ranged="node", needs_option=True, dims=BOTH),
     Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
             "Stages say what it does; without one it is shut in.",
-            ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node"),
+            ("pcdc well create 'injection' range geometry 'hole'",), (_NAME,), ranged="node", dims=BOTH),
     Command("well st{age}", "One more stage of a well, after those that it has; one without time that has begun ends "
             "now. After the last the well is shut in. Times of tables are those of flow.",
             ("pcdc well stage 'injection' rate 1e-4 time 60 limit 8e6", "pcdc well stage 'injection' shut-in time 600",
              "pcdc well stage 'injection' pressure table 'bottom-hole'"),
             (_NAME,),
-            options=(Option("ra{te}", (TABLED,), "volume that is pumped in; negative: drawn, as far as there is fluid",
-                            "m2/s"),
+            options=(Option("ra{te}", (TABLED,), "volume that is pumped in; negative: drawn, as far as there is fluid; "
+                            "in space m3/s", "m2/s"),
                      Option("pr{essure}", (TABLED,), "pressure that is held", "Pa"),
                      Option("sh{ut}-in", (), "nothing comes in or out"),
                      Option("time", (POSITIVE,), "time of flow that it takes", "s", "no end"),
                      Option("lim{it}", (NOT_NEGATIVE,), "with rate: pressure above which less is pumped in", "Pa",
-                            "none"))),
+                            "none")), dims=BOTH),
     Command("bolt cr{eate} p{olyline}", "Installs a rock bolt along these points, as things are now: at any stage of "
             "a run. It is divided at the edges of elements, or as said. Nodes go with the rock across the bar, and are "
             "tied to it along the bar by grout, under the plate altogether; where the rock is taken out they are free. "
@@ -1072,7 +1071,7 @@ _RECORDS = (
              Option("near{est}", (VECTOR,), "the object nearest to this point", "m"),
              Option("val{ue}", (_RECORDED,), "what is recorded, see below", required=True), _EVERY,
              Option("var{iable}", (STRING,), "with law-state: which state variable of laws of the user", dims=PLANE),
-             Option("well", (STRING,), "with object well: its name", dims=PLANE),
+             Option("well", (STRING,), "with object well: its name"),
              *(Option(how, (), "of the objects of range, or of all")
                for how in ("sum", "mean", "min{imum}", "max{imum}"))),
             ranged="any", dims=BOTH),

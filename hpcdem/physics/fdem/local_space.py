@@ -113,7 +113,8 @@ class LocalSpace(LawsSpace):
         places = mesh.points[mesh.face_points(faces[i, k])].mean(axis=1)
         self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
         self.load_of = self.load_functions.of
-        self.some_applied = sim.comm.any(len(i) > 0)
+        sim.surface_loads.corners(sim, self.special)
+        self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0)
 
     def _mark_special(self) -> None:
         """All forces are stored."""
@@ -134,6 +135,8 @@ class LocalSpace(LawsSpace):
         if not sim.options.collision:
             for k in range(4):
                 springs[:, FACES[k]] += each[:, k, None]
+            sim.surface_loads.springs(sim, springs)
+            sim.surface_loads.dashpots(sim, dashpots)
             return springs, dashpots
         length = self.shapes.double_area[own]
         surfaces = Surfaces(sim, self.shapes, faces, np.repeat(np.arange(own.start, own.stop), 4))
@@ -153,6 +156,8 @@ class LocalSpace(LawsSpace):
             for c in FACES[k]:
                 springs[:, c] += np.maximum(each[:, k], contact[:, k])
                 dashpots[:, c] += drag[:, k]
+        sim.surface_loads.springs(sim, springs)
+        sim.surface_loads.dashpots(sim, dashpots)
         return springs, dashpots
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
@@ -214,6 +219,7 @@ class LocalSpace(LawsSpace):
             self.applied[:] = 0.0
             loads = self.loads_now(self.load_functions, clock.time)
             space.tractions(self.load_corner, self.load_of, loads, sim.x, self.applied)
+            sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
             if self.some_applied:

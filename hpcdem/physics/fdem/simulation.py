@@ -537,7 +537,7 @@ class Blocks(State):
                 self.prepare_kernels(f"{kind}-space" if self.dim == 3 else kind)
         for load in self.surface_loads:
             if load.kernel_kind:
-                self.prepare_kernels(load.kernel_kind)
+                self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 else ""))
         user_laws.begin(self)
         user_laws.compile_for_quads(self)
         with self.timers("neighbour"):

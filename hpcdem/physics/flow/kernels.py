@@ -1,5 +1,8 @@
 """The arithmetic of flow in channels: apertures, flows, volumes and pressures of nodes, loads on faces.
 
+What flows goes along links (network.py): in the plane each channel is one; in space (kernels_space.py) three, and each
+row of the table of "channels" is that of a link. A link may have a negative conductance, opposite an obtuse angle.
+
 Node state (n, 3): pressure [Pa], saturation, and potential energy of the fluid per volume by its height, -rho g . x
 [Pa]. Flows are those of the manual, 7.5.1, with its slips corrected; nodes keep the volume of their fluid at reference
 density W, so that what flows out of one flows into another: p = K (W / V - 1), or s = W / V where that is below 1.
@@ -89,7 +92,7 @@ def longest_step(begin, channel, ends, channels, nodes, state, bulk):
         for m in range(begin[i], begin[i + 1]):
             c = channel[m]
             rise = abs(state[ends[c, 0], E] - state[ends[c, 1], E]) * channels[c, WEIGHT]
-            k += channels[c, CONDUCT] * (bulk + STEEPEST * rise)
+            k += abs(channels[c, CONDUCT]) * (bulk + STEEPEST * rise)
         if k > 0.0:
             least = min(least, 0.5 * nodes[i, V] / k)
     return least
@@ -102,13 +105,13 @@ def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, s
         a, b = ends[c, 0], ends[c, 1]
         head = (state[a, P] - state[b, P]) + (state[a, E] - state[b, E]) * channels[c, WEIGHT]
         s = 0.5 * (state[a, S] + state[b, S])
-        up = state[a, S] if head > 0.0 else state[b, S]
+        up = state[a, S] if (head > 0.0) == (channels[c, CONDUCT] > 0.0) else state[b, S]
         q[c] = channels[c, CONDUCT] * part(min(s, up)) * head
         if leaks:
             row = laws[law[c]]
             over = 0.5 * (state[a, P] + state[b, P]) - row[PORE]
             if over > 0.0 and row[LEAK] > 0.0 and since[c] <= before:
-                length = 2.0 * channels[c, HALF] / channels[c, APERTURE]
+                length = 2.0 * channels[c, HALF] / channels[c, APERTURE]  # in space an area
                 roots = math.sqrt(after - since[c]) - math.sqrt(before - since[c])
                 lost[c] = 2.0 * part(s) * row[LEAK] * over * length * roots  # half of both walls, to each end
             else:

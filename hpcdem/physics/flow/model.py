@@ -20,13 +20,13 @@ from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.halo.copies import Copies, moved
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import said
-from hpcdem.physics.fdem.connectivity import corner_counts, face_points
+from hpcdem.physics.fdem.connectivity import corner_counts
 from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE, JOINT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
-from hpcdem.physics.flow import kernels
-from hpcdem.physics.flow.network import Network, at_nodes, wet_faces
+from hpcdem.physics.flow import kernels, kernels_space
+from hpcdem.physics.flow.network import LINKS, Network, at_nodes, links_of, wet_faces
 from hpcdem.physics.flow.properties import FLUID, POROUS
 from hpcdem.physics.flow.wells import PRESSURE as HELD
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
@@ -329,7 +329,7 @@ class Flow(SurfaceLoad):
         if self._network is None:
             blocks, mesh = self.blocks, self.blocks.the_mesh()
             channels = np.flatnonzero((self.row > 0) & blocks.joint_exists())
-            self._network = Network.of(mesh.cells, len(mesh.points), channels)
+            self._network = Network.of(mesh, channels)
         return self._network
 
     def numbers(self, kind: str) -> np.ndarray:
@@ -351,15 +351,16 @@ class Flow(SurfaceLoad):
             blocks = self.blocks
             row = blocks.where[self._channels // 4]
             mine = (row >= blocks.owned.start) & (row < blocks.owned.stop)
-            ends, table = self._ends[mine], self._table[mine]
+            ends, aperture = self._corners[mine], self.apertures()[mine]
             self._find_flows(0.0)
+            flux = self.fluxes()[mine]
             wanted = [name for name in names if name in _OF_OTHERS]
             others = {name: self._of_others(name, copies=True)[ends].mean(axis=1) for name in wanted}
             made = {
-                "number": self._channels[mine], "aperture": table[:, kernels.APERTURE], "flow_rate": self._q[mine],
+                "number": self._channels[mine], "aperture": aperture, "flow_rate": flux,
                 "pressure": self.state[ends, kernels.P].mean(axis=1),
                 "saturation": self.state[ends, kernels.S].mean(axis=1),
-                "velocity": self._q[mine] / table[:, kernels.APERTURE], **others,
+                "velocity": flux / aperture, **others,
             }  # fmt: skip
         return {name: made[name].copy() for name in ("number", *names)}
 
@@ -381,15 +382,28 @@ class Flow(SurfaceLoad):
         at = np.minimum(np.searchsorted(self._channels, channels), max(len(self._channels) - 1, 0))
         return np.where(self._channels[at] == channels, at, -1) if len(self._channels) else np.full(len(channels), -1)
 
+    def fluxes(self) -> np.ndarray:
+        """What flows in this rank's channels (m,) [m2/s] at `_q`: from the first corner on, in space its size: that of
+        sum q_ij (x_j - x_i) / A, exact for a pressure that is linear, as half of sum cot(angle) e e^T over the sides of
+        a triangle is A. Not collective."""
+        if self.blocks.dim == 2:
+            return self._q
+        x, (one, other) = self.blocks.x.reshape(-1), self._sides
+        a, b, c, p, q, r = (x[at[:, None] + np.arange(3)] for at in (*one.T, *other.T))
+        at = 0.5 * np.stack([a + p, b + r, c + q], axis=1)
+        way = at[:, [2, 0, 1]] - at[:, [1, 2, 0]]
+        area = 0.5 * np.linalg.norm(np.cross(way[:, 0], way[:, 1]), axis=1)
+        return np.linalg.norm((self._q.reshape(-1, 3, 1) * way).sum(axis=1), axis=1) / area
+
     @property
     def links(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Rows of the ends (m, 2) of this rank's channels, and channels by its nodes, see network.at_nodes. Not
-        collective."""
+        """Rows of the ends (m, 2) of the links of this rank's channels, and links by its nodes, see network.at_nodes.
+        Not collective."""
         return self._ends, self._begin, self._channel, self._side
 
     @property
     def sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where both faces of this rank's channels begin in x (m,). Not collective."""
+        """Where both faces of this rank's channels begin in x (m,), in space their corners (m, 3). Not collective."""
         return self._sides
 
     @property
@@ -399,17 +413,17 @@ class Flow(SurfaceLoad):
 
     @property
     def channel_table(self) -> np.ndarray:
-        """Of this rank's channels (m, kernels.CHANNEL). Not to be changed. Not collective."""
+        """Of the links of this rank's channels (m, kernels.CHANNEL). Not to be changed. Not collective."""
         return self._table
 
     def apertures(self) -> np.ndarray:
         """Of this rank's channels [m]. Not to be changed. Not collective."""
-        return self._table[:, kernels.APERTURE]
+        return self._table[:: LINKS[self.blocks.dim], kernels.APERTURE]
 
     def mean_flows(self) -> np.ndarray:
-        """Flow (m,) [m2/s] of this rank's channels from their first end on: the mean of the last cycle, of which
-        `carried` is kept, or where flow is switched off that of this moment. Not collective."""
-        if self.carried is None or not self.blocks.options.hydraulic or len(self.carried) != len(self._channels):
+        """Flow (m,) [m2/s] of the links of this rank's channels from their first end on: the mean of the last cycle, of
+        which `carried` is kept, or where flow is switched off that of this moment. Not collective."""
+        if self.carried is None or not self.blocks.options.hydraulic or len(self.carried) != len(self._ends):
             self._find_flows(0.0)
             return self._q
         return self.carried / (self.sub_steps * self.dt)
@@ -456,19 +470,18 @@ class Flow(SurfaceLoad):
 
     def wet(self) -> np.ndarray:
         """Faces of owned elements that fluid pushes on, ascending."""
-        blocks, cells = self.blocks, self.blocks.the_mesh().cells
+        blocks, mesh = self.blocks, self.blocks.the_mesh()
         number = np.sort(blocks.number[blocks.owned])
-        faces = (4 * number[:, None] + np.arange(4))[np.arange(4) < corner_counts(cells[number])[:, None]]
-        channel = np.zeros(cells.size, bool)
+        faces = (4 * number[:, None] + np.arange(4))[np.arange(4) < corner_counts(mesh.cells[number])[:, None]]
+        channel = np.zeros(mesh.cells.size, bool)
         channel[self.network.channels] = True
-        return wet_faces(cells, blocks.partner, faces, blocks.closed_faces(), channel, self.network.there)
+        return wet_faces(mesh, blocks.partner, faces, blocks.closed_faces(), channel, self.network.there)
 
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)
         if self.pushes:
-            cells, faces = blocks.the_mesh().cells, self.wet()
-            row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
-            out[row, k] = out[row, (k + 1) % corner_counts(cells[faces // 4])] = True
+            corner = blocks.the_mesh().face_corners(self.wet())
+            out[blocks.where[corner // 4] - blocks.n_left, corner % 4] = True
         return out
 
     def springs(self, blocks: Any) -> np.ndarray | None:
@@ -484,23 +497,27 @@ class Flow(SurfaceLoad):
         lower = np.minimum(faces, np.where(blocks.partner[faces] >= 0, blocks.partner[faces], faces))
         there = (self.row[lower] > 0) & blocks.joint_exists()[lower]
         faces, laws = faces[there], self.laws()[self.row[lower[there]] - 1]
-        way = np.diff(mesh.points[face_points(mesh.cells, faces)], axis=1)[:, 0]
         delta = np.clip(laws[:, kernels.INITIAL], laws[:, kernels.LEAST], laws[:, kernels.MOST])
-        each = 0.5 * modulus * np.hypot(way[:, 0], way[:, 1]) / delta
+        each = modulus / mesh.dim * mesh.face_sizes(faces) / delta
         out = np.zeros((blocks.n_own, 4))
-        row, k = blocks.where[faces // 4] - blocks.n_left, faces % 4
-        np.add.at(out, (row, k), each)
-        np.add.at(out, (row, (k + 1) % corner_counts(mesh.cells[faces // 4])), each)
+        for corner in mesh.face_corners(faces).T:
+            np.add.at(out, (blocks.where[corner // 4] - blocks.n_left, corner % 4), each)
         return out
 
     def _sides_of(self, faces: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, int]:
-        """Where both faces of channels begin in x, their laws, and a face that this rank does not hold, or -1."""
+        """Where both faces of channels begin in x, in space their corners; the laws of their links; and a face that
+        this rank does not hold, or -1."""
         blocks, width = self.blocks, self.blocks.x.shape[1]
         other = blocks.partner[faces]
         one, two = blocks.where[faces // 4], blocks.where[other // 4]
         lost = faces[(one < 0) | (two < 0)]
-        sides = np.maximum(one, 0) * width + 2 * (faces % 4), np.maximum(two, 0) * width + 2 * (other % 4)
-        law = (self.row[np.minimum(faces, other)] - 1).astype(np.int64)
+        stride = blocks.local.stride
+        near, far = faces % 4, other % 4
+        if blocks.dim == 3:
+            near, far = (blocks.the_mesh().face_corners(of) % 4 for of in (faces, other))
+            one, two = one[:, None], two[:, None]
+        sides = np.maximum(one, 0) * width + stride * near, np.maximum(two, 0) * width + stride * far
+        law = np.repeat((self.row[np.minimum(faces, other)] - 1).astype(np.int64), LINKS[blocks.dim])
         return sides, law, int(lost[0]) if len(lost) else -1
 
     def laws(self) -> np.ndarray:
@@ -514,14 +531,15 @@ class Flow(SurfaceLoad):
         return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"], *dilation]))
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
-        """Largest distance from the first element around a flow node to the others there [m]; middle (n_own, 2): of
-        the owned elements."""
+        """Largest distance from the first element around a flow node to the others there [m]; middle (n_own, dim):
+        of the owned elements."""
         network, comm = self.network, blocks.comm
         if not len(network.channels):
             return 0.0
-        cells, faces = blocks.the_mesh().cells, network.channels
+        mesh, faces = blocks.the_mesh(), network.channels
+        cells = mesh.cells
         torn = np.zeros(len(network.there), bool)
-        torn[face_points(cells, faces[blocks.open[faces]])] = True
+        torn[mesh.face_points(faces[blocks.open[faces]])] = True
         torn &= network.there
         if not torn.any():
             return 0.0
@@ -532,9 +550,12 @@ class Flow(SurfaceLoad):
         first[cells[use][::-1]] = corner[use][::-1] // 4
         own = cells[blocks.number]
         mine, k = np.nonzero((own >= 0) & torn[own])
-        wanted, beside = first[own[mine, k]], blocks.partner[4 * blocks.number[mine] + k]
+        wanted, at, beside = first[own[mine, k]], mine, blocks.partner[4 * blocks.number[mine] + k]
+        if mesh.dim == 3:  # all faces that end there
+            at = np.repeat(np.flatnonzero(torn[own].any(axis=1)), 4)
+            beside = blocks.partner[4 * blocks.number[at] + np.tile(np.arange(4), len(at) // 4)]
         other = (beside >= 0) & blocks.alive[beside // 4]
-        mine, wanted = np.append(mine, mine[other]), np.append(wanted, beside[other] // 4)
+        mine, wanted = np.append(mine, at[other]), np.append(wanted, beside[other] // 4)
         home = blocks.number * comm.size // total
         _, number, places = comm.to_ranks(home, blocks.number, np.ascontiguousarray(middle))
         target = wanted * comm.size // total
@@ -552,18 +573,18 @@ class Flow(SurfaceLoad):
         if not len(network.channels):
             self._forget_nodes(np.ones(len(self.number), bool))
             return
-        points, cells = len(network.there), blocks.the_mesh().cells
+        points, mesh = len(network.there), blocks.the_mesh()
         leads = blocks.local.leads[network.nodes]
         row = blocks.where[leads // 4]
         own = (row >= blocks.owned.start) & (row < blocks.owned.stop)
         mine, leads, row = network.nodes[own], leads[own], row[own]
         at = blocks.where[network.channels // 4]
         beside = (at >= blocks.owned.start) & (at < blocks.owned.stop)
-        self._channels = network.channels[np.isin(network.ends, mine).any(axis=1) | beside]
-        ends = face_points(cells, self._channels)
+        self._channels = network.channels[np.isin(network.corners, mine).any(axis=1) | beside]
+        corners = mesh.face_points(self._channels)
         self._pushed = self.wet() if self.pushes else np.empty(0, np.int64)
-        loaded = face_points(cells, self._pushed)
-        wanted = np.setdiff1d(np.concatenate([ends.reshape(-1), loaded.reshape(-1)]), mine)
+        loaded = mesh.face_points(self._pushed)
+        wanted = np.setdiff1d(np.concatenate([corners.reshape(-1), loaded.reshape(-1)]), mine)
         self._forget_nodes(~network.there[self.number])
         n = len(self.number)
         had = np.column_stack([self.nodes, self.state[:n, : kernels.E]])
@@ -579,9 +600,10 @@ class Flow(SurfaceLoad):
         self.held = np.concatenate([mine, wanted])
         local = np.full(points, -1, np.int64)
         local[mine], local[wanted] = np.arange(len(mine)), len(mine) + np.arange(len(wanted))
-        self._ends = local[ends]
+        self._corners = local[corners]
+        self._ends = ends = links_of(self._corners)
         self._begin, self._channel, self._side = at_nodes(self._ends, len(mine))
-        self._lead = row * blocks.x.shape[1] + 2 * (leads % 4)
+        self._lead = row * blocks.x.shape[1] + blocks.local.stride * (leads % 4)
         self._q, self._lost_fluid = np.zeros(len(ends)), np.zeros(len(ends))
         self.note_leaks()
         self._bind_loads(loaded, local)
@@ -634,7 +656,8 @@ class Flow(SurfaceLoad):
     def find_geometry(self) -> None:
         """Apertures and conductances where the blocks are now. Not collective."""
         blocks, (one, other) = self.blocks, self._sides
-        kernel = kernels.geometry if blocks.threads == 1 else kernels.geometry_threaded
+        of = kernels if blocks.dim == 2 else kernels_space
+        kernel = of.geometry if blocks.threads == 1 else of.geometry_threaded
         kernel(blocks.threads, one, other, self._law, self._law_table, blocks.x, self.viscosity, self._table)
         if self.slurry is not None:
             self.slurry.thicken(self._ends, self._table)
@@ -653,20 +676,21 @@ class Flow(SurfaceLoad):
     def _take_heights(self) -> None:
         """Potential energy of the owned nodes, where the first element around each has them."""
         o, flat = self.blocks.options, self.blocks.x.reshape(-1)
-        rho = self.fluid("fluid_density")
-        self.state[: len(self.number), kernels.E] = -rho * (o.gx * flat[self._lead] + o.gy * flat[self._lead + 1])
+        rho, along = self.fluid("fluid_density"), o.gx * flat[self._lead] + o.gy * flat[self._lead + 1]
+        if self.blocks.dim == 3:
+            along += o.gz * flat[self._lead + 2]
+        self.state[: len(self.number), kernels.E] = -rho * along
 
     def _refresh(self) -> None:
         if self._copies is not None:
             self._copies.refresh()
 
     def _bind_loads(self, loaded: np.ndarray, local: np.ndarray) -> None:
-        blocks, cells = self.blocks, self.blocks.the_mesh().cells
-        faces = self._pushed
-        row, k = blocks.where[faces // 4], faces % 4
-        self._push_edge = row * blocks.x.shape[1] + 2 * k
-        last = (k + 1) % corner_counts(cells[faces // 4])
-        self._push_corner = np.column_stack([8 * row + 2 * k, 8 * row + 2 * last])
+        blocks, faces = self.blocks, self._pushed
+        corner, of = blocks.the_mesh().face_corners(faces), blocks.local
+        row, k = blocks.where[corner // 4], corner % 4
+        self._push_edge = np.ascontiguousarray((row * blocks.x.shape[1] + of.stride * k)[:, 0])
+        self._push_corner = of.force_width * row + of.stride * k
         self._push_node = local[loaded]
 
     def note_leaks(self, broken: np.ndarray | None = None) -> None:
@@ -678,7 +702,7 @@ class Flow(SurfaceLoad):
         leaks = np.array([False, *(row[_PROPERTIES.index("leak_off")] > 0.0 for row in self.rows)])
         new = at[leaks[self.row[at]] & np.isinf(self.since[at])]
         self.since[new] = self.time
-        self._since = self.since[self._channels]
+        self._since = np.repeat(self.since[self._channels], LINKS[self.blocks.dim])
         self._leaks = bool(np.isfinite(self.since).any())
 
     def joints_opened(self) -> None:
@@ -708,7 +732,12 @@ class Flow(SurfaceLoad):
         """What the length of a sub-step follows from, beside the channels."""
         o = self.blocks.options
         switches = [float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.flow_steps), o.flow_dt]
-        return [*switches, o.gx, o.gy, self.blocks.clock.dt if o.mechanical else 0.0]
+        return [*switches, *self._gravity(), self.blocks.clock.dt if o.mechanical else 0.0]
+
+    def _gravity(self) -> list[float]:
+        """By components [m/s2]."""
+        o = self.blocks.options
+        return [o.gx, o.gy, o.gz][: self.blocks.dim]
 
     def _find_step(self) -> None:
         """Sub-steps of a cycle and their length, from what was said and what is stable."""
@@ -753,7 +782,7 @@ class Flow(SurfaceLoad):
         if o.mechanical and not o.dynamic and o.flow_dt == 0.0:
             raise CommandError("in static runs time of flow passes by model time-step hydraulic, which comes first")
         surface = [row for row in np.unique(self.condition).tolist() if conditions[row].does == kernels.SURFACE]
-        if surface and o.gx == 0.0 == o.gy:
+        if surface and not any(self._gravity()):
             raise CommandError("flow-surface needs gravity: model gravity comes first")
 
         for well in self.wells:
@@ -773,13 +802,13 @@ class Flow(SurfaceLoad):
             if o.mechanical:
                 self.find_geometry()
                 self._find_volumes()
-                if o.gx != 0.0 or o.gy != 0.0:
+                if any(self._gravity()):
                     self._take_heights()
                     self._refresh()
             if o.mechanical and (self.cycles % LOOK == 0 or self._found_for != self._given()):
                 self._find_step()
             if self.carried is not None:
-                self.carried = np.zeros(len(self._channels))
+                self.carried = np.zeros(len(self._ends))
             for _ in range(self.sub_steps):
                 self._sub_step()
             self.cycles += 1
@@ -842,9 +871,8 @@ class Flow(SurfaceLoad):
 
     def conditions_at(self, time: float) -> np.ndarray:
         """The table of conditions (rows, 2) at a flow time: heights as potential energies."""
-        o = self.blocks.options
         table = np.zeros((len(self.conditions), 2))
-        height = self.fluid("fluid_density") * math.hypot(o.gx, o.gy)
+        height = self.fluid("fluid_density") * math.hypot(*self._gravity())
         for row, one in enumerate(self.conditions):
             value = said.now(self.blocks.tables, one.value, time)
             table[row] = one.does, value * height if one.does == kernels.SURFACE else value
@@ -869,10 +897,13 @@ class Flow(SurfaceLoad):
     def push(self, state: np.ndarray, column: int, applied: np.ndarray) -> None:
         """Add a pressure on faces to what is applied to corners: a column of rows like those of `state`, copies too.
         Not collective."""
-        if self.pushes:
-            kernels.loads(
-                self._push_edge, self._push_corner, self._push_node, self.blocks.x, state, column, applied
-            )  # fmt: skip
+        if not self.pushes:
+            return
+        at = self._push_corner, self._push_node, self.blocks.x, state, column, applied
+        if self.blocks.dim == 2:
+            kernels.loads(self._push_edge, *at)
+        else:
+            kernels_space.loads(*at)
 
     def balanced(self) -> None:
         """Pressures and saturations are those of before: fluid that this takes is given, what has no room left goes."""

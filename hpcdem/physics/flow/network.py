@@ -2,7 +2,8 @@
 
 A *channel* is a joint with a hydraulic model, broken or not, between two elements that are there; it has the number of
 the joint, its lower face. A *flow node* is a point of the mesh at which a channel ends, and has the number of the
-point: however many corners of elements have parted there, they share one pressure.
+point: however many corners of elements have parted there, they share one pressure. Fluid goes along *links* between two
+nodes: in the plane the channel itself, in space the three sides of its triangle, of which each stands for a third.
 """
 
 from __future__ import annotations
@@ -11,31 +12,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hpcdem.physics.fdem.connectivity import face_points
+from hpcdem.physics.fdem.mesh import Mesh
+
+LINKS = {2: 1, 3: 3}
+"""Of a channel, by dimensions of space."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """channels (m,): joints, ascending; ends (m, 2): points of the mesh where they begin and end, in the direction of
-    the lower face; nodes (n,): points, ascending; there (np,) bool: points that are nodes."""
+    """channels (m,): joints, ascending; corners (m, 2), in space (m, 3): points of the mesh at which they end, in the
+    direction of the lower face; ends (l, 2): those of their links, see `links_of`; nodes (n,): points, ascending; there
+    (np,) bool: points that are nodes."""
 
     channels: np.ndarray
+    corners: np.ndarray
     ends: np.ndarray
     nodes: np.ndarray
     there: np.ndarray
 
     @staticmethod
-    def of(cells: np.ndarray, n_points: int, channels: np.ndarray) -> Network:
+    def of(mesh: Mesh, channels: np.ndarray) -> Network:
         """The network of these channels (lower faces, ascending)."""
-        ends = face_points(cells, channels)
-        there = np.zeros(n_points, bool)
-        there[ends] = True
-        return Network(channels, ends, np.flatnonzero(there), there)
+        corners = mesh.face_points(channels)
+        there = np.zeros(len(mesh.points), bool)
+        there[corners] = True
+        return Network(channels, corners, links_of(corners), np.flatnonzero(there), there)
+
+
+def links_of(corners: np.ndarray) -> np.ndarray:
+    """(l, 2) ends of the links of channels with these corners (m, 2) or (m, 3): the sides of triangles one after the
+    other, the k-th opposite the k-th corner."""
+    return corners if corners.shape[1] == 2 else np.ascontiguousarray(corners[:, [1, 2, 2, 0, 0, 1]]).reshape(-1, 2)
 
 
 def at_nodes(ends: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Channels (m,) with these ends (rows of nodes, -1: another's) by the nodes 0 .. n - 1: begin (n + 1,), and for
-    each the channels and -1.0 where it is their first end, 1.0 where it is their last, in the order of channels."""
+    """Links (m,) with these ends (rows of nodes, -1: another's) by the nodes 0 .. n - 1: begin (n + 1,), and for each
+    the links and -1.0 where it is their first end, 1.0 where it is their last, in the order of links."""
     m = len(ends)
     node, channel = ends.T.reshape(-1), np.tile(np.arange(m), 2)
     side = np.repeat([-1.0, 1.0], m)
@@ -69,19 +81,19 @@ def path(ends: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def wet_faces(
-    cells: np.ndarray,
+    mesh: Mesh,
     partner: np.ndarray,
     faces: np.ndarray,
     closed: np.ndarray,
     channel: np.ndarray,
     there: np.ndarray,
 ) -> np.ndarray:
-    """Those of these faces (k,) that fluid pushes on: sides of channels, and free faces between two flow nodes.
+    """Those of these faces (k,) that fluid pushes on: sides of channels, and free faces between flow nodes.
 
     closed (4 ne,) bool: faces that hang together with their partner; channel (4 ne,) bool: lower faces of channels;
     there (np,) bool: points that are flow nodes.
     """
     other = partner[faces]
     is_channel = channel[np.where(other >= 0, np.minimum(faces, other), faces)]
-    between = there[face_points(cells, faces)].all(axis=1)
+    between = there[mesh.face_points(faces)].all(axis=1)
     return faces[is_channel | (between & ~closed[faces])]

@@ -464,8 +464,8 @@ class Heat(SurfaceLoad):
             blocks.log.warn_once(
                 "obtuse tetrahedra",
                 f"along {int(against.sum())} of {len(key)} edges heat is conducted from the colder to the warmer end, "
-                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} tetrahedra): "
-                "near steep fronts temperatures may leave the range of those around them",
+                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} "
+                "tetrahedra): near steep fronts temperatures may leave the range of those around them",
             )
 
     def _make_nodes(self) -> None:

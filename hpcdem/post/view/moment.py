@@ -47,7 +47,7 @@ PARTS = {
 
 def unit_of(name: str, dim: int = 2) -> str:
     """The unit of a field of a frame, "" for numbers without one, and for those that are not known here."""
-    if dim == 3:
+    if dim == 3 and name != "flow_rate":  # of a metre of a channel
         unit = unit_of(name)
         return PER_METRE.get(unit, unit)
     words = name.split("_")
@@ -300,7 +300,9 @@ def of_blocks(state: MeshState) -> Moment:
     wet = [name for name in OF_CHANNELS if name in state.of_joints]
     rest = [name for name in state.of_joints if name not in (*wet, "cell") and not name.startswith("group_")]
     if count and dim == 3:
-        objects["joints"] = Objects(FACES, count, lambda: (state.points, _faces(state)), of_joints(slice(None), rest))
+        objects["joints"] = Objects(
+            FACES, count, lambda: (state.points, _faces(state)), of_joints(slice(None), rest + wet)
+        )
     elif count:
         objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(slice(None), rest))
     if "aperture" in wet and dim == 2 and fluid.there(state):

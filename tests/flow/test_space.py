@@ -1,0 +1,327 @@
+"""Fluid in triangular channels of tetrahedra: kernels against the plain formula, closed forms, pressure on walls."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.flow import kernels, reference
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import RATE
+from tests.flow import exact
+from tests.flow.space import on_plane, points_at, ring, standing
+from tests.flow.support import WATER, hold, inner, run, until
+from tests.space.support import body, box
+
+SHAKEN = box((3, 3, 2), (3.0, 2.0, 1.0), 5, shaken=0.25)
+
+
+def _by_links(flow: Flow) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ends (rows of nodes), conductances and halves of the links of triangles, of the formula alone."""
+    mesh, network = flow.blocks.the_mesh(), flow.network
+    conduct, half = [], []
+    for corners in network.corners:
+        at = mesh.points[corners]
+        side = [at[(k + 2) % 3] - at[(k + 1) % 3] for k in range(3)]
+        area = 0.5 * np.linalg.norm(np.cross(side[0], side[1]))
+        for k in range(3):
+            cot = -float(side[(k + 1) % 3] @ side[(k + 2) % 3]) / (2.0 * area)
+            conduct.append(1e-5**3 * cot / (24.0 * 1e-3))
+            half.append(1e-5 * area / 6.0)
+    return np.searchsorted(flow.number, network.ends), np.array(conduct), np.array(half)
+
+
+def test_what_leaves_corners_is_half_the_flux_across_the_opposite_side() -> None:
+    """Table of links against Q = q . n s / 2 of each triangle, also of obtuse ones."""
+    sim, flow = standing(SHAKEN)
+    sim.close_model()
+    table = flow.channel_table.reshape(-1, 3, kernels.CHANNEL)
+    assert table[:, :, kernels.CONDUCT].min() < 0.0
+    rng = np.random.default_rng(3)
+    for corners, rows in zip(flow.network.corners, table):
+        at, head = SHAKEN.points[corners], rng.uniform(0.0, 1e6, 3)
+        wanted = reference.out_of_triangle(at, 1e-5, 1e-3, head)
+        along = rows[:, kernels.CONDUCT] * (head[[1, 2, 0]] - head[[2, 0, 1]])  # from 1 to 2, 2 to 0, 0 to 1
+        assert [along[2] - along[1], along[0] - along[2], along[1] - along[0]] == pytest.approx(wanted, rel=1e-10)
+        area = 0.5 * np.linalg.norm(np.cross(at[1] - at[0], at[2] - at[0]))
+        assert 2.0 * rows[:, kernels.HALF].sum() == pytest.approx(1e-5 * area, rel=1e-12)
+
+
+def test_kernels_do_what_the_plain_loop_does() -> None:
+    """Wet, half wet and dry nodes, gravity along all axes, one with a pressure."""
+    sim, flow = standing(SHAKEN, fluid_bulk=1e5)
+    sim.gravity(1.3, -0.7, -9.81)
+    sim.close_model()
+    n = len(flow.number)
+    flow.nodes[:, kernels.W] = flow.nodes[:, kernels.V] * np.random.default_rng(2).choice([0.0, 0.4, 0.9, 1.0, 1.3], n)
+    flow._find_state(slice(None))
+    hold(flow, flow.number[3:4], 5e4)
+    sim.close_model()
+    w, energy = flow.nodes[:, kernels.W].copy(), -1000.0 * (SHAKEN.points[flow.number] @ np.array([1.3, -0.7, -9.81]))
+    links = _by_links(flow)
+    for _ in range(3):
+        sim.step()
+        w, p, s = reference.sub_step(*links, 1e5, energy, w, flow.dt, {3: 5e4})
+        assert flow.nodes[:, kernels.W] == pytest.approx(w, rel=1e-11, abs=1e-18)
+        assert flow.state[:n, kernels.P] == pytest.approx(p, rel=1e-9, abs=1e-3)
+        assert flow.state[:n, kernels.S] == pytest.approx(s, rel=1e-11)
+
+
+def test_a_uniform_gradient_flows_evenly() -> None:
+    """A plane of triangles: q = d^3 / (12 mu) dp/dx, its velocity over the aperture, the same everywhere."""
+    mesh = box((4, 3, 2), (4.0, 3.0, 2.0), 6)
+    sim, flow = standing(mesh, on_plane(mesh, 2, 1.0), aperature_initial=1e-4)
+    flow.fill(None, saturation=1.0)
+    hold(flow, points_at(mesh, x=0.0, z=1.0), 4e3)
+    hold(flow, points_at(mesh, x=4.0, z=1.0), 0.0)
+    run(sim, 400)
+    flux = 1e-12 / 12e-3 * 1e3
+    assert flow.values("flow-channel", "flow_rate") == pytest.approx(flux, rel=1e-6)
+    assert flow.values("flow-channel", "velocity") == pytest.approx(flux / 1e-4, rel=1e-6)
+    nodes = flow.numbers("flow-node")
+    assert flow.values("flow-node", "pressure") == pytest.approx(4e3 - 1e3 * mesh.points[nodes, 0], rel=1e-6, abs=1e-2)
+    inflow = flow.values("flow-node", "inflow")
+    assert inflow[mesh.points[nodes, 0] == 0.0].sum() == pytest.approx(3.0 * flux, rel=1e-6)
+    assert flow.values("flow-node", "volume").sum() == pytest.approx(12.0 * 1e-4)
+
+
+def test_radial_flow_in_a_disc() -> None:
+    """fdem_3d.md D: 10 MPa at r = 1 m, 1 MPa at 5 m, 10 um, 1 mPa s: 7.7326, 6.1239, 3.8565, 2.2478 MPa within 1 % of
+    9 MPa; Q 2.92797e-6 m3/s; what comes in goes out to 1e-6."""
+    marks, parts = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0), (3, 2, 3, 2, 2)
+    radii = np.concatenate(
+        [np.geomspace(a, b, n, endpoint=False) for a, b, n in zip(marks, marks[1:], parts)] + [[5.0]]
+    )
+    mesh = ring(radii, 24, np.array([-0.5, 0.0, 0.5]))
+    sim, flow = standing(mesh, on_plane(mesh, 2, 0.0), fluid_bulk=1e7)
+    flow.fill(None, pressure=5e6)
+    nodes = flow.numbers("flow-node")
+    r = np.hypot(*mesh.points[nodes, :2].T)
+    hold(flow, nodes[r < 1.0 + 1e-9], 10e6)
+    hold(flow, nodes[r > 5.0 - 1e-9], 1e6)
+    run(sim, 13_000)
+    pressure, inflow = flow.values("flow-node", "pressure"), flow.values("flow-node", "inflow")
+    for radius, wanted in ((1.5, 7.7326e6), (2.0, 6.1239e6), (3.0, 3.8565e6), (4.0, 2.2478e6)):
+        found = pressure[np.abs(r - radius) < 1e-9]
+        assert len(found) == 24 and found == pytest.approx(wanted, abs=0.01 * 9e6)
+        assert float(exact.radial(np.array([radius]), (1.0, 10e6), (5.0, 1e6))[0]) == pytest.approx(wanted, rel=1e-4)
+    into, out = inflow[r < 1.0 + 1e-9].sum(), inflow[r > 5.0 - 1e-9].sum()
+    wanted = 2.0 * math.pi * 1e-15 / (12.0 * 1e-3) * 9e6 / math.log(5.0)
+    assert wanted == pytest.approx(2.92797e-6, rel=1e-5)
+    assert into == pytest.approx(wanted, rel=0.01) and into == pytest.approx(-out, rel=1e-6)
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_a_pulse_runs_into_a_closed_channel() -> None:
+    """A plane of channels 10 m long; the closed form of the line, 1 % of p_A."""
+    mesh = box((40, 1, 2), (10.0, 0.25, 0.5), 6)
+    sim, flow = standing(mesh, on_plane(mesh, 2, 0.25), aperature_initial=1e-4)
+    flow.fill(None, saturation=1.0)
+    hold(flow, points_at(mesh, x=0.0, z=0.25), 1e6)
+    ends = [points_at(mesh, x=x, z=0.25) for x in (5.0, 10.0)]
+    rate = 2.2e9 * 1e-8 / (12.0 * 1e-3) / 100.0
+    for t in (0.25, 0.5):
+        until(sim, t / rate)
+        for at, xi in zip(ends, (0.5, 0.0)):
+            assert flow.values("flow-node", "pressure", at) == pytest.approx(1e6 * exact.transient(xi, t), abs=1e4)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_column_of_water_is_hydrostatic(axis: int) -> None:
+    """In an upright plane, gravity along y or z; then its surface is below the upper end, where it is dry."""
+    size = [0.4, 0.4, 0.4]
+    size[axis] = 2.0
+    cells = [2, 2, 2]
+    cells[axis] = 8
+    mesh = box(tuple(cells), tuple(size))
+    sim, flow = standing(mesh, on_plane(mesh, 0, 0.2), fluid_bulk=1e6)
+    g = [0.0, 0.0, 0.0]
+    g[axis] = -9.81
+    sim.gravity(*g)
+    top = points_at(mesh, **{"x": 0.2, "xyz"[axis]: 2.0})
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(top, kernels.SURFACE, 2.5)
+    run(sim, 5000)
+    height = mesh.points[flow.numbers("flow-node"), axis]
+    assert flow.values("flow-node", "pressure") == pytest.approx(1000.0 * 9.81 * (2.5 - height), rel=1e-4)
+    assert flow.values("flow-channel", "flow_rate").max() < 1e-11
+    flow.prescribe(top, kernels.SURFACE, 1.9)
+    run(sim, 4000)
+    assert flow.values("flow-node", "pressure") == pytest.approx(1000.0 * 9.81 * (2.0 - height), abs=2.0)
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_leak_off_after_carter() -> None:
+    """Both walls of the area take up 4 C A sqrt(t)."""
+    mesh = box((3, 2, 2), (0.3, 0.2, 0.2))
+    sim = body(mesh)
+    joints = on_plane(mesh, 2, 0.1)
+    matrix = {"matrix_permeability": 1e-15, "matrix_porosity": 0.2, "matrix_porosity_compressibility": 1e-9}
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "leak_off": 1.0, "matrix_pore_pressure": 2e5, **matrix})
+    sim.parts(mechanical=False)
+    sim.flow_clock(dt=1e-7)
+    flow.fill(None, pressure=1e6)
+    hold(flow, flow.numbers("flow-node"), 1e6)
+    run(sim, 5)
+    assert flow.account()["leaked"] == 0.0
+    changes.crack(sim, joints)
+    start = flow.time
+    run(sim, 200)
+    wanted = exact.carter(8e5, flow.time - start, 0.3 * 0.2, (1e-15, 0.2, 1e-9), 2.2e9, 1e-3)
+    assert flow.account()["leaked"] == pytest.approx(wanted, rel=1e-9)
+    assert flow.account()["relative"] < 1e-12
+
+
+# ---- conditions, wells ---------------------------------------------------------------------------------------------
+
+
+def test_rates_and_wells_count_volumes() -> None:
+    """A rate at three nodes follows a table; a well pumps a slug of so many m3; nothing comes out of dry nodes."""
+    mesh = box((3, 3, 2), (3.0, 3.0, 2.0))
+    sim, flow = standing(mesh, on_plane(mesh, 2, 1.0), fluid_bulk=1e6)
+    nodes = flow.numbers("flow-node")
+    sim.table("ramp", [(0.0, 0.0), (10.0, 1e-6)])
+    flow.prescribe(nodes[:3], kernels.RATE, "ramp")
+    flow.drill("hole", nodes[8:10])
+    flow.stage("hole", RATE, 2e-6, 1.5, math.inf)
+    sim.flow_clock(dt=0.01)
+    run(sim, 200)
+    wanted = 3.0 * sum(1e-7 * 0.01 * (k + 1) * 0.01 for k in range(200)) + 3e-6
+    assert flow.account()["given"] == pytest.approx(wanted, rel=1e-9)
+    assert flow.well_value("hole", "injected") == pytest.approx(3e-6, rel=1e-9)
+    flow.prescribe(nodes[-1:], kernels.RATE, -1.0)
+    run(sim, 50)
+    assert flow.values("flow-node", "fluid").min() >= 0.0
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_flow_surface_needs_gravity_along_any_axis() -> None:
+    mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
+    sim, flow = standing(mesh)
+    flow.prescribe(flow.numbers("flow-node")[:1], kernels.SURFACE, 1.0)
+    with pytest.raises(CommandError, match="flow-surface needs gravity"):
+        sim.step()
+    sim.gravity(0.0, 0.0, -9.81)
+    sim.step()
+
+
+def test_channels_go_with_their_elements() -> None:
+    mesh = box((3, 2, 2), (3.0, 2.0, 2.0))
+    sim, flow = standing(mesh, fluid_bulk=1e6)
+    flow.fill(None, pressure=1e3)
+    before = len(flow.network.channels)
+    changes.null(sim, np.arange(12))
+    sim.step()
+    account = flow.account()
+    assert len(flow.network.channels) < before and account["removed"] > 0.0 and account["relative"] < 1e-12
+
+
+# ---- with blocks that move ------------------------------------------------------------------------------------------
+
+
+def _sandwich(one_way: bool = False) -> tuple[Blocks, Flow]:
+    """Two blocks with a crack between them at z = 0.1 that is full of fluid at 2 MPa, held below and above, which move
+    along z only."""
+    mesh = box((3, 2, 2), (0.3, 0.2, 0.2))
+    sim = body(mesh, young=1e9, damp_factor=0.3)
+    joints = on_plane(mesh, 2, 0.1)
+    changes.crack(sim, joints)
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    for z in (0.0, 0.2):
+        sim.velocity_condition(points_at(mesh, z=z), vx=0.0, vy=0.0, vz=0.0)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "fluid_bulk": 1e6, "aperature_initial": 1e-4})
+    flow.fill(None, saturation=1.0)
+    hold(flow, flow.numbers("flow-node"), 2e6)
+    sim.parts(one_way=one_way)
+    return sim, flow
+
+
+def test_pressure_pushes_walls_apart_and_the_aperture_follows() -> None:
+    """Uniaxial strain: each side gives way by p h / M, M = 1.2 E; the room for the fluid grows with it. One way: walls
+    stay."""
+    sim, flow = _sandwich()
+    convergence.advance(sim, 1500)
+    wanted = 1e-4 + 2.0 * 2e6 * 0.1 / 1.2e9
+    assert flow.values("flow-channel", "aperture") == pytest.approx(wanted, rel=1e-6)
+    assert flow.values("flow-node", "volume").sum() == pytest.approx(wanted * 0.06, rel=1e-6)
+    assert flow.account()["relative"] < 1e-12
+    still, flow = _sandwich(one_way=True)
+    convergence.advance(still, 300)
+    assert flow.values("flow-channel", "aperture") == pytest.approx(1e-4, rel=1e-9)
+
+
+def test_a_pressure_that_is_linear_on_a_face_pushes_by_its_integrals() -> None:
+    """A (2 p1 + p2 + p3) / 12 on the first corner; all together, and their moment, are those of the pressure."""
+    sim, flow = _sandwich()
+    sim.close_model()
+    at = sim.mesh.points[flow.held]
+    flow.state[:, kernels.P] = 1e6 * (1.0 + 2.0 * at[:, 0] - 3.0 * at[:, 1])
+    applied = np.zeros_like(sim.local.applied)
+    flow.add_to(applied)
+    force, place = applied.reshape(-1, 4, 4)[:, :, :3], sim.x.reshape(-1, 4, 4)[:, :, :3]
+    above = sim.mesh.centroids(sim.number)[:, 2] > 0.1
+    assert np.abs(force.sum(axis=(0, 1))).max() < 1e-6
+    up, arm = force[above][:, :, 2], place[above]
+    lx, ly = 0.3, 0.2
+    assert up.sum() == pytest.approx(1e6 * lx * ly * (1.0 + lx - 1.5 * ly), rel=1e-12)
+    moment = 1e6 * ly * (lx**2 / 2.0 + 2.0 * lx**3 / 3.0 - 0.75 * ly * lx**2)
+    assert (up * arm[:, :, 0]).sum() == pytest.approx(moment, rel=1e-12)
+
+
+def test_fluid_that_cannot_drain_makes_channels_stiff() -> None:
+    """K A / (3 d) at each corner of a channel: a shorter time step, by its square root where it rules."""
+    steps = []
+    for bulk in (1e6, 2.2e9, 8.8e9):
+        mesh = box((2, 2, 2), (0.2, 0.2, 0.2))
+        sim = body(mesh)
+        flow = Flow.of(sim)
+        flow.assign(on_plane(mesh, 2, 0.1), {**WATER, "fluid_bulk": bulk})
+        sim.close_model()
+        steps.append(sim.clock.dt)
+    assert steps[0] > 5.0 * steps[1] and steps[1] == pytest.approx(2.0 * steps[2], rel=0.02)
+
+
+def test_apertures_of_joints_that_open_slip_and_press() -> None:
+    """Limits, and dilation by the size of a slip along both axes."""
+    mesh = box((2, 2, 2), (0.2, 0.2, 0.2))
+    sim = body(mesh)
+    joints = on_plane(mesh, 2, 0.1)
+    changes.crack(sim, joints)
+    flow = Flow.of(sim)
+    limits = {"aperature_minumum": 4e-5, "aperature_maximum": 6e-4, "shear_dilation": 10.0}
+    flow.assign(joints, {**WATER, **limits, "aperature_initial": 1e-4})
+    sim.close_model()
+    above = sim.mesh.centroids(sim.number)[:, 2] > 0.1
+    for move, wanted in (
+        ((0.0, 0.0, 1e-4), 2e-4), ((0.0, 0.0, -9e-5), 4e-5), ((0.0, 0.0, 1e-3), 6e-4),
+        ((3e-4, 4e-4, 0.0), 1e-4 + math.tan(math.radians(10.0)) * 5e-4),
+    ):  # fmt: skip
+        kept = sim.x.copy()
+        sim.x.reshape(-1, 4, 4)[above, :, :3] += np.array(move)
+        flow.find_geometry()
+        assert flow.apertures() == pytest.approx(wanted, rel=1e-9)
+        sim.x[:] = kept
+
+
+def test_an_unbroken_joint_has_a_virtual_aperture() -> None:
+    """A cohesive joint is a channel too: of aperature-initial and its elastic opening."""
+    mesh = box((2, 2, 2), (0.2, 0.2, 0.2))
+    sim = body(mesh)
+    joints = inner(mesh)
+    law = {"friction": 30.0, "cohesion": 8e9, "tensile_strength": 2e9, "gf1": 1e6, "gf2": 4e6, "penalty_normal": 5e11}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "fluid_bulk": 1e6})
+    flow.fill(None, pressure=1e6)
+    hold(flow, flow.numbers("flow-node"), 1e6)
+    convergence.advance(sim, 200)
+    aperture = flow.values("flow-channel", "aperture")
+    assert (aperture > 1e-6).all() and np.ptp(aperture) > 0.0
+    assert diagnostics.joint_counts(sim)[2] == 0
