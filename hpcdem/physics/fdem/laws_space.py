@@ -19,6 +19,8 @@ class LawsSpace(Local):
     """rows: see `LocalSpace`. There are no quads: what `Local` does with theirs finds none."""
 
     rows: np.ndarray
+    _stress: np.ndarray
+    """Initial stress (n_own, 6) [Pa]."""
 
     def _make_memories(self) -> None:
         """What is remembered of yielding and creep, and what of it is in the stress without strain. s0 is what was said

@@ -1,4 +1,4 @@
-"""`hpcdem case thermal-shock`: an ensemble of slabs, each with another field of strength and one with another mesh, beside
+"""`hpcdem case thermal-shock`: an ensemble of slabs, each with another field of strength, one with another mesh, beside
 the theory of cracks that leave each other behind."""
 
 from __future__ import annotations
