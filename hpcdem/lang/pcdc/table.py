@@ -946,8 +946,7 @@ _OBJECTS = (
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K",
-                            dims=PLANE)), ranged="node",
+                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
             needs_option=True, dims=BOTH),
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
     dims=BOTH),
