@@ -451,7 +451,7 @@ def test_conditions_without_equilibrium():
     refused(sim, f"node {top[0]} has a prescribed acceleration")
     sim.velocity_condition(top, vx=1e-6)
     sim.move_constraint(top, 2, (0.6, 0.8))
-    refused(sim, f"node {top[0]} moves along an oblique line and has one component prescribed")
+    refused(sim, f"node {top[0]} moves along an oblique line and has some components prescribed")
     sim.move_constraint(top, 0)
     sim.option(dynamic=True)
     refused(sim, f"node {top[0]} moves at a prescribed velocity: there is no equilibrium in dynamic mode")

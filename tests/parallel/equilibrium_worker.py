@@ -4,11 +4,13 @@ python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
 SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools,
-or SOLVER-rinsed: rock that water cools; one after the other. Files are RUN.npz.
+SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed: tetrahedra, with joints that break, that yield
+and are dug out; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -18,11 +20,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
 from hpcdem.physics.fdem.connectivity import face_points
+from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import QUANTITIES, RATE, SHUT
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import CONCENTRATION, Proppant
@@ -30,6 +34,7 @@ from tests.blocks.support import JOINT, ROCK, near, rectangle, shaken
 from tests.flow.support import WATER
 from tests.heat.support import GRANITE
 from tests.parallel.model import communicator
+from tests.space.support import box
 
 SAND = {"proppant_density": 2650.0, "proppant_size": 1e-6, "proppant_concentration_limit": 0.6}
 
@@ -37,6 +42,9 @@ NAMES = (
     "stress_xx", "stress_yy", "stress_xy", "stress_zz", "displacement_x", "displacement_y", "velocity_x", "velocity_y",
     "opening", "slip", "reaction_x", "reaction_y",
 )  # fmt: skip
+
+
+SPACE = ("stress_xx", "stress_yz", "displacement_x", "displacement_z", "reaction_x", "opening", "slip")
 
 
 def excavation(sim: Blocks, solver: str, out: str) -> None:
@@ -107,12 +115,16 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
     equilibrium.solve_elastic(sim)
     flow = Flow.of(sim)
     flow.assign(joints, {**WATER, "aperature_initial": 5e-6})
-    flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
     if propped:
+        flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
         proppant = Proppant.of(sim)
         proppant.assign(joints, SAND)
         proppant.prescribe(None, CONCENTRATION, 0.2)
-        sim.gravity(5.0, 0.0)
+    else:
+        flow.drill("pump", np.flatnonzero((x < 0.25) & (np.abs(y) < 1e-9)))
+        flow.stage("pump", RATE, 5e-5, 0.83, math.inf)
+        flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
+    sim.gravity(5.0, 0.0)
     with Coupled(sim, 0.05, solver) as run:
         while flow.time < 1.0:
             run.advance(1.0)
@@ -121,6 +133,7 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
         found[name] = flow.values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])
+    found["wells"] = np.array([flow.well_value(one.name, name) for one in flow.wells for name in QUANTITIES])
     if propped:
         found |= {name: flow.values("flow-node", name) for name in ("concentration", "proppant")}
         found["sand"] = np.array(list(proppant.account().values())[:5])
@@ -198,13 +211,63 @@ def rinsed(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def solid(sim: Blocks, solver: str, out: str) -> None:
+    """A bar with joints in its right half, held along oblique ways, pulled until some break."""
+    mesh = box((12, 2, 2), (2.4, 0.4, 0.3), 5, shaken=0.2)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    face = mesh.points[mesh.face_points(np.arange(4 * len(mesh.cells)))][:, :, 0]
+    joints = np.intersect1d(np.flatnonzero(((face > 1.1) & (face < 1.9)).all(axis=1)), sim.numbers_of_joints(None))
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", {**JOINT, "penalty_normal": 5e11, "gf1": 200.0})
+    sim.option(dynamic=False, collision=False)
+    left, right = (np.unique(mesh.layers[side]) for side in ("left", "right"))
+    sim.velocity_condition(left, vx=0.0, vy=0.0, vz=0.0)
+    sim.move_constraint(np.unique(mesh.layers["bottom"])[4:7], space.ACROSS, (0.1, 0.2, 0.9))
+    sim.velocity_condition(right, vx=4e-5, vy=0.0)
+    sim.gravity(0.0, 0.0, -9.81)
+    sim.initial_stress(None, xx=-1e4, yz=3e3)
+    first = equilibrium.solve_elastic(sim, cycles=2, solver=solver)
+    second = equilibrium.solve_elastic(sim, solver=solver, softening=True)
+    found = {name: diagnostics.values(sim, name) for name in SPACE}
+    sim.velocity_condition(right, vx=0.0, vy=0.0)
+    convergence.advance(sim, 30)
+    found.update({f"later_{name}": diagnostics.values(sim, name) for name in SPACE})
+    found["ratios"] = np.array([first.ratio, second.ratio, diagnostics.unbalanced_ratio(sim)])
+    found["joints"] = np.array(diagnostics.joint_counts(sim))
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
+def crushed(sim: Blocks, solver: str, out: str) -> None:
+    """A bar of rock that yields under a stamp; a part is dug out."""
+    mesh = box((12, 3, 3), (2.4, 0.6, 0.6), 5, shaken=0.2)
+    sim.take_mesh(mesh)
+    soil = {
+        "density": 2000.0, "bulk": 3.9e9, "shear": 2.8e9, "friction": 30.0, "dilation": 10.0, "cohesion": 3.45e6,
+        "tensile": 1e6,
+    }  # fmt: skip
+    changes.element_model(sim, None, "mech_mohr_coulomb", soil)
+    sim.option(dynamic=False, collision=False)
+    bottom, top = (np.unique(mesh.layers[side]) for side in ("bottom", "top"))
+    sim.velocity_condition(bottom, vx=0.0, vy=0.0, vz=0.0)
+    sim.velocity_condition(top[np.abs(mesh.points[top, 0] - 1.0) < 0.45], vx=0.0, vy=0.0, vz=-1.5e-3)
+    sim.gravity(0.0, 0.0, -9.81)
+    first = equilibrium.solve_elastic(sim, solver=solver, steps=3)
+    changes.null(sim, np.flatnonzero(mesh.centroids()[:, 0] > 2.1))
+    second = equilibrium.solve_elastic(sim, solver=solver)
+    found = {name: diagnostics.values(sim, name) for name in (*SPACE[:-2], "plastic_shear_strain", "plastic_work")}
+    found["ratios"] = np.array([first.ratio, second.ratio])
+    found["counts"] = np.array([first.iterations, first.increments, second.iterations])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
 KINDS = {
     "": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed,
+    "solid": solid, "crushed": crushed,
 }  # fmt: skip
 
 if __name__ == "__main__":
     for run in sys.argv[1:]:
         solver, _, kind = run.partition("-")
-        {"": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed}[
-            kind
-        ](Blocks(communicator()), solver, f"{run}.npz")
+        KINDS[kind](Blocks(communicator()), solver, f"{run}.npz")

@@ -16,7 +16,7 @@ WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 pytestmark = pytest.mark.ranks
 SLOW = pytest.mark.slow
-KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed")
+KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed")
 Found = dict[str, np.ndarray]
 
 
@@ -62,6 +62,8 @@ def test_rock_that_yields_is_in_balance(yielding):
 def test_fluid_opens_the_joint(runs):
     found = runs(1, "direct-pumped")
     assert found["joints"][2] > 3 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
+    pressure, rate, injected, stage = found["wells"]
+    assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(5e-5 * 0.83, rel=1e-12)
 
 
 def test_slurry_opens_it_too(runs):
@@ -86,10 +88,14 @@ def test_cold_water_cools_the_rock(runs):
     assert found["steady"] == pytest.approx(10.0, abs=1e-6)
 
 
+def test_tetrahedra_break_and_yield(runs):
+    solid, crushed = runs(1, "direct-solid"), runs(1, "direct-crushed")
+    assert solid["ratios"].max() < 1e-8 and solid["joints"][1:].sum() > 3
+    assert crushed["ratios"].max() < 1e-8 and np.nanmax(crushed["plastic_shear_strain"]) > 1e-3
+
+
 @pytest.mark.mpi
-@pytest.mark.parametrize(
-    "name", ["direct", "direct-yields", "direct-pumped", "direct-propped", "direct-cooled", "direct-rinsed"]
-)
+@pytest.mark.parametrize("name", [f"direct{kind}" for kind in KINDS])
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=SLOW), 3, pytest.param(4, marks=SLOW)])
 def test_the_same_bits(runs, name, ranks):
     alone, found = runs(1, name), runs(ranks, name)
@@ -105,11 +111,23 @@ COOLED = ("stress_xx", "displacement_x", "temperature", "account")
 PLASTIC = ("stress_xx", "stress_yy", "displacement_x", "displacement_y", "plastic_shear_strain", "plastic_work")
 
 
+SOLID = ("stress_xx", "displacement_x", "displacement_z", "opening", "joints")
+CRUSHED = ("stress_xx", "displacement_x", "displacement_z", "plastic_shear_strain", "plastic_work")
+
+
 @pytest.mark.mpi
 @pytest.mark.petsc
 @pytest.mark.parametrize(
     ("kind", "quantities"),
-    [("", ELASTIC), ("-yields", PLASTIC), ("-pumped", PUMPED), ("-propped", PROPPED), ("-cooled", COOLED)],
+    [
+        ("", ELASTIC),
+        ("-yields", PLASTIC),
+        ("-pumped", PUMPED),
+        ("-propped", PROPPED),
+        ("-cooled", COOLED),
+        ("-solid", SOLID),
+        ("-crushed", CRUSHED),
+    ],
 )
 @pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=SLOW), pytest.param(4, marks=SLOW)])
 def test_petsc_on_several_ranks(runs, kind, quantities, ranks):

@@ -147,9 +147,32 @@ def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(
     run.steady()
     run.close()
     assert temperatures(sim) == pytest.approx(100.0 - 30.0 * mesh.points[:, 0] / 1.2, rel=1e-9)
-    sim.parts(mechanical=True)
-    with pytest.raises(CommandError, match="heat alone"):
-        Implicit(sim)
+
+
+@pytest.mark.parametrize("jointed", [False, True])
+def test_blocks_are_in_equilibrium_at_the_end_of_implicit_steps(jointed: bool) -> None:
+    """Between walls along x, free across: stress follows the temperature, 2 e of it with joints that are 100 E stiff."""
+    mesh = box((4, 2, 2), (1.2, 0.8, 0.9))
+    sim = body(mesh, dynamic=False)
+    if jointed:
+        edges = mesh.edges()
+        sim.joint_model(edges.faces[edges.inner, 0], INTERFACE, {**JOINT, "penalty_normal": 100.0 * YOUNG})
+    for axis, low in (("x", "left"), ("y", "front"), ("z", "bottom")):
+        sim.velocity_condition(nodes_on(mesh, low), **{f"v{axis}": 0.0})
+    sim.velocity_condition(nodes_on(mesh, "right"), vx=0.0)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "expansion_coeficient": ALPHA})
+    sim.table("warming", [(0.0, 0.0), (1e6, 50.0)])
+    heat.prescribe(None, "warming")
+    run = Implicit(sim)
+    for k in range(2):
+        run.advance(5e5)
+        wanted = -YOUNG * ALPHA * 25.0 * (k + 1)
+        found = diagnostics.values(sim, "stress_xx")
+        assert found == pytest.approx(wanted, rel=0.05 if jointed else 1e-3), k
+        assert np.abs(diagnostics.values(sim, "stress_yy")).max() < (0.05 if jointed else 1e-3) * abs(wanted)
+        assert diagnostics.unbalanced_ratio(sim) < 1e-6
+    run.close()
 
 
 def test_kernel_of_touching_faces() -> None:

@@ -1,8 +1,8 @@
 """The static solve: equilibrium of blocks at once, by Newton's method with the tangent of the forces.
 
 The unbalanced forces are those of the kernels that step, so the answer is a state of the explicit code at rest; only
-the tangent is of its own (physics/fdem/kernels/stiffness.py, plastic_stiffness.py). Positions of all nodes are known to
-every rank meanwhile.
+the tangent is of its own (physics/fdem/kernels/stiffness.py, plastic_stiffness.py; in space tangent_space.py).
+Positions of all nodes are known to every rank meanwhile. Below dim is 2, in space 3; forces are in N/m, in space in N.
 
 What elements that yield remember is that of the last balance while Newton's method looks for the next one, whatever it
 tries on the way: `Local.evaluation` puts everything back. `_follow` lets them flow where balance was found.
@@ -19,12 +19,21 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import changes, connectivity, diagnostics, user_functions, user_laws
+from hpcdem.physics.fdem import changes, connectivity, diagnostics, tangent_space, user_functions, user_laws
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import nodes as moving
-from hpcdem.physics.fdem.kernels import plastic_stiffness, stiffness
+from hpcdem.physics.fdem.kernels import plastic_stiffness, space, stiffness
 from hpcdem.physics.fdem.kernels.joints import BROKEN, YIELDED
-from hpcdem.physics.fdem.linear import MANY, Direct, Petsc, Pieces, Unknowns, petsc_there
+from hpcdem.physics.fdem.linear import (
+    MANY,
+    MANY_IN_SPACE,
+    Direct,
+    Petsc,
+    Pieces,
+    Unknowns,
+    petsc_there,
+    rigid_movements,
+)
 from hpcdem.physics.fdem.local import Evaluation
 from hpcdem.physics.fdem.simulation import Blocks
 
@@ -69,7 +78,7 @@ class Balanced:
 
 @dataclass
 class _Balance:
-    """What Newton's method came to: positions (nn, 2), unbalanced over all forces, iterations, factors, joints behind
+    """What Newton's method came to: positions (nn, dim), unbalanced over all forces, iterations, factors, joints behind
     their peak; error: why this is no balance, "" if it is; ratios: on the way; total: sum of forces [N/m]."""
 
     x: np.ndarray
@@ -84,8 +93,8 @@ class _Balance:
 
 @dataclass
 class Nodes:
-    """Of all nodes, on all ranks: the lowest corner (nn,), its point and rank; position and velocity (nn, 2). Nodes of
-    which nothing is left have corner -1."""
+    """Of all nodes, on all ranks: the lowest corner (nn,), its point and rank; position and velocity (nn, dim). Nodes
+    of which nothing is left have corner -1."""
 
     lead: np.ndarray
     point: np.ndarray
@@ -220,20 +229,22 @@ def all_nodes(sim: Blocks) -> Nodes:
     row = np.where(lead >= 0, sim.where[lead // 4], -1)
     mine = np.flatnonzero((row >= sim.owned.start) & (row < sim.owned.stop))
     row, k = row[mine], lead[mine] % 4
-    columns = (sim.x[row, 2 * k], sim.x[row, 2 * k + 1], sim.v[row, 2 * k], sim.v[row, 2 * k + 1])
-    found = np.zeros((len(lead), 4))
+    at = sim.stride * k[:, None] + np.arange(sim.dim)
+    columns = sim.x[row[:, None], at], sim.v[row[:, None], at]
+    found = np.zeros((len(lead), 2 * sim.dim))
     owner = np.zeros(len(lead), np.int64)
     for rank, (numbers, values) in enumerate(sim.comm.allgather((mine, np.column_stack(columns)))):
         found[numbers], owner[numbers] = values, rank
-    return Nodes(lead, cells.reshape(-1)[lead], owner, found[:, :2].copy(), found[:, 2:].copy())
+    return Nodes(lead, cells.reshape(-1)[lead], owner, found[:, : sim.dim].copy(), found[:, sim.dim :].copy())
 
 
 def forces_of_heat(sim: Blocks) -> float:
-    """Size of the forces [N/m] that thermal stress would take to be held. Collective."""
+    """Size of the forces that thermal stress would take to be held. Collective."""
     heat = sim.surface_loads.eigenstress(sim)
     if heat is None:
         return 0.0
-    return exact_sum(np.abs(heat) * np.sqrt(sim.areas[sim.number[sim.owned]]), sim.comm)
+    size = sim.areas[sim.number[sim.owned]] ** ((sim.dim - 1) / sim.dim)
+    return exact_sum(np.abs(heat) * size, sim.comm)
 
 
 def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
@@ -244,10 +255,11 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
                 f"a condition of nodes follows the function {function.title}: the static solve takes numbers and tables"
             )
     table = sim.conditions_at(sim.clock.time, sim.clock.time, 1.0)
-    free, way, step = (np.empty((len(table), *shape)) for shape in ((2,), (2, 2), (2,)))
+    dim = sim.dim
+    free, way, step = (np.empty((len(table), *shape)) for shape in ((dim,), (dim, dim), (dim,)))
     for row, one in enumerate(table):
         points = np.flatnonzero(sim.point_row == row)
-        free[row], way[row], step[row] = 1.0, np.eye(2), 0.0
+        free[row], way[row], step[row] = 1.0, np.eye(dim), 0.0
         if row and len(points):
             free[row], way[row], step[row] = _freedom(sim, one, int(points[0]))
     row = sim.point_row[nodes.point]
@@ -255,32 +267,39 @@ def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:
     free[nodes.lead < 0] = step[nodes.lead < 0] = 0.0
     number = np.full(free.shape, -1, np.int64)
     number[free > 0.0] = np.arange(int((free > 0.0).sum()))
-    return Unknowns(number, way, step * cycles, ~(way == np.eye(2)).all(axis=(1, 2)))
+    return Unknowns(number, way, step * cycles, ~(way == np.eye(dim)).all(axis=(1, 2)))
 
 
-def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[list[float], np.ndarray, np.ndarray]:
-    """Of a row of conditions: free ways (1) and others (0), the two ways as columns, movement per unit of time.
-    point: one to which they apply, for messages."""
-    does = one[[moving.DOES_X, moving.DOES_Y]]
-    at = np.where(does == moving.VELOCITY, one[[moving.AT_X, moving.AT_Y]], 0.0)
-    held = does != moving.FREE
-    pushed = (does == moving.ACCELERATION) & (one[[moving.AT_X, moving.AT_Y]] != 0.0)
-    if pushed.any():
-        raise CommandError(f"node {point} has a prescribed acceleration: there is no equilibrium")
-    if one[moving.CONSTRAINT] == moving.FIXED:
-        free, way, step = [0.0, 0.0], np.eye(2), np.zeros(2)
-    elif one[moving.CONSTRAINT] == moving.ALONG:
+def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of a row of conditions: free ways (1) and others (0), the ways as columns, movement per unit of time. point: one
+    to which they apply, for messages."""
+    if sim.dim == 2:
+        does, at, kind = one[[moving.DOES_X, moving.DOES_Y]], one[[moving.AT_X, moving.AT_Y]], one[moving.CONSTRAINT]
         along = one[[moving.WAY_X, moving.WAY_Y]]
-        way = np.column_stack([along, [-along[1], along[0]]])
-        if held.any() and not held.all() and along.all():
-            raise CommandError(
-                f"node {point} moves along an oblique line and has one component prescribed: the static solve "
-                "takes a move constraint along a vector alone, or with both components"
-            )
-        bound = held.all() or bool((held & (along != 0.0)).any())
-        free, step = [0.0 if bound else 1.0, 0.0], float(np.where(held, at, 0.0) @ along) * along
     else:
-        free, way, step = [float(not h) for h in held], np.eye(2), np.where(held, at, 0.0)
+        does, at, along = (one[first : first + 3] for first in (space.DOES, space.AT, space.WAY))
+        kind = one[space.CONSTRAINT]
+    held = does != moving.FREE
+    if ((does == moving.ACCELERATION) & (at != 0.0)).any():
+        raise CommandError(f"node {point} has a prescribed acceleration: there is no equilibrium")
+    at = np.where(does == moving.VELOCITY, at, 0.0)
+    if kind == moving.FIXED:
+        free, way, step = np.zeros(sim.dim), np.eye(sim.dim), np.zeros(sim.dim)
+    elif kind in (moving.ALONG, space.ACROSS):
+        touched, oblique = held & (along != 0.0), np.abs(along).max() < 1.0
+        if oblique and held.any() and not held.all() and (kind == space.ACROSS or touched.any()):
+            raise CommandError(
+                f"node {point} moves {'along' if kind == moving.ALONG else 'across'} an oblique line and has some "
+                "components prescribed: the static solve takes a move constraint alone, or with all components"
+            )
+        way, first = _ways(along)
+        free = np.zeros(sim.dim)
+        step = float(at @ along) * along
+        if kind == space.ACROSS:
+            free, step = (np.ones(sim.dim) if oblique and not held.all() else (~held).astype(float)), at - step
+        free[first] = float(kind == moving.ALONG and not touched.any())
+    else:
+        free, way, step = (~held).astype(float), np.eye(sim.dim), at
     if sim.options.dynamic and step.any():
         raise CommandError(
             f"node {point} moves at a prescribed velocity: there is no equilibrium in dynamic mode; in static mode "
@@ -289,46 +308,57 @@ def _freedom(sim: Blocks, one: np.ndarray, point: int) -> tuple[list[float], np.
     return free, way, step
 
 
+def _ways(along: np.ndarray) -> tuple[np.ndarray, int]:
+    """Orthogonal ways, as columns, one of them the unit vector `along` (dim,), and which one: the axes, if it is one of
+    them, else those that a reflection makes of them (Householder)."""
+    dim, first = len(along), int(np.argmax(np.abs(along)))
+    if abs(along[first]) == 1.0:
+        return np.eye(dim), first
+    normal = along - np.eye(dim)[0]
+    way = np.eye(dim) - 2.0 * np.outer(normal, normal) / (normal @ normal)
+    way[:, 0] = along
+    return way, 0
+
+
 def refuse_loose_bodies(sim: Blocks, nodes: Nodes, unknowns: Unknowns) -> None:
-    """CommandError naming a body that can move as a whole: its three rigid movements are looked at where nodes are
-    held (the smallest eigenvalue of the sum of squares of the movements there)."""
+    """CommandError naming a body that can move as a whole: its three rigid movements, in space six, are looked at where
+    nodes are held (the smallest eigenvalue of the sum of squares of the movements there)."""
     hold = np.where((sim.closed_faces() & np.repeat(sim.alive, 4)), sim.partner, -1)
-    of_elements = connectivity.bodies(hold)
+    of_elements, dim = connectivity.bodies(hold), sim.dim
     use = nodes.lead >= 0
     body, x = of_elements[nodes.lead[use] // 4], nodes.x[use]
     count = np.maximum(np.bincount(body), 1)
-    centre = np.column_stack([np.bincount(body, x[:, c]) / count for c in range(2)])
+    centre = np.column_stack([np.bincount(body, x[:, c]) / count for c in range(dim)])
     arm = x - centre[body]
     size = np.zeros(len(count))
     np.maximum.at(size, body, np.abs(arm).max(axis=1))
-    arm /= size[body][:, None]
-    rigid = np.zeros((len(arm), 2, 3))
-    rigid[:, 0, 0] = rigid[:, 1, 1] = 1.0
-    rigid[:, 0, 2], rigid[:, 1, 2] = -arm[:, 1], arm[:, 0]
+    rigid = rigid_movements(arm / size[body][:, None])
+    modes = rigid.shape[2]
     bound = unknowns.number[use] < 0
     along = np.einsum("nck,ncm->nkm", unknowns.way[use], rigid) * bound[:, :, None]
     squares = np.einsum("nkm,nkl->nml", along, along)
-    gram = np.zeros((len(count), 3, 3))
+    gram = np.zeros((len(count), modes, modes))
     some = bound.any(axis=1)
     np.add.at(gram, body[some], squares[some])
     there = np.unique(body)
     values, vectors = np.linalg.eigh(gram[there])
-    loose = values < 1e-12 * np.maximum(values[:, 2:], 1e-12)
+    loose = values < 1e-12 * np.maximum(values[:, -1:], 1e-12)
     bad = np.flatnonzero(loose.any(axis=1))
     if not len(bad):
         return
     at = there[bad[0]]
     members = np.flatnonzero((of_elements == at) & sim.alive)
     held = gram[at]
-    ways = [f"in {axis}" for c, axis in enumerate("xy") if held[c, c] <= 1e-12]
-    modes = vectors[bad[0]][:, loose[bad[0]]]
-    if (np.abs(modes[2]) > 1e-6).any():
-        ways.append("about some point" if not ways else "and turn")
+    ways = [f"in {axis}" for c, axis in enumerate("xyz"[:dim]) if held[c, c] <= 1e-12]
+    movements = vectors[bad[0]][:, loose[bad[0]]]
+    if (np.abs(movements[dim:]) > 1e-6).any():
+        ways.append(f"about some {'point' if dim == 2 else 'axis'}" if not ways else "and turn")
     words = " ".join(ways) or "along a line"
     others = f" (and {len(bad) - 1} more bodies)" if len(bad) > 1 else ""
+    place = ", ".join(f"{c:g}" for c in centre[at])
     raise CommandError(
-        f"the body of {len(members)} elements around ({centre[at, 0]:g}, {centre[at, 1]:g}), with element "
-        f"{members[0]}, can move {words}{others}: hold it by conditions of nodes, or use relaxation (model solve)"
+        f"the body of {len(members)} elements around ({place}), with element {members[0]}, can move {words}{others}: "
+        "hold it by conditions of nodes, or use relaxation (model solve)"
     )
 
 
@@ -360,7 +390,8 @@ def touching(sim: Blocks) -> list[tuple[int, int]]:
     """Pairs of elements whose surfaces press on each other, on all ranks. Collective."""
     seen = sim.evaluate()
     pairs = sim.local.pairs
-    force = np.hypot(seen.pair_force[:, 0:6:2].sum(axis=1), seen.pair_force[:, 1:6:2].sum(axis=1))
+    on_face = seen.pair_force[:, : 3 * sim.dim].reshape(-1, 3, sim.dim).sum(axis=1)
+    force = np.sqrt((on_face * on_face).sum(axis=1))
     total = exact_sum(diagnostics.contributing(sim, seen), sim.comm)
     at = np.flatnonzero((seen.touching > 0) & (force > TOUCH * total))
     mine = list(zip(pairs.element[pairs.first[at]].tolist(), pairs.element[pairs.second[at]].tolist()))
@@ -378,6 +409,8 @@ def refuse_touching(sim: Blocks, pairs: list[tuple[int, int]], what: str) -> Non
 
 def inverted(sim: Blocks) -> bool:
     x = sim.x[sim.owned]
+    if sim.dim == 3:
+        return any(not space.volume(row) > 0.0 for row in x)
     cells = sim.the_mesh().cells[sim.number[sim.owned]]
 
     def turn(a: int, b: int) -> np.ndarray:
@@ -415,32 +448,31 @@ def hold_still(sim: Blocks) -> None:
 
 
 def place_corners(sim: Blocks, x: np.ndarray) -> None:
-    """Place all corners held here, ghosts too, by the positions of their nodes (nn, 2)."""
-    node = sim.node[sim.number]
-    real = node >= 0
-    columns = 4 if sim.wide else 3
-    for k in range(columns):
-        rows = np.flatnonzero(real[:, k])
-        sim.x[rows, 2 * k : 2 * k + 2] = x[node[rows, k]]
-    changes.repeat(sim, sim.x)
+    """Place all corners held here, ghosts too, by the positions of their nodes (nn, dim)."""
+    _put(sim, sim.x, x)
+
+
+def _put(sim: Blocks, rows: np.ndarray, values: np.ndarray) -> None:
+    """Values of the nodes (nn, dim) into the corners of rows (n, w) of positions or velocities."""
+    node, stride = sim.node[sim.number], sim.stride
+    for k in range(4 if sim.wide or sim.dim == 3 else 3):
+        at = np.flatnonzero(node[:, k] >= 0)
+        rows[at, stride * k : stride * k + sim.dim] = values[node[at, k]]
+    if sim.dim == 2:
+        changes.repeat(sim, rows)
 
 
 def settle(sim: Blocks, nodes: Nodes, x: np.ndarray, v: np.ndarray) -> None:
-    """Positions and velocities (nn, 2) of all nodes, as a command sets them; the model is closed again."""
+    """Positions and velocities (nn, dim) of all nodes, as a command sets them; the model is closed again."""
     sim.before_change()
-    node = sim.node[sim.number]
-    for k in range(4 if sim.wide else 3):
-        rows = np.flatnonzero(node[:, k] >= 0)
-        sim.x[rows, 2 * k : 2 * k + 2] = x[node[rows, k]]
-        sim.v[rows, 2 * k : 2 * k + 2] = v[node[rows, k]]
-    changes.repeat(sim, sim.x)
-    changes.repeat(sim, sim.v)
+    _put(sim, sim.x, x)
+    _put(sim, sim.v, v)
     sim.changed(stiffness=False)
     sim.close_model()
 
 
 def linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: Nodes) -> Direct | Petsc:
-    many = unknowns.count >= MANY
+    many = unknowns.count >= (MANY if sim.dim == 2 else MANY_IN_SPACE)
     there = False
     if wanted == "petsc" or (wanted == "auto" and many):
         there = not sim.comm.any(not petsc_there())
@@ -452,14 +484,16 @@ def linear_solver(sim: Blocks, wanted: str, unknowns: Unknowns, nodes: Nodes) ->
                 f"{unknowns.count} unknowns are solved on one rank, as petsc4py is not there: this may need "
                 "minutes and many GB of history",
             )
-    return (Petsc if there else Direct)(sim.comm, unknowns, nodes.owner)
+    if there:
+        return Petsc(sim.comm, unknowns, nodes.owner, nodes.x if nodes.x.shape[-1] == 3 else None)
+    return Direct(sim.comm, unknowns, nodes.owner)
 
 
 def _follow(
     sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, steps: int, cycles: int,
     softening: bool,
 ) -> tuple[np.ndarray, Balanced]:  # fmt: skip
-    """Positions of the nodes in equilibrium (nn, 2), by increments: what is out of balance at the beginning grows
+    """Positions of the nodes in equilibrium (nn, dim), by increments: what is out of balance at the beginning grows
     smaller, prescribed movement greater, by equal parts. CommandError if the last ones find no balance."""
     yields, step = sim.local.yields, sim.clock.step + cycles - 1
     solver.flows = yields or softening
@@ -542,7 +576,7 @@ def _balance(
 
 
 def commit(sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, step: int, softening: bool) -> bool:
-    """Elements flow and joints open at these positions of the nodes (nn, 2), for good. True if some joint broke: then
+    """Elements flow and joints open at these positions of the nodes (nn, dim), for good. True if some joint broke: then
     it is a free face. CommandError if a body came loose, or its surfaces touch."""
     if sim.local.yields:
         _flow(sim, x, step)
@@ -569,7 +603,7 @@ def _still_to_flow(sim: Blocks) -> float:
 
 
 def _flow(sim: Blocks, x: np.ndarray, step: int) -> None:
-    """Elements outside their yield surface flow at these positions of the nodes (nn, 2), for good."""
+    """Elements outside their yield surface flow at these positions of the nodes (nn, dim), for good."""
     place_corners(sim, x)
     sim.local.flow(sim.local.plastic_state(), step)
 
@@ -578,7 +612,7 @@ def _newton(
     sim: Blocks, nodes: Nodes, unknowns: Unknowns, enough: float, solver: Direct | Petsc, x: np.ndarray,
     missing: np.ndarray, given: float, softening: bool,
 ) -> _Balance:  # fmt: skip
-    """Balance of all forces but `missing` (nn, 2) [N/m], from the positions x (nn, 2) and this part of what is
+    """Balance of all forces but `missing` (nn, dim) [N/m], from the positions x (nn, dim) and this part of what is
     prescribed on."""
     left, renew, yields = given if unknowns.given.any() else 0.0, True, sim.local.yields
     # Which elements on the yield surface will flow on is not known at the beginning: rounding would say. The first way
@@ -680,7 +714,7 @@ def _rounding(sim: Blocks, pieces: list[Pieces], x: np.ndarray) -> float:
 def unbalanced(
     sim: Blocks, nodes: Nodes, unknowns: Unknowns, x: np.ndarray, missing: np.ndarray | float = 0.0
 ) -> tuple[np.ndarray, float, float]:
-    """Forces (nn, 2) on nodes at these positions, conditions and `missing` left out, the ratio, and the sum of the
+    """Forces (nn, dim) on nodes at these positions, conditions and `missing` left out, the ratio, and the sum of the
     sizes of all forces [N/m]; equal on all ranks. The ratio is infinite where forces are no numbers."""
     with np.errstate(invalid="ignore", over="ignore"):
         place_corners(sim, x)
@@ -694,7 +728,7 @@ def unbalanced(
 
 
 def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
-    """Sum of the forces on every node (nn, 2) [N/m], on all ranks."""
+    """Sum of the forces on every node (nn, dim) [N/m], on all ranks."""
     local, own = sim.local, sim.owned
     lead = local.first_corners()
     row = sim.where[lead // 4]
@@ -702,8 +736,9 @@ def _node_forces(sim: Blocks, seen: Evaluation) -> np.ndarray:
     i, k = np.nonzero(local.alone())
     corner = np.concatenate([lead[mine], 4 * sim.number[own][i] + k])
     flat = seen.force[own]
-    values = np.concatenate([seen.felt[mine, :2], np.column_stack([flat[i, 2 * k], flat[i, 2 * k + 1]])])
-    out = np.zeros((len(sim.member_begin) - 1, 2))
+    at = sim.stride * k[:, None] + np.arange(sim.dim)
+    values = np.concatenate([seen.felt[mine, : sim.dim], flat[i[:, None], at]])
+    out = np.zeros((len(sim.member_begin) - 1, sim.dim))
     node = sim.node.reshape(-1)
     for corners, forces in sim.comm.allgather((corner, values)) if sim.comm.size > 1 else [(corner, values)]:
         out[node[corners]] = forces
@@ -722,9 +757,11 @@ def tangent(
 def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
     """Stiffness of the owned joints at the present positions, and how many are behind their peak; with softening, those
     that pass it now."""
+    slots = _lower_slots(sim)
+    if sim.dim == 3:
+        return tangent_space.of_joints(sim, slots, softening)
     sim.prepare_kernels("tangent")
     local, cells = sim.local, sim.the_mesh().cells
-    slots = _lower_slots(sim)
     joints, left = np.empty((len(slots), 8, 8)), np.empty(len(slots))
     stiffness.intact_joints(
         slots, local.slot_face, local.slot_at, local.slot_kind, local.slot_state, sim.where, cells, sim.x,
@@ -750,6 +787,8 @@ def of_joints(sim: Blocks, softening: bool = False) -> tuple[Pieces, int]:
 
 def of_elements(sim: Blocks, flows: bool = True) -> list[Pieces]:
     """Stiffness of the owned triangles and quads at the present positions. flows: less what flow takes from it."""
+    if sim.dim == 3:
+        return tangent_space.of_elements(sim, flows)
     sim.prepare_kernels("tangent")
     local, small, number = sim.local, not sim.options.large_strain, sim.number
     rows, quad_rows = local.triangle_rows[: local.count], local.quad_rows

@@ -119,6 +119,19 @@ class LawsSpace(Local):
             self.creep_table, not sim.options.large_strain, sim.creep.passed, keep, memory, s0,
         )  # fmt: skip
 
+    def linear(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Constants (count + 3, 16) and stress without strain (count + 3, 8) [Pa] of the elastic tetrahedra that those
+        that creep are within this creep step; of quads nothing. Not to be changed."""
+        sim, nothing = self.sim, self.quad_s0
+        if not (self.creeps and sim.creep.passed > 0.0):
+            return self.c, self.s0, nothing, nothing
+        c, s0 = self.c.copy(), self.s0.copy()
+        creep_tets.as_elastic(
+            self.creeping, self.rows, sim.n_left, self.c, self.uncrept, self.creep_law, self.creep_table,
+            sim.creep.passed, sim.cold["creep"], c, s0,
+        )  # fmt: skip
+        return c, s0, nothing, nothing
+
     def creep_memory(self, memory: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """What the elements that creep remember in memory (n_own, 16): (n, 16), and the rows (n,) of their models."""
         return [(memory[self.rows[self.creeping] - self.sim.n_left], self.creep_law[self.creeping])]

@@ -17,6 +17,8 @@ from hpcdem.core.errors import CommandError
 
 MANY = 400_000
 """Unknowns from which PETSc is taken, if it is there: SuperLU then needs minutes and several GB on one rank."""
+MANY_IN_SPACE = 20_000
+"""The same in space, where factors fill up sooner."""
 CONDENSED = 2000
 """Most unknowns of joints and fluid for dense matrices."""
 SINGULAR = (
@@ -27,7 +29,8 @@ SINGULAR = (
 
 @dataclass
 class Pieces:
-    """key (m,): numbers in the mesh, ascending on one rank after the other; node (m, k); stiffness (m, 2 k, 2 k)."""
+    """key (m,): numbers in the mesh, ascending on one rank after the other; node (m, k); stiffness (m, dim k,
+    dim k)."""
 
     key: np.ndarray
     node: np.ndarray
@@ -44,8 +47,8 @@ class Pieces:
 
 @dataclass
 class Unknowns:
-    """What nodes can do. number (nn, 2): of the unknowns of a node along way[:, :, 0] and way[:, :, 1], -1: none there;
-    given (nn, 2) [m]: prescribed movement."""
+    """What nodes can do. number (nn, dim): of the unknowns of a node along way[:, :, k], -1: none there; given
+    (nn, dim) [m]: prescribed movement."""
 
     number: np.ndarray
     way: np.ndarray
@@ -58,7 +61,7 @@ class Unknowns:
         return int((self.number >= 0).sum())
 
     def reduced(self, force: np.ndarray) -> np.ndarray:
-        """Forces (nn, 2) on nodes as right-hand side (n,)."""
+        """Forces (nn, dim) on nodes as right-hand side (n,)."""
         along = np.einsum("nck,nc->nk", self.way, force)
         out = np.empty(self.count)
         known = self.number >= 0
@@ -66,7 +69,7 @@ class Unknowns:
         return out
 
     def moved(self, q: np.ndarray, share: float) -> np.ndarray:
-        """Movements (nn, 2) [m] from the unknowns, and this share of what is prescribed."""
+        """Movements (nn, dim) [m] from the unknowns, and this share of what is prescribed."""
         along = np.where(self.number >= 0, q[self.number], 0.0) if len(q) else np.zeros(self.number.shape)
         out = np.where(self.oblique[:, None], np.einsum("nck,nk->nc", self.way, along), along)
         return out + share * self.given
@@ -75,25 +78,26 @@ class Unknowns:
         """Rows, columns and values of the matrix; rows and values of its product with the prescribed movements."""
         rows, columns, values, of_rows, of_values = [], [], [], [], []
         some_given = bool(self.given.any())
+        dim = self.number.shape[1]
         for one in pieces:
             m, k = one.node.shape
-            stiffness = one.stiffness.reshape(m, k, 2, k, 2)
+            stiffness = one.stiffness.reshape(m, k, dim, k, dim)
             turned = np.flatnonzero(self.oblique[one.node].any(axis=1))
-            number = self.number[one.node].reshape(m, 2 * k)
+            number = self.number[one.node].reshape(m, dim * k)
             if len(turned):
                 way = self.way[one.node[turned]]
                 half = np.einsum("mkca,mkcjd->mkajd", way, stiffness[turned])
                 stiffness = stiffness.copy()
                 stiffness[turned] = np.einsum("mkajd,mjdb->mkajb", half, way)
             if some_given:
-                # The columns of prescribed movements count in x and y; only the rows are turned.
-                untouched = one.stiffness.reshape(m, k, 2, k, 2).copy()
+                # The columns of prescribed movements count along the axes; only the rows are turned.
+                untouched = one.stiffness.reshape(m, k, dim, k, dim).copy()
                 if len(turned):
                     untouched[turned] = half
-                product = np.einsum("mkajd,mjd->mka", untouched, self.given[one.node]).reshape(m, 2 * k)
+                product = np.einsum("mkajd,mjd->mka", untouched, self.given[one.node]).reshape(m, dim * k)
                 of_rows.append(number[number >= 0])
                 of_values.append(product[number >= 0])
-            full = stiffness.reshape(m, 2 * k, 2 * k)
+            full = stiffness.reshape(m, dim * k, dim * k)
             keep = (number >= 0)[:, :, None] & (number >= 0)[:, None, :]
             rows.append(np.broadcast_to(number[:, :, None], keep.shape)[keep])
             columns.append(np.broadcast_to(number[:, None, :], keep.shape)[keep])
@@ -106,6 +110,18 @@ class Unknowns:
             np.concatenate([nothing, *of_rows]),
             np.concatenate([np.empty(0), *of_values]),
         )
+
+
+def rigid_movements(arm: np.ndarray) -> np.ndarray:
+    """Movements (n, dim, modes) of points at `arm` (n, dim): along each axis, then about the axis across the plane, in
+    space about x, y and z."""
+    n, dim = arm.shape
+    turns = ((0, 1),) if dim == 2 else ((1, 2), (2, 0), (0, 1))
+    out = np.zeros((n, dim, dim + len(turns)))
+    out[:, range(dim), range(dim)] = 1.0
+    for k, (i, j) in enumerate(turns):
+        out[:, i, dim + k], out[:, j, dim + k] = -arm[:, j], arm[:, i]
+    return out
 
 
 def _on_first(comm: Any, pieces: list[Pieces], take: Callable[[list[Pieces]], str | None]) -> None:
@@ -158,8 +174,8 @@ class Direct:
         return None
 
     def solve(self, force: np.ndarray, share: float) -> np.ndarray:
-        """Movements (nn, 2) [m] that undo the unbalanced forces (nn, 2), with this share of what is prescribed; equal
-        on all ranks. Collective."""
+        """Movements (nn, dim) [m] that undo the unbalanced forces (nn, dim), with this share of what is prescribed;
+        equal on all ranks. Collective."""
         moved = None
         if self.comm.rank == 0:
             q = self.unknowns.reduced(force) - share * self._coupling
@@ -266,24 +282,40 @@ class Condensed:
 
 
 class Petsc:
-    """Rows shared out as nodes are owned: MUMPS if PETSc has it, else GMRES with algebraic multigrid. flows: as of
-    `Direct`, without effect."""
+    """Rows shared out as nodes are owned: MUMPS if PETSc has it, else GMRES with algebraic multigrid. In space, where
+    factors fill up, conjugate gradients with multigrid if the matrix is symmetric; then all components of a node have
+    rows, held ones too: multigrid is made for blocks of one size. flows: as of `Direct`; then it is not symmetric."""
 
     flows = False
 
-    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray) -> None:
-        """owner (nn,): rank of each node."""
+    def __init__(self, comm: Any, unknowns: Unknowns, owner: np.ndarray, x: np.ndarray | None = None) -> None:
+        """Of each node: owner (nn,): its rank; x (nn, 3) [m]: in space, where it is."""
         from petsc4py import PETSc
 
-        self.comm, self.unknowns, self._petsc = comm, unknowns, PETSc
-        known = unknowns.number >= 0
-        self._owner = np.empty(unknowns.count, np.int64)
-        self._owner[unknowns.number[known]] = np.repeat(owner[:, None], 2, axis=1)[known]
+        self.comm, self.unknowns, self._petsc, self._x = comm, unknowns, PETSc, x
+        known, dim = unknowns.number >= 0, unknowns.number.shape[1]
         # PETSc wants the rows of a rank in one piece.
-        self._mine = np.argsort(self._owner, kind="stable")
-        self._place = np.empty(unknowns.count, np.int64)
-        self._place[self._mine] = np.arange(unknowns.count)
-        ends = np.searchsorted(self._owner[self._mine], np.arange(comm.size + 1))
+        if x is None:
+            owners = np.empty(unknowns.count, np.int64)
+            owners[unknowns.number[known]] = np.repeat(owner[:, None], dim, axis=1)[known]
+            order = np.argsort(owners, kind="stable")
+            self._place = np.empty(unknowns.count, np.int64)
+            self._place[order] = np.arange(unknowns.count)
+            self._block, self._node = 1, np.empty(0, np.int64)
+        else:
+            self._block, used = dim, np.flatnonzero(known.any(axis=1))
+            order = np.argsort(owner[used], kind="stable")
+            self._node, owners = used[order], np.repeat(owner[used], dim)
+            at = np.full(len(known), -1, np.int64)
+            at[self._node] = np.arange(len(used))
+            self._place = np.empty(unknowns.count, np.int64)
+            self._place[unknowns.number[known]] = (dim * at[:, None] + np.arange(dim))[known]
+        self._rows = len(owners)
+        self._held = np.ones(self._rows, bool)
+        self._held[self._place] = False
+        self._owner = np.empty(self._rows, np.int64)
+        self._owner[:] = np.sort(owners)
+        ends = np.searchsorted(self._owner, np.arange(comm.size + 1))
         self._first, self._end = int(ends[comm.rank]), int(ends[comm.rank + 1])
         self._on = PETSc.COMM_SELF if comm.mpi is None else comm.mpi
         self._matrix: Any = None
@@ -302,24 +334,37 @@ class Petsc:
         product = np.column_stack([self._place[of_rows].astype(float), np.full(len(of_rows), -1.0), of_values])
         table = np.concatenate([table, product])
         if self.comm.size > 1:
-            _, table = self.comm.to_ranks(self._owner[np.concatenate([rows, of_rows])], table)
-        mine, n = self._end - self._first, self.unknowns.count
+            _, table = self.comm.to_ranks(self._owner[table[:, 0].astype(np.int64)], table)
+        mine, n = self._end - self._first, self._rows
         of_given = table[:, 1] < 0.0
         self._coupling = np.bincount(table[of_given, 0].astype(np.int64) - self._first, table[of_given, 2], mine)
         table = table[~of_given]
         place = (table[:, 0].astype(np.int64) - self._first, table[:, 1].astype(np.int64))
         local = coo_matrix((table[:, 2], place), (mine, n)).tocsr()
+        if self._block > 1:
+            held = np.flatnonzero(self._held[self._first : self._end])
+            size = np.abs(table[:, 2]).max(initial=1.0)
+            local = local + coo_matrix((np.full(len(held), size), (held, self._first + held)), (mine, n)).tocsr()
         local.sort_indices()
         kind = self._petsc.IntType
         self._matrix = self._petsc.Mat().createAIJ(
             ((mine, n), (mine, n)),
+            bsize=self._block,
             csr=(local.indptr.astype(kind), local.indices.astype(kind), local.data),
             comm=self._on,
         )
         self._ksp = ksp = self._petsc.KSP().create(self._on)
         ksp.setOperators(self._matrix)
         pc = ksp.getPC()
-        if self._mumps:
+        symmetric = self._block > 1 and not (self.flows or self.comm.any(not all(map(_symmetric, pieces))))
+        if symmetric:
+            self.name = "PETSc (CG, multigrid)"
+            ksp.setType("cg")
+            ksp.setTolerances(rtol=1e-10, max_it=2000)
+            pc.setType("gamg")
+            self._matrix.setOption(self._petsc.Mat.Option.SYMMETRIC, True)
+            self._matrix.setNearNullSpace(self._rigid())
+        elif self._mumps:
             ksp.setType("preonly")
             pc.setType("lu")
             pc.setFactorSolverType("mumps")
@@ -338,13 +383,16 @@ class Petsc:
             raise CommandError(SINGULAR)
 
     def _rigid(self) -> Any:
-        """Near null space: both translations. (Multigrid for elasticity needs to know them.)"""
+        """Near null space: the translations, in space rotations, too. (Multigrid for elasticity needs to know them.)"""
+        if self._x is None:
+            movements = rigid_movements(np.zeros(self.unknowns.given.shape))[:, :, : self.unknowns.given.shape[1]]
+        else:
+            arm = self._x - self._x.mean(axis=0)
+            movements = rigid_movements(arm / max(float(np.abs(arm).max(initial=0.0)), 1e-300))
         vectors: list[Any] = []
-        for axis in range(2):
-            unit = np.zeros(self.unknowns.given.shape)
-            unit[:, axis] = 1.0
+        for k in range(movements.shape[2]):
             vector = self._matrix.createVecRight()
-            vector.setArray(self.unknowns.reduced(unit)[self._mine][self._first : self._end])
+            vector.setArray(self._spread(self.unknowns.reduced(movements[:, :, k])))
             for other in vectors:
                 vector.axpy(-vector.dot(other), other)
             if vector.norm() > 0.0:
@@ -352,12 +400,17 @@ class Petsc:
                 vectors.append(vector)
         return self._petsc.NullSpace().create(vectors=vectors, comm=self._on)
 
+    def _spread(self, q: np.ndarray) -> np.ndarray:
+        """Values of the unknowns in the rows of this rank."""
+        rows = np.zeros(self._rows)
+        rows[self._place] = q
+        return rows[self._first : self._end]
+
     def solve(self, force: np.ndarray, share: float) -> np.ndarray:
-        """Movements (nn, 2) [m] that undo the unbalanced forces (nn, 2), with this share of what is prescribed; equal
-        on all ranks. Collective."""
+        """Movements (nn, dim) [m] that undo the unbalanced forces (nn, dim), with this share of what is prescribed;
+        equal on all ranks. Collective."""
         right, found = self._matrix.createVecLeft(), self._matrix.createVecRight()
-        mine = self.unknowns.reduced(force)[self._mine][self._first : self._end] - share * self._coupling
-        right.setArray(mine)
+        right.setArray(self._spread(self.unknowns.reduced(force)) - share * self._coupling)
         self._ksp.solve(right, found)
         failed = self._ksp.getConvergedReason() < 0
         parts = self.comm.allgather(found.getArray().copy()) if self.comm.size > 1 else [found.getArray().copy()]
@@ -365,9 +418,7 @@ class Petsc:
         found.destroy()
         if self.comm.any(failed):
             raise CommandError(f"{self.name} found no solution (reason {self._ksp.getConvergedReason()}); {SINGULAR}")
-        q = np.empty(self.unknowns.count)
-        q[self._mine] = np.concatenate(parts)
-        return self.unknowns.moved(q, share)
+        return self.unknowns.moved(np.concatenate(parts)[self._place], share)
 
     def close(self) -> None:
         """Give back what PETSc holds."""
@@ -375,6 +426,12 @@ class Petsc:
             if held is not None:
                 held.destroy()
         self._ksp = self._matrix = None
+
+
+def _symmetric(one: Pieces) -> bool:
+    """But for rounding."""
+    k = one.stiffness
+    return bool(np.abs(k - k.transpose(0, 2, 1)).max(initial=0.0) <= 1e-12 * np.abs(k).max(initial=0.0))
 
 
 def _mumps_there(petsc: Any) -> bool:

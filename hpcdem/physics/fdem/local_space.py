@@ -42,6 +42,7 @@ class LocalSpace(LawsSpace):
         self._make_joints()
         self._put_histories()
         self.pairs: Any = ContactSpace(sim, self.shapes, self.kinds, *ContactSpace.remembered(sim))
+        self.relaxing_corner = np.empty(0, np.int64)  # nothing dies down in space
         self._make_loads()
         self._make_nodes()
         self._set_masses()
@@ -206,6 +207,16 @@ class LocalSpace(LawsSpace):
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
         self.pairs.add_to(force)
+
+    def open_joints(self) -> None:
+        """See `Local.open_joints`."""
+        scratch, of_joints = (np.zeros((len(self.sim.number), tets.ROW)) for _ in range(2))
+        self.pairs.pushed[:] = 0.0
+        yields, self.yields = self.yields, False
+        try:
+            self._fill(scratch, of_joints, False)
+        finally:
+            self.yields = yields
 
     def move_nodes(self) -> None:
         """New velocities of the nodes from the forces on their corners. Collective."""

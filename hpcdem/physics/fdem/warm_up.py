@@ -167,6 +167,15 @@ def creeping_in_space(threads: int = 1) -> None:
         diagnostics.values(sim, name)
 
 
+def tangent_in_space(threads: int = 1) -> None:
+    """Those of the static solve of tetrahedra: with joints, of which one is behind its peak, and yielding."""
+    sim = _in_space(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim.initial_stress(None, yy=1e3)
+    sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
+    sim.close_model()
+    equilibrium.tangent(sim, softening=True)
+
+
 def in_space(threads: int = 1) -> None:
     """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     sim = _in_space(threads, "mech_iso_elastic", {})

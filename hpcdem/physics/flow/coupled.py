@@ -101,10 +101,6 @@ class Coupled:
                 )
         if not sim.options.hydraulic:
             raise CommandError("the hydraulic part is switched off: model option hydraulic on comes first")
-        if self.flow.wells:
-            raise CommandError(
-                "implicit steps of flow know no wells: prescribe rates and pressures of nodes, or step the flow"
-            )
         if not self.moves:
             return
         if self.flow.slurry is not None and self.flow.slurry.values["proppant_modulus"] > 0.0:
@@ -126,6 +122,7 @@ class Coupled:
 
     def __enter__(self) -> Coupled:
         sim, flow = self.sim, self.flow
+        flow.check_wells()
         sim.close_model()
         if self.moves and sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
             sim._renew_lists()
@@ -242,7 +239,8 @@ class Coupled:
     def advance(self, end: float) -> None:
         """One time step, at most to this flow time [s]."""
         flow = self.flow
-        left = end - flow.time
+        change = min((well.next_change(flow.time) for well in flow.wells), default=math.inf)
+        left = min(end, change) - flow.time
         dt = min(flow.implicit_dt or self.longest, self.longest)
         while True:
             parts = max(1, math.ceil(left / dt - 1e-9))
@@ -255,7 +253,8 @@ class Coupled:
             if dt < CUTS * self.longest:
                 raise CommandError(f"flow time {flow.time:.6g} s: {found.error}")
         self.count.steps += 1
-        flow.implicit_dt = min(self._next(now, found), self.longest)
+        # What is left of a stage says nothing of the step after it.
+        flow.implicit_dt = min(self._next(dt if change < end else now, found), self.longest)
         self.sim.clock.step += 1
         if flow.slurry is not None:
             flow.slurry.flowed()
@@ -282,7 +281,7 @@ class Coupled:
             raise CommandError("leak-off goes on for ever: there is no steady flow with it")
         time, dt, growth = flow.time, self.longest, 10.0
         for _ in range(MOST_STEADY):
-            found = self._tried(dt)
+            found = self._tried(dt, passes=False)
             flow.time = time
             if found.error:
                 self.count.cut += 1
@@ -298,9 +297,9 @@ class Coupled:
             "steady flow was not found: some node needs a pressure or a level, or rates must add up to zero"
         )
 
-    def _tried(self, dt: float) -> _Found:
-        """This time step [s], taken if it finds balance."""
-        sim, (step, u) = self.sim, self.fluid.begin(dt, self.x)
+    def _tried(self, dt: float, passes: bool = True) -> _Found:
+        """This time step [s], taken if it finds balance. passes: conditions are those at its end, else those of now."""
+        sim, (step, u) = self.sim, self.fluid.begin(dt, self.x, passes)
         found = self._newton(step, self.x, u)
         if not found.error and found.past > 1 and dt > TOGETHER * self.longest:
             found.error = "more than one joint would pass its peak"

@@ -44,10 +44,6 @@ class Implicit:
             raise CommandError("the thermal part is switched off: model option thermal on comes first")
         self.sim, self.heat, self.wanted = sim, heat, solver
         self.moves = bool(sim.options.mechanical)
-        if self.moves and sim.dim == 3:
-            raise CommandError(
-                "in three dimensions implicit steps know heat alone: model option mechanical off comes first"
-            )
         if self.moves and sim.options.dynamic:
             raise CommandError(
                 "implicit steps of heat keep blocks in static equilibrium: model option dynamic off comes first, or "

@@ -9,8 +9,8 @@ own growth, dG_1/da_1 < 0; when that is zero every second one stops, and the spa
 443; Nemat-Nasser & Oranratnachai 1979, J. Energy Resour. Technol. 101, 34). So the spacing of growing cracks stays
 between the critical one and twice that.
 
-With the Griffith length l = G_c E' / s^2, E' = E / (1 - nu^2), all follows from g(a / p, b / p) = G E' / (s^2 p), which
-is computed here by bilinear finite elements of the strip between two cracks, one on each side, of the depths a_1 and a_2:
+With the Griffith length l = G_c E' / s^2, E' = E / (1 - nu^2), all follows from g(a / p, b / p) = G E' / (s^2 p). It is
+computed here by bilinear finite elements of the strip between two cracks, one on each side, of the depths a_1 and a_2:
 G_1 = -2 dU/da_1 (each side has half a crack) by releasing one node after the other.
 """
 

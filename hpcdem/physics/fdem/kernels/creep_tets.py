@@ -10,7 +10,7 @@ from hpcdem.numerics.lanes import CAPACITY, U, lane
 from hpcdem.physics.fdem.kernels import creep as plane
 from hpcdem.physics.fdem.kernels import tets
 from hpcdem.physics.fdem.kernels.creep import KELVIN, LOST, PER_KELVIN, PER_MAXWELL, factors, stress_then
-from hpcdem.physics.fdem.kernels.tets import TWO_MU
+from hpcdem.physics.fdem.kernels.tets import LAMBDA, TWO_MU
 
 C13, C23, K13, K23, S13, S23 = range(plane.MEMORY, plane.MEMORY + 6)
 MEMORY = plane.MEMORY + 6
@@ -154,3 +154,27 @@ def strains(rows, first, x, c, small, memory, out):
             found = tets.turned(a[0], a[1], a[2], -(a[0] + a[1]), a[3], a[4], r)
             for k in range(6):
                 out[j, 6 * part + k] = found[k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def as_elastic(who, rows, first, c, base, law, table, dt, memory, like, s0):
+    """The elastic element that a tetrahedron is within this creep step: into like (count + 3, 16) its moduli, into s0
+    (count + 3, 8) [Pa] its stress without strain, see `creep.as_elastic`; other arguments as for `creep`."""
+    for m in range(len(who)):
+        i = who[m]
+        j, row, two_mu = rows[i] - first, law[i], c[i, TWO_MU]
+        back, kelvin, maxwell, div, _ = factors(
+            dt, two_mu, table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
+        )
+        mean = (base[i, 0] + base[i, 1] + base[i, 3]) / 3.0
+        for k in range(5):
+            start = base[i, PLACES[k]] - (mean if k < 2 else 0.0)
+            s0[i, PLACES[k]] = stress_then(
+                0.0, start, memory[j, CREPT[k]], memory[j, IN_KELVIN[k]], memory[j, BEFORE[k]], two_mu, back,
+                kelvin + maxwell, div,
+            )  # fmt: skip
+        s0[i, 3] = mean - (s0[i, 0] + s0[i, 1])
+        s0[i, 0] += mean
+        s0[i, 1] += mean
+        like[i, TWO_MU] = 1.0 / div
+        like[i, LAMBDA] = c[i, LAMBDA] + (two_mu - like[i, TWO_MU]) / 3.0

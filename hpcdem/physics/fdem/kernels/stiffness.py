@@ -131,7 +131,7 @@ def quads(rows, x, c, s0, small, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _slopes(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear):
+def slopes(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear):
     """Derivatives of laws.intact_point: sigma by o, tau by o, tau by s, and how much is left to the peak."""
     sigma, _, left = laws.intact_point(o, s, kop, tensile, overlay, tan_phi, cohesion, half_shear)
     r = o * kop
@@ -172,7 +172,7 @@ def intact_joints(slots, face, at, kind, state, where, cells, x, table, out, lef
             near = joints.NEAR if point == 0 else (0.5 if point == 1 else joints.FAR)
             far = 1.0 - near
             weight = 8.0 / 18.0 if point == 1 else 5.0 / 18.0
-            normal, rub, shear, here = _slopes(
+            normal, rub, shear, here = slopes(
                 near * oa + far * ob, near * sa + far * sb, law[joints.KOP], law[joints.TENSILE], law[joints.OVERLAY],
                 law[joints.TAN_PHI], law[joints.COHESION], law[joints.HALF_SHEAR],
             )  # fmt: skip
