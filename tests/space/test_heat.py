@@ -151,7 +151,7 @@ def test_an_implicit_step_is_backward_euler_and_steady_states_are_found_at_once(
 
 @pytest.mark.parametrize("jointed", [False, True])
 def test_blocks_are_in_equilibrium_at_the_end_of_implicit_steps(jointed: bool) -> None:
-    """Between walls along x, free across: stress follows the temperature, 2 e of it with joints that are 100 E stiff."""
+    """Between walls along x, free across: stress follows the temperature; joints are 100 E stiff."""
     mesh = box((4, 2, 2), (1.2, 0.8, 0.9))
     sim = body(mesh, dynamic=False)
     if jointed:

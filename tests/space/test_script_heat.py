@@ -42,7 +42,7 @@ pcdc model step 200
 pcdc model option thermal off
 pcdc model step 10
 pcdc model save 'end.sav'
-pcdc output image 'heat' field 'temperature' section (1,0.25,0.25) (0,1,0)
+pcdc output image 'heat' field 'temperature' section 'y=0.25'
 account = pcdc.heat
 assert account['relative'] < 1e-12 and account['given'] > 0
 pcdc model option mechanical off thermal on
