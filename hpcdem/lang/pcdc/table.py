@@ -302,10 +302,10 @@ STRESS = Model(
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa"),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
-            "given beside it enters as a wave of half its size", dims=PLANE),
-     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s",
-            dims=PLANE),
-     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s", dims=PLANE)),
+            "given beside it enters as a wave of half its size"),
+     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
+     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s"),
+     Option("inc{oming}-z", (TABLED,), "the same along z", "m/s", dims=SPACE)),
     any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 FLOW_CONDITION = Model(
@@ -681,7 +681,7 @@ _MODEL = (
                      Option("ela{stic}", (), "at once, without steps"),
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
-                            "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
+                            "may pass their peak and break; with mechanical off, flow alone"),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
                             "and joints may pass their peak and break; with mechanical off, heat alone"),
@@ -689,7 +689,7 @@ _MODEL = (
                             "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
                             "where an estimate says that these cost less, or where implicit ones are refused; the log "
-                            "has both estimates", dims=PLANE),
+                            "has both estimates"),
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
                             "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "

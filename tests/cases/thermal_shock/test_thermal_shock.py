@@ -36,8 +36,8 @@ def slabs(tmp_path_factory: pytest.TempPathFactory) -> list[dict]:
 @pytest.mark.slow
 def test_spacing_and_depth_of_cracks(slabs: list[dict]) -> None:
     """Cracks that are at least half as deep as the deepest one are as far apart, in the mean of the ensemble, as those
-    that grow can be: the critical spacing to twice that, for thermal lengths from 29 to 72 Griffith lengths. The deepest
-    ones are as deep as cracks of the critical spacing."""
+    that grow can be: the critical spacing to twice that, for thermal lengths from 29 to 72 Griffith lengths. The
+    deepest ones are as deep as cracks of the critical spacing."""
     theory = exact.critical_spacings(np.array([0.75, 1.0, 1.25]))
     for b in (0.032, 0.048, 0.064, 0.08):
         spacings, depths = [], []
