@@ -280,6 +280,12 @@ def _heat() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _heat_space() -> WarmUp:
+    from hpcdem.physics.heat import kernels_space, warm_up
+
+    return warm_up.in_space, (kernels_space,)
+
+
 def _yielding() -> WarmUp:
     from hpcdem.physics.fdem import warm_up
     from hpcdem.physics.fdem.kernels import plastic_quads, plasticity
@@ -355,6 +361,7 @@ KINDS = {
     "flow-space": Kernels(_flow_space, after=("space", "flow")),
     "proppant": Kernels(_proppant, after=("flow",)),
     "heat": Kernels(_heat),
+    "heat-space": Kernels(_heat_space, after=("space", "heat")),
     "yielding": Kernels(_yielding),
     "creep": Kernels(_creep),
     "tangent": Kernels(_tangent),
@@ -370,7 +377,7 @@ others are loaded, or compiled, by the first model that needs them."""
 OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
-    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
+    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space", "heat-space",
     "yielding-space", "creep-space", "tangent-space", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""

@@ -1,4 +1,4 @@
-"""A warm crack between two blocks, which calls every kernel of heat once."""
+"""A warm crack between two blocks, in the plane and in space, which calls every kernel of heat once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.warm_up import ROCK
-from hpcdem.physics.heat import friction, kernels, kernels_space
+from hpcdem.physics.heat import friction, kernels
 from hpcdem.physics.heat.model import Heat
 
 GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5, "transfer_coeficient": 5.0}
@@ -17,8 +17,24 @@ GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = _heated(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    pairs, one = np.array([0]), np.ones(2)
+    friction.rub(
+        pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
+        np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
+    )  # fmt: skip
+    _fluid()
+
+
+def in_space(threads: int = 1) -> None:
+    """The same between two tetrahedra."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+    _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+
+
+def _heated(mesh: Mesh, threads: int) -> Blocks:
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     heat = Heat.of(sim)
     heat.assign(None, GRANITE)
@@ -26,27 +42,7 @@ def warm_up(threads: int = 1) -> None:
     heat.expose(None, flux=1.0)
     changes.crack(sim, np.flatnonzero(sim.joint_exists()))
     sim.step()
-    pairs, one = np.array([0]), np.ones(2)
-    friction.rub(
-        pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
-        np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
-    )  # fmt: skip
-    _fluid()
-    _space()
-
-
-def _space() -> None:
-    """Two tetrahedra that touch."""
-    points = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)[2]])
-    cells, number = np.array([[0, 1, 2, 3], [0, 2, 1, 4]]), np.arange(2)
-    kernels_space.conductances(number, points, cells, np.ones((2, 6)), np.empty((2, 6)))
-    x = np.zeros((2, 16))
-    ends, weight, pass_on = np.empty((3, 6), np.int64), np.empty((3, 6)), np.empty(3)
-    kernels_space.touching(number * 4, number * 4 + 4, number, number, x, np.ones(2), 1e-3, 0.1, ends, weight, pass_on)
-    t, q, given = (np.zeros(8) for _ in range(3))
-    corner = np.zeros((1, 3), np.int64)
-    kernels.through_faces(corner, np.ones(1), np.zeros(1, np.int64), np.zeros((1, 3)), 0, 8, t, q, 0.0, given)
-    kernels.through_contacts(np.zeros((1, 6), np.int64), np.zeros((1, 6)), np.zeros(1), t, q)
+    return sim
 
 
 def _fluid() -> None:
