@@ -377,8 +377,8 @@ others are loaded, or compiled, by the first model that needs them."""
 OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
-    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space", "heat-space",
-    "yielding-space", "creep-space", "tangent-space", "pictures",
+    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
+    "heat-space", "yielding-space", "creep-space", "tangent-space", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 
