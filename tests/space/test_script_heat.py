@@ -37,7 +37,7 @@ pcdc model save 'half.sav'
 """
 END = """
 pcdc element property conductivity 4 range x 0 0.5
-pcdc node boundary remove range x 0.9 0.95
+pcdc node boundary remove range x 0.9 1.1 y 0 0.1
 pcdc model step 200
 pcdc model option thermal off
 pcdc model step 10
