@@ -25,7 +25,7 @@ CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
     "tunnel": "Tunnel", "stability": "SlopeStability", "wedge": "Wedge", "support": "Support", "pillar": "Pillar",
     "creep": "Creep", "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
-    "fault-injection": "FaultInjection",
+    "fault-injection": "FaultInjection", "penny-fracture": "PennyFracture",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
     "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
 }  # fmt: skip
