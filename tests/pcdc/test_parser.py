@@ -261,7 +261,6 @@ REFUSED_IN_SPACE = [
     ("element property young table 't' over temperature", "'over temperature' is for two dimensions"),
     ("element c-model mech-m-c property coh table 't' over temperature", "'over temperature' is for two dimensions"),
     ("element-face boundary m-s-b-c quiet on", "'quiet' is for two dimensions"),
-    ("model solve elastic", "'elastic' is for two dimensions"),
     ("model option energy on", "'energy' is for two dimensions"),
     ("node initial temperature 3", "'temperature' is for two dimensions"),
     ("bolt create polyline (0,0) (1,1)", "'bolt create polyline' is for two dimensions"),
