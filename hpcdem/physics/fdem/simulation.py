@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_laws
 from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
@@ -622,8 +622,27 @@ class Blocks(State):
         corner from it."""
         middle = np.empty((len(self.number), self.dim))
         if self.dim == 3:
-            return middle, space.middles(self.x, middle)
+            radius = space.middles(self.x, middle)
+            return middle, max(radius, self._gather_hexes(middle)) if len(self.the_mesh().hexes) else radius
         return middle, build.middles(self.x, self.the_mesh().cells, self.number, middle)
+
+    def _gather_hexes(self, middle: np.ndarray) -> float:
+        """Parts of a hexahedron get one middle (n, 3), the mean of theirs, so that they go together. Returns the
+        largest distance of their corners from it. Collective."""
+        mesh = self.the_mesh()
+        of = mesh.hex_of()[self.number]
+        mine = np.flatnonzero(of >= 0)
+        parts = [(self.number[mine], middle[mine])]
+        if self.comm.size > 1:
+            whole = np.bincount(of[mine], minlength=len(mesh.hexes))[of[mine]] == hexahedra.PARTS
+            if self.comm.any(not whole.all()):
+                parts = self.comm.allgather((self.number[mine], middle[mine]))
+        number, middles = (np.concatenate([part[k] for part in parts]) for k in range(2))
+        number, first = np.unique(number, return_index=True)
+        means = middles[first].reshape(-1, hexahedra.PARTS, 3).mean(axis=1)
+        middle[mine] = means[np.searchsorted(number[:: hexahedra.PARTS], mesh.hexes[of[mine], 8])]
+        way = self.x[mine].reshape(-1, 4, 4)[:, :, :3] - middle[mine][:, None]
+        return math.sqrt(float((way * way).sum(axis=2).max(initial=0.0)))
 
     def _keys(self, middle: np.ndarray) -> np.ndarray:
         """Cells of elements by their middles."""

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from hpcdem.physics.fdem.kernels import tet_stiffness
+from hpcdem.physics.fdem.kernels import tet_stiffness, tets
 from hpcdem.physics.fdem.kernels.joints import YIELDED
 from hpcdem.physics.fdem.linear import Pieces
 from hpcdem.physics.fdem.local_space import LocalSpace
@@ -58,4 +58,12 @@ def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:
         )
         found[who] = part
     number = sim.number[rows]
-    return [Pieces(number, sim.node[number], found)]
+    if local.hexes is None:
+        return [Pieces(number, sim.node[number], found)]
+    hexes, alone = local.hexes, np.ones(len(rows), bool)
+    alone[hexes.rows - sim.n_left] = False
+    corner = hexes.place[: hexes.count]
+    nodes = sim.node[sim.number[corner // tets.ROW], corner % tets.ROW // tets.STRIDE]
+    return [
+        Pieces(number[alone], sim.node[number[alone]], found[alone]), Pieces(hexes.number, nodes, hexes.stiffness())
+    ]  # fmt: skip

@@ -12,7 +12,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import structured_space
 from tests.cases.solids import exact
-from tests.space.support import ROCK, body, box, faces_on, nodes_on
+from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
 
 YOUNG, NU = ROCK["young"], ROCK["poisson_ratio"]
 
@@ -65,17 +65,23 @@ def test_cantilever(across, nu, want):
     assert sag(across, 6, nu) == pytest.approx(want, abs=0.01)
 
 
-def octant(inner: int, cells: int, radii: np.ndarray, split: int = 6) -> Mesh:
+def octant(inner: int, cells: int, radii: np.ndarray, of_hexes: bool = False) -> Mesh:
     """An eighth of a shell: cubes of a grid from the ring `inner` on, whose rings lie on spheres of these radii
     (cells - inner + 1,). Layers: x, y, z: the planes of symmetry; inside, outside."""
-    grid = structured_space.box([np.arange(cells + 1.0)] * 3, split)
+    lines = [np.arange(cells + 1.0)] * 3
+    grid = structured_space.hexes(lines) if of_hexes else structured_space.box(lines, 6)
     ring = grid.points.max(axis=1)
     keep = grid.centroids().max(axis=1) > inner
     length = np.linalg.norm(grid.points, axis=1)
     out = np.where(ring >= inner, np.interp(ring, np.arange(inner, cells + 1), radii), 0.0)
     points = grid.points / np.where(length > 0.0, length, 1.0)[:, None] * out[:, None]
-    used, cells_ = np.unique(grid.cells[keep], return_inverse=True)
-    made = Mesh.of(points[used], cells_.reshape(-1, 4))
+    used = np.unique(grid.cells[keep])
+    number = np.full(len(points), -1)
+    number[used] = np.arange(len(used))
+    if of_hexes:
+        made = Mesh.of_hexes(points[used], number[grid.hexes[keep[grid.hexes[:, 8]], :8]])
+    else:
+        made = Mesh.of(points[used], number[grid.cells[keep]])
     edges = made.edges()
     free = edges.points[~edges.inner]
     flat = np.abs(made.points) < 1e-9
@@ -83,7 +89,7 @@ def octant(inner: int, cells: int, radii: np.ndarray, split: int = 6) -> Mesh:
     far = np.linalg.norm(made.points, axis=1)[free]
     layers["inside"] = free[(far < radii[0] * (1 + 1e-9)).all(axis=1)]
     layers["outside"] = free[(far > radii[-1] * (1 - 1e-9)).all(axis=1)]
-    return Mesh.of(made.points, made.cells, layers=layers)
+    return Mesh.of(made.points, made.cells, layers=layers, hexes=made.hexes)
 
 
 def eighth(mesh: Mesh, **properties: float) -> Blocks:
@@ -101,10 +107,16 @@ def stress_along(sim: Blocks, way: np.ndarray) -> np.ndarray:
     return x * x * xx + y * y * yy + z * z * zz + 2.0 * (x * y * xy + x * z * xz + y * z * yz)
 
 
-@pytest.mark.parametrize("cells, within", [(8, (0.07, 0.13)), pytest.param(16, (0.04, 0.035), marks=SLOW)])
-def test_thick_sphere_under_pressure(cells, within):
+@pytest.mark.parametrize(
+    "cells, of_hexes, within",
+    [
+        (8, False, (0.07, 0.13)), pytest.param(16, False, (0.04, 0.035), marks=SLOW),
+        (8, True, (0.02, 0.07)), pytest.param(16, True, (0.01, 0.02), marks=SLOW),
+    ],
+)  # fmt: skip
+def test_thick_sphere_under_pressure(cells, of_hexes, within):
     """Stresses, root mean square over the pressure, and the movement of both walls."""
-    mesh = octant(cells // 2, cells, np.geomspace(1.0, 3.0, cells - cells // 2 + 1))
+    mesh = octant(cells // 2, cells, np.geomspace(1.0, 3.0, cells - cells // 2 + 1), of_hexes)
     sim = eighth(mesh)
     sim.stress_condition(faces_on(mesh, "inside"), normal=-10e6)
     solve(sim)
@@ -139,11 +151,18 @@ def test_goodier_cavity():
         assert zz[ring].mean() == pytest.approx(want, rel=0.03), r[ring].mean()
 
 
-@pytest.mark.parametrize("across, within", [(4, 0.31), pytest.param(8, 0.085, marks=SLOW)])
-def test_torsion_of_a_square_bar(across, within):
-    """One end is turned by an angle in its plane, free to warp: the torque is G J angle / L. (Tetrahedra are too
-    stiff: by 30 % with 4 across, 8 % with 8.)"""
-    mesh = box((4 * across, across, across), (0.4, 0.1, 0.1), 5)
+@pytest.mark.parametrize(
+    "across, of_hexes, within",
+    [
+        (4, False, 0.31), pytest.param(8, False, 0.085, marks=SLOW), (4, True, 0.31),
+        pytest.param(8, True, 0.085, marks=SLOW), pytest.param(16, True, 0.025, marks=SLOW),
+    ],
+)  # fmt: skip
+def test_torsion_of_a_square_bar(across, of_hexes, within):
+    """One end is turned by an angle in its plane, free to warp: the torque is G J angle / L. (Both are too
+    stiff: by 30 % with 4 across, 8 % with 8, 2 % with 16.)"""
+    size = (4 * across, across, across), (0.4, 0.1, 0.1)
+    mesh = hexes(*size) if of_hexes else box(*size, 5)
     sim = body(mesh, dynamic=False)
     sim.option(large_strain=False)
     sim.velocity_condition(nodes_on(mesh, "left"), vy=0.0, vz=0.0)
