@@ -12,6 +12,7 @@ from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, 
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.pre.mesh.imported import import_mesh
 from tests.cases.solids import exact
 from tests.space.support import LAME, ROCK, SHEAR, body, box, faces_on, hexes, nodes_on
 from tests.space.test_equilibrium import STRAIN, STRESSES, boundary, farthest, slopes_by_difference
@@ -269,3 +270,50 @@ def test_the_same_body_of_tetrahedra_is_stiffer():
         equilibrium.solve_elastic(sim)
         sags.append(-diagnostics.values(sim, "displacement_z").min())
     assert sags[0] > 1.2 * sags[1]
+
+
+def test_import(tmp_path):
+    """Hexahedra beside tetrahedra, with groups and a surface of quads; one that is inside out is turned back."""
+    meshio = pytest.importorskip("meshio")
+    one = hexes((2, 1, 1), (2.0, 1.0, 1.0))
+    cells = one.hexes[:, :8].copy()
+    cells[1] = cells[1][[4, 5, 6, 7, 0, 1, 2, 3]]
+    points = np.concatenate([one.points, np.array([(5.0, 0, 0), (6, 0, 0), (5, 1, 0), (5, 0, 1)])])
+    n = len(one.points)
+    side = cells[0][hexahedra.FACES[5]]
+    path = tmp_path / "both.msh"
+    data = {"gmsh:physical": [np.array([7]), np.array([1, 2]), np.array([3])]}
+    data["gmsh:geometrical"] = data["gmsh:physical"]
+    blocks = [("quad", side[None]), ("hexahedron", cells), ("tetra", np.array([[n, n + 1, n + 2, n + 3]]))]
+    names = {"wall": np.array([7, 2]), "a": np.array([1, 3]), "b": np.array([2, 3]), "c": np.array([3, 3])}
+    meshio.write(path, meshio.Mesh(points, blocks, cell_data=data, field_data=names), "gmsh22", binary=False)
+    mesh = import_mesh(path, dim=3)
+    assert len(mesh.hexes) == 2 and len(mesh.cells) == 13 and mesh.areas().min() > 0.0
+    groups = {name: rows.tolist() for name, rows in mesh.groups["physical"].items()}
+    assert groups == {"a": list(range(6)), "b": list(range(6, 12)), "c": [12]}
+    assert (mesh.points[mesh.layers["wall"]][:, :, 0] == 0.0).all() and len(mesh.layers["wall"]) == 2
+    sim = body(mesh)
+    convergence.advance(sim, 2)
+
+
+def test_tetrahedra_that_lock_are_told_of_and_hexahedra_are_not():
+    for made, told in ((box((2, 1, 1), (1.0, 0.5, 0.5)), True), (hexes((2, 1, 1), (1.0, 0.5, 0.5)), False)):
+        sim = body(made, poisson_ratio=0.49)
+        log = Heard()
+        sim.log = log
+        sim.changed()
+        sim.close_model()
+        assert any("lock" in text for text in log.told) == told
+
+
+class Heard:
+    """A log that is listened to."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def warn_once(self, key: str, text: str) -> None:
+        self.told.append(text)
+
+    def info(self, text: str) -> None:
+        pass

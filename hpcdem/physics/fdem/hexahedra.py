@@ -50,17 +50,17 @@ def split(points: np.ndarray) -> np.ndarray:
     return out
 
 
-def cut_sides(layers: dict) -> dict:
-    """Layer -> (k, 3) triangles, of sides (k, 4) as `split` cuts them."""
-    out = {}
-    for name, given in layers.items():
-        of = np.array(given, np.int64)
-        if of.ndim == 2 and of.shape[1] == 4:
-            first = np.argmin(of, axis=1)[:, None]
-            a, b, c, d = (np.take_along_axis(of, (first + m) % 4, axis=1)[:, 0] for m in range(4))
-            of = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-        out[name] = of
-    return out
+def triangles(sides: list[np.ndarray]) -> np.ndarray:
+    """(k, 3) triangles, of triangles (m, 3) and sides (m, 4) as `split` cuts them."""
+    out = [np.empty((0, 3), np.int64)]
+    for of in sides:
+        if of.shape[1] == 3:
+            out.append(of)
+            continue
+        first = np.argmin(of, axis=1)[:, None]
+        a, b, c, d = (np.take_along_axis(of, (first + m) % 4, axis=1)[:, 0] for m in range(4))
+        out += [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
+    return np.concatenate(out)
 
 
 def volumes(points: np.ndarray, hexes: np.ndarray) -> np.ndarray:

@@ -52,14 +52,13 @@ class Mesh:
 
     @staticmethod
     def of_hexes(points, hexes, layers=None, more=None) -> Mesh:
-        """Hexahedra with these points (nh, 8), then tetrahedra `more` (n, 4); layers: (k, 4) points of sides, or
-        (k, 3)."""
+        """Hexahedra with these points (nh, 8), then tetrahedra `more` (n, 4)."""
         hexes = np.array(hexes, np.int64).reshape(-1, 8)
         cells = hexahedra.split(hexes).reshape(-1, 4)
         if more is not None:
             cells = np.concatenate([cells, np.array(more, np.int64).reshape(-1, 4)])
         table = np.column_stack([hexes, hexahedra.PARTS * np.arange(len(hexes))])
-        return Mesh.of(points, cells, layers=hexahedra.cut_sides(layers or {}), hexes=table)
+        return Mesh.of(points, cells, layers=layers, hexes=table)
 
     @staticmethod
     def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None, hexes=None) -> Mesh:
@@ -350,6 +349,11 @@ def _bad_names(mesh: Mesh) -> str | None:
         return f"there are {len(mesh.cracks)} crack edges, but {len(mesh.crack_sets)} numbers of fracture sets"
     rows = mesh.find_edges(edges, mesh.cracks)
     outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
+    if len(mesh.hexes) and len(rows):
+        of = mesh.hex_of() >= 0
+        bad = np.flatnonzero((rows >= 0) & of[edges.faces[rows] // 4].any(axis=1))
+        if len(bad):
+            return f"a crack through or beside hexahedra at {_at(mesh, int(mesh.cracks[bad[0], 0]))}: tetrahedra crack"
     if len(outside):
         points = mesh.cracks[outside[0]].tolist()
         return (

@@ -50,6 +50,8 @@ SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
 """Storage is made again at this age even if nobody moved, so that borders can follow the load."""
+LOCKS = 0.45
+"""Poisson's ratio above which tetrahedra are said to lock."""
 AUTO = 100
 """Steps after which an automatic time step is estimated again."""
 
@@ -545,6 +547,7 @@ class Blocks(State):
                 self.renew_topology()
             if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
+                self._warn_of_locking()
             middle, radius = self._middles()
             self._choose_reach(radius, 0.0 if frozen else self.surface_loads.reach(self, middle), frozen)
         middle = self._share_out(middle)
@@ -718,6 +721,21 @@ class Blocks(State):
         if self.options.collision:
             halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
+
+    def _warn_of_locking(self) -> None:
+        """A line in the log about tetrahedra that hardly change their volume."""
+        if self.log is None or self.dim == 2:
+            return
+        bulk, shear = (np.array(self.element_rows.column(name)) for name in ("bulk", "shear"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+        of = np.where(self.alive & (self.the_mesh().hex_of() < 0), nu[self.element_row], 0.0)
+        if (of > LOCKS).any():
+            self.log.warn_once(
+                "locking",
+                f"{int((of > LOCKS).sum())} tetrahedra have a Poisson's ratio up to {of.max():.3g}: as they have one "
+                "strain each they are much too stiff near 0.5 (they lock); hexahedra are not",
+            )
 
     def _warn_of_snap_back(self) -> None:
         """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening."""
