@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import atexit
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
@@ -97,8 +97,8 @@ class Session:
         """Collective: wait for the kernels of a kind, see KINDS, once."""
         if kind not in self.ready:
             with self._counted():
-                prepare(self.comm, self.log, [kind], self.threads)
-            self.ready.add(kind)
+                prepare(self.comm, self.log, [kind], self.threads, ready=self.ready)
+            self.ready.update(needed([kind]))
             if kind in ("", "blocks"):
                 self.stop.install(self.comm.rank)
 
@@ -178,15 +178,23 @@ class Session:
             run_folder.leave(Path(sim.outdir), self.comm, state, sim.clock.step)
 
 
-def prepare(comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int) -> Path:
-    """Collective: load the kernels of kinds, see KINDS, with those that they need and those that all share, or compile
-    them, for each number of threads. Returns the last cache folder."""
+def prepare(
+    comm: SerialComm, log: Log, kinds: Sequence[str], *threads: int, ready: Collection[str] = frozenset()
+) -> Path:
+    """Collective: load the kernels of kinds, see KINDS, and of those that they need, or compile them, for each number
+    of threads; but not those that are `ready`. Returns the last cache folder."""
     from hpcdem.runtime.kernels import prepare_kernels
 
-    needed = dict.fromkeys(["shared"])
+    names = [name for name in needed(kinds) if name not in ready]
+    return prepare_kernels(comm, log, {name: partial(warm_up, name, *threads) for name in names})
+
+
+def needed(kinds: Sequence[str]) -> list[str]:
+    """These kinds, after those that they need and those that all share."""
+    found = dict.fromkeys(["shared"])
     for kind in kinds:
-        needed |= dict.fromkeys([*(KINDS[kind].after if kind in KINDS else ()), kind])
-    return prepare_kernels(comm, log, {name: partial(warm_up, name, *threads) for name in needed})
+        found |= dict.fromkeys([*(KINDS[kind].after if kind in KINDS else ()), kind])
+    return list(found)
 
 
 class Kernels(NamedTuple):
@@ -208,6 +216,20 @@ def _particles() -> WarmUp:
     from hpcdem.commands.dem import warm_up
 
     return warm_up.warm_up, ()
+
+
+def _energy() -> WarmUp:
+    from hpcdem.commands.dem import warm_up
+    from hpcdem.physics.dem.kernels import energy
+
+    return warm_up.with_energy, (energy,)
+
+
+def _clumps() -> WarmUp:
+    from hpcdem.commands.dem import warm_up
+    from hpcdem.physics.dem.kernels import rigid
+
+    return warm_up.with_clumps, (rigid,)
 
 
 def _blocks() -> WarmUp:
@@ -330,8 +352,10 @@ def _pictures() -> WarmUp:
 KINDS = {
     "shared": Kernels(_shared),
     "": Kernels(_particles),
+    "energy": Kernels(_energy, after=("",)),
+    "clumps": Kernels(_clumps, after=("",)),
     "blocks": Kernels(_blocks),
-    "coupled": Kernels(_coupled),
+    "coupled": Kernels(_coupled, after=("energy",)),
     "bolts": Kernels(_bolts),
     "liners": Kernels(_liners),
     "flow": Kernels(_flow),
@@ -351,6 +375,8 @@ KINDS = {
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
+OF_PARTICLES = ("energy", "clumps")
+"""Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
     "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
     "yielding-space", "creep-space", "tangent-space", "hexes", "pictures",

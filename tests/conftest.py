@@ -158,6 +158,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not item.get_closest_marker("alone") and not shared.get(item.path, set()).isdisjoint(_made_once(item)):
             item.add_marker("ranks")
 
+    if PARTS is not None:  # of all tests that there are; which of them run is sorted out later
+        for part in ("ranks", "alone"):
+            files = sorted({str(item.path) for item in items if item.get_closest_marker(part)})
+            (PARTS / part).write_text("\n".join(files))
+
     if GREEN.is_file():
         passed = set(GREEN.read_text().splitlines())
         items[:] = [item for item in items if item.nodeid not in passed]
@@ -167,6 +172,11 @@ def _made_once(item: pytest.Item) -> set[str]:
     """Fixtures of a test that are made once for its file."""
     found = item._fixtureinfo.name2fixturedefs if isinstance(item, pytest.Function) else {}
     return {name for name, fixtures in found.items() if fixtures[-1].scope == "module"}
+
+
+PARTS = Path(os.environ["HPCDEM_TEST_PARTS"]) if "HPCDEM_TEST_PARTS" in os.environ else None
+"""Folder for the names of the files with tests of several ranks, and with tests that want to be alone: scripts/test
+lets each part read those only, as to read all takes a quarter of a minute of each process."""
 
 
 # --- tests that go on after a break: scripts/test --go-on --------------------------------------------------------

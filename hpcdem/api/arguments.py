@@ -104,7 +104,7 @@ def _read(options: tuple[Option, ...], given: Mapping[str, Any], of: str, dim: i
             found[option.name] = [_values(option, one, name, dim) for one in _items(value, name)]
         else:
             found[option.name] = _values(option, value, name, dim)
-    missing = [option for option in options if option.required and option.name not in found]
+    missing = [option for option in options if option.required and option.name not in found and dim in option.dims]
     if missing:
         raise ValueError(f"{of} needs {_listed(missing)}")
     return {option.name: found[option.name] for option in options if option.name in found}

@@ -108,7 +108,7 @@ class Geometry(Words):
         self._shape("polyline", as_layer, points=points)
 
     def polygon(self, points: Sequence[Point], as_layer: str) -> None:
-        """A closed line."""
+        """A closed line; in three dimensions the flat surface within."""
         self._shape("polygon", as_layer, points=points)
 
     def rectangle(self, first: Point, second: Point, as_layer: str) -> None:
@@ -139,40 +139,77 @@ class Geometry(Words):
         """In three dimensions: a round cylinder between the middles of its ends."""
         self._shape("cylinder", as_layer, first=first, second=second, radius=radius)
 
+    def cone(self, first: Point, second: Point, radius: float, other: float, as_layer: str) -> None:
+        """In three dimensions: a round cone, or a part of one, by the middles and radii of its ends."""
+        self._shape("cone", as_layer, first=first, second=second, radius=radius, other=other)
+
+    def disc(self, centre: Point, normal: Point, radius: float, as_layer: str) -> None:
+        """In three dimensions: the surface of a round disc."""
+        self._shape("disc", as_layer, centre=centre, normal=normal, radius=radius)
+
+    def plane(self, point: Point, normal: Point, as_layer: str) -> None:
+        """In three dimensions: a plane without end."""
+        self._shape("plane", as_layer, point=point, normal=normal)
+
+    def extrude(self, layer: str, along: Point, as_layer: str) -> None:
+        """In three dimensions: the polygons of a layer, drawn along a way, as bodies."""
+        self._shape("extrude", as_layer, layer=layer, along=along)
+
+    def revolve(
+        self, layer: str, axis: Point, as_layer: str, about: Point | None = None, angle: float | None = None
+    ) -> None:
+        """In three dimensions: the polygons of a layer, turned about an axis in their plane [degrees], as bodies."""
+        self._shape("revolve", as_layer, layer=layer, axis=axis, about=about, angle=angle)
+
     def fractures(
         self,
         as_layer: str,
         inside: str,
         *,
         orientation: tuple[str, float],
-        length: tuple[str, float],
+        length: tuple[str, float] | None = None,
+        radius: tuple[str, float] | None = None,
         seed: int,
         orientation_spread: float | None = None,
+        orientation_towards: float | None = None,
         length_spread: float | None = None,
         length_least: float | None = None,
         length_greatest: float | None = None,
+        radius_spread: float | None = None,
+        radius_least: float | None = None,
+        radius_greatest: float | None = None,
         p10: float | None = None,
         p20: float | None = None,
         p21: float | None = None,
+        p30: float | None = None,
+        p32: float | None = None,
         scan_line: float | None = None,
+        scan_direction: Point | None = None,
         reached: bool = False,
         ends_at: float | None = None,
         hole: Sequence[str] = (),
         shortest: float | None = None,
     ) -> None:
-        """A set of fractures with given statistics, as straight lines inside of a layer. orientation: ("fixed",
-        "uniform", "normal" or "fisher", mean); length: ("fixed", "exponential", "lognormal" or "power", value); one of
-        the densities p10, p20 and p21 [1/m, 1/m2, 1/m]; docs/pcdc_reference.md has the rest."""
+        """A set of fractures with given statistics, as straight lines inside of a layer, in three dimensions as discs.
+        orientation: ("fixed", "uniform", "normal" or "fisher", mean); length, of discs radius: ("fixed", "exponential",
+        "lognormal" or "power", value); one of the densities p10, p20 and p21 [1/m, 1/m2, 1/m], of discs p10, p30 and
+        p32 [1/m, 1/m3, 1/m]; docs/pcdc_reference.md has the rest."""
+        laws = {
+            "length": (length, {"spread": length_spread, "least": length_least, "greatest": length_greatest}),
+            "radius": (radius, {"spread": radius_spread, "least": radius_least, "greatest": radius_greatest}),
+        }
         given = {
-            "orientation": {"value": orientation, "spread": orientation_spread},
-            "length": {"value": length, "spread": length_spread, "least": length_least, "greatest": length_greatest},
-            "p10": p10, "p20": p20, "p21": p21, "scan_line": scan_line, "reached": reached, "ends_at": ends_at,
+            "orientation": {"value": orientation, "spread": orientation_spread, "towards": orientation_towards},
+            **{name: None if law is None else {"value": law, **more} for name, (law, more) in laws.items()},
+            "p10": p10, "p20": p20, "p21": p21, "p30": p30, "p32": p32, "scan_line": scan_line,
+            "scan_direction": scan_direction, "reached": reached, "ends_at": ends_at,
             "inside": inside, "hole": hole or None, "shortest": shortest, "seed": seed, "as_layer": as_layer,
         }  # fmt: skip
         self._do("geometry create fractures", given)
 
     def import_file(self, file: File, as_layer: str, dxf_layer: str | None = None) -> None:
-        """Lines of a DXF file, or of one of its layers."""
+        """Lines of a DXF file, or of one of its layers; in three dimensions the solids of a STEP or BREP file, or what
+        the triangles of an STL or DXF file enclose."""
         given = {"file": file, "as_layer": as_layer, "dxf_layer": dxf_layer}
         self._do("geometry import", given)
 
@@ -216,13 +253,16 @@ class Mesh(Words):
         crack: Sequence[str] = (),
         irregular: bool = False,
         smooth: bool = False,
+        bodies: bool = False,
         group: str | None = None,
         set: str | None = None,
     ) -> None:
         """The inside of a layer, by Gmsh; size: of edges [m]; type: "tri" or "quad". refine_layer: (layer, size) or
-        (layer, size, distance); hole, embed, crack: layers; region: layers, or (layer, name of the group)."""
+        (layer, size, distance); hole, embed, crack: layers; region: layers, or (layer, name of the group); bodies: in
+        three dimensions each body of the layer is a group of its own."""
         given = {
             "from_layer": from_layer, "size": size, "type": type, "irregular": irregular, "smooth": smooth,
+            "bodies": bodies,
             "refine_layer": [_named(one, "value", "size", "distance") for one in refine_layer] or None,
             "hole": hole or None, "embed": embed or None, "crack": crack or None,
             "region": [_named(one, "value", "group") for one in region] or None, "group": _group(group, set),
@@ -609,15 +649,25 @@ class BoltNodes(Objects):
         vy: Number | None = None,
         ax: Number | None = None,
         ay: Number | None = None,
+        vz: Number | None = None,
+        az: Number | None = None,
         where: Where = None,
     ) -> None:
         """Velocity [m/s] or acceleration [m/s2] from now on; components left out stay free."""
         given = {"velocity_x": vx, "velocity_y": vy, "acceleration_x": ax, "acceleration_y": ay}
+        given |= {"velocity_z": vz, "acceleration_z": az}
         self._carry_out("boundary", given, where, "bolt-node-constrain")
 
-    def force(self, *, fx: Number | None = None, fy: Number | None = None, where: Where = None) -> None:
+    def force(
+        self,
+        *,
+        fx: Number | None = None,
+        fy: Number | None = None,
+        fz: Number | None = None,
+        where: Where = None,
+    ) -> None:
         """Force on each node of one bolt [N]."""
-        given = {"force_x": fx, "force_y": fy}
+        given = {"force_x": fx, "force_y": fy, "force_z": fz}
         self._carry_out("boundary", given, where, "bolt-node-force-boundary-condition")
 
     def remove_boundary(self, *, where: Where = None) -> None:

@@ -9,7 +9,7 @@ from typing import ClassVar
 from pydantic import model_validator
 
 from hpcdem.cases.base import choice, quantity
-from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Rock
+from hpcdem.cases.rock import CRACKS, ELASTIC, JOINTS, SURFACES, WAVES, Dimensions, Rock, in_space
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,8 @@ class Splitting:
     """strength: 2 P / (pi D) at the peak [Pa]; peak_force: P there [N/m]; centre_x, centre_y: mean stress in the
     middle, across the load and along it, over 2 P / (pi D) while it rises: 1 and -3 in an elastic disc; curve:
     (shortening over diameter, 2 P / (pi D) [Pa]) pairs; tension, mixed, shear: broken joints by mode; energy_error:
-    closing error of the energy budget over its largest flow."""
+    closing error of the energy budget over its largest flow (in three dimensions NaN). In three dimensions P is that of
+    a metre of thickness."""
 
     strength: float
     peak_force: float
@@ -38,6 +39,8 @@ class Brazilian(Rock):
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Splitting
 
+    dim: Dimensions = choice(2, "dimensions of space: a flat disc, or one of this thickness along z")
+    thickness: float = quantity(0.025, "m", "of the disc in three dimensions, and of the platens", gt=0)
     size: float = quantity(0.001, "m", "edges of the elements", gt=0)
     cohesion: float = quantity(20e6, "Pa", "cohesion of the joints", gt=0)
     tensile_strength: float = quantity(5e6, "Pa", "tensile strength of the joints", gt=0)
@@ -55,20 +58,30 @@ class Brazilian(Rock):
     def _fits(self) -> Brazilian:
         if self.size > self.diameter / 8:
             raise ValueError(f"size is {self.size:g}, expected at most an eighth of diameter, {self.diameter / 8:g} m")
-        self.not_too_many(0.25 * math.pi * self.diameter**2)
+        if self.dim == 2 and "thickness" in self.model_fields_set:
+            raise ValueError("thickness: expected dim 3 beside it")
+        if self.dim == 3 and self.guided:
+            raise ValueError("guided: expected no in three dimensions")
+        self.not_too_many(0.25 * math.pi * self.diameter**2, self.thickness if self.dim == 3 else None)
         return self
 
     def model(self) -> str:
-        return (
-            DISC.format(mesh=GUIDED if self.guided else FREE)
+        disc = DISC if self.dim == 2 else THICK
+        text = (
+            disc.replace("MESH", GUIDED if self.guided else FREE)
             + ELASTIC
             + (JOINTS if self.joints else "")
             + SURFACES
             + STEEL
         )
+        return in_space(text) if self.dim == 3 else text
 
     def loading(self) -> str:
-        return LOADING + CRACKS + REPORT
+        text = (LOADING + CRACKS + REPORT).replace("DEEP", " * thickness" if self.dim == 3 else "")
+        if self.dim == 2:
+            return text
+        text = text.replace("velocity-x 0 velocity-y", "velocity-x 0 velocity-z 0 velocity-y")
+        return in_space(text) + PICTURE
 
 
 DISC = """
@@ -83,13 +96,36 @@ for i in range(2*edges + 2):
     if flat > 0 or step < edges:
         outline.append(Vector(0.5*diameter*math.cos(angle), 0.5*diameter*math.sin(angle)))
 pcdc geometry create polyline [outline + outline[:1]] as-layer 'outline'
-{mesh}
+MESH
 wide, thick, end = 0.4*diameter, 0.1*diameter, 0.5*diameter*math.cos(half)
 for low in (-end - thick, end):
     pcdc mesh structured ([-wide/2],[low]) ([wide/2],[low + thick]) \\
         cells [max(4, 2*round(wide/size/6))] [max(2, round(thick/size/3))] type quad group 'platen' set 'body'
 
 pcdc geometry create circle (0,0) [max(0.05*diameter, 1.5*size)] as-layer 'middle'
+pcdc element group 'middle' set 'gauge' range geometry 'middle'
+"""
+THICK = """
+pcdc model new dim 3
+# The outline has corners at the ends of the flats, and as many on the left as on the right.
+half = math.radians(flat) / 2                    # of a flat end
+edges = max(8, math.ceil((math.pi - 2*half) * diameter / (2*size) / 2) * 2)
+outline = []
+for i in range(2*edges + 2):
+    side, step = divmod(i, edges + 1)
+    angle = (side - 0.5) * math.pi + half + step * (math.pi - 2*half) / edges
+    if flat > 0 or step < edges:
+        outline.append(Vector(0.5*diameter*math.cos(angle), 0.5*diameter*math.sin(angle), 0))
+pcdc geometry create polygon [outline] as-layer 'rim'
+pcdc geometry create extrude layer 'rim' along (0,0,[thickness]) as-layer 'outline'
+pcdc mesh create from-layer 'outline' size [size] group 'rock' set 'body'
+wide, thick, end = 0.4*diameter, 0.1*diameter, 0.5*diameter*math.cos(half)
+for low in (-end - thick, end):
+    pcdc mesh structured ([-wide/2],[low],0) ([wide/2],[low + thick],[thickness]) \\
+        cells [max(4, 2*round(wide/size/6))] [max(2, round(thick/size/3))] [max(2, round(thickness/size/3))] \\
+        group 'platen' set 'body'
+
+pcdc geometry create cylinder (0,0,0) (0,0,[thickness]) [max(0.05*diameter, 1.5*size)] as-layer 'middle'
 pcdc element group 'middle' set 'gauge' range geometry 'middle'
 """
 FREE = """\
@@ -141,7 +177,7 @@ pcdc output vtk 'brazilian'
 # The curve of 2 P / (pi D): the tension that this force brings to the middle of an elastic disc.
 below, above, rise, fall, xx, yy = (pcdc.history(name)[:, 2] for name in (
     'force below', 'force above', 'way below', 'way above', 'middle xx', 'middle yy'))
-strain, stress = (rise - fall) / diameter, (below - above) / (math.pi * diameter)
+strain, stress = (rise - fall) / diameter, (below - above) / (math.pi * diameterDEEP)
 curve = list(zip(strain.tolist(), stress.tolist()))
 strength = float(stress.max())
 peak_force = 0.5 * math.pi * diameter * strength
@@ -159,3 +195,8 @@ pcdc chart create 'brazilian' x-label 'shortening over diameter (%)' y-label '2P
 pcdc chart add 'brazilian' values [points] label 'disc'
 pcdc chart export 'brazilian' 'brazilian.png' cracks
 """
+PICTURE = """\
+pcdc output image 'brazilian' deformed 10
+pcdc output image 'section' section 'z=[thickness/2]' eye '0,0,1'
+"""
+"""The disc, and its middle with what broke."""

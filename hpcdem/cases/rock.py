@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator
 
 from hpcdem.cases.base import Case, quantity
 
 MOST = 5e6
 """Elements: more are a slip of the pen."""
+
+
+def _whole(given: Any) -> Any:
+    """Words of a command line are texts."""
+    return int(given) if isinstance(given, str) and given.isdigit() else given
+
+
+Dimensions = Annotated[Literal[2, 3], BeforeValidator(_whole)]
+"""Of space."""
 
 
 class Rock(Case):
@@ -26,9 +38,12 @@ class Rock(Case):
     penalty: float = quantity(10.0, "1", "penalty of opening and sliding joints, over young", gt=0)
     penalty_overlay: float = quantity(100.0, "1", "penalty of closed joints, over young", gt=0)
 
-    def not_too_many(self, area: float) -> None:
-        """ValueError if `size` makes too many elements of an area [m2]."""
-        number = area / (math.sqrt(3.0) / 4.0 * self.size**2)
+    def not_too_many(self, area: float, thickness: float | None = None) -> None:
+        """ValueError if `size` makes too many elements of an area [m2], in space of this thickness [m]."""
+        if thickness is None:
+            number = area / (math.sqrt(3.0) / 4.0 * self.size**2)
+        else:
+            number = area * thickness * 6.0 * math.sqrt(2.0) / self.size**3
         if number > MOST:
             raise ValueError(f"size is {self.size:g}: that are {number:.2g} elements, expected at most {MOST:.0e}")
 
@@ -68,3 +83,13 @@ mixed = int(broken.sum()) - tension - shear
 energy_error = pcdc.energies['relative']         # of the energy budget, part of its largest flow
 """
 """tension, mixed, shear: broken joints by mode; energy_error."""
+ENERGY = "pcdc model option energy on\n"
+"""The budget is kept."""
+
+
+def in_space(text: str) -> str:
+    """The same for three dimensions, in which no budget is kept yet, and charts have no model beside them."""
+    text = text.replace(
+        "pcdc.energies['relative']         # of the energy budget, part of its largest flow", "math.nan"
+    )
+    return text.replace(ENERGY, "").replace(".png' cracks\n", ".png'\n")

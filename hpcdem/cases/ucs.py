@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from pydantic import model_validator
 
 from hpcdem.cases.base import choice, quantity
-from hpcdem.cases.rock import CRACKS, PROPERTIES, WAVES, Rock
+from hpcdem.cases.rock import CRACKS, PROPERTIES, WAVES, Dimensions, Rock, in_space
 
 
 @dataclass(frozen=True)
 class Compression:
     """peak, modulus [Pa], peak_strain: of the curve; curve: (strain, stress [Pa]) pairs, compression positive; tension,
-    mixed, shear: broken joints by mode; energy_error: closing error of the energy budget over its largest flow."""
+    mixed, shear: broken joints by mode; energy_error: closing error of the energy budget over its largest flow (in
+    three dimensions NaN)."""
 
     peak: float
     peak_strain: float
@@ -27,13 +29,15 @@ class Compression:
 
 
 class UCS(Rock):
-    """Uniaxial compression: a rectangle of rock between two platens that approach each other."""
+    """Uniaxial compression: a rectangle, in three dimensions a cylinder, of rock between two platens that approach each
+    other."""
 
     name: ClassVar[str] = "ucs"
     title: ClassVar[str] = "Uniaxial compression of a specimen of rock"
     needs: ClassVar[str] = "mesh"
     result: ClassVar[type] = Compression
 
+    dim: Dimensions = choice(2, "dimensions of space: a rectangle, or a cylinder of this diameter along z")
     gf1: float = quantity(0.5, "N/m", "fracture energy of opening (mode I)", gt=0)
     gf2: float = quantity(5.0, "N/m", "fracture energy of sliding (mode II)", gt=0)
     width: float = quantity(0.052, "m", "width of the specimen", gt=0)
@@ -52,20 +56,47 @@ class UCS(Rock):
             raise ValueError(f"size is {self.size:g}, expected at most a quarter of width, {self.width / 4:g} m")
         if self.platens and self.platen_width < self.width:
             raise ValueError(f"platen_width is {self.platen_width:g}, expected at least width, {self.width:g} m")
-        self.not_too_many(self.width * self.height)
+        if self.dim == 3:
+            self.not_too_many(math.pi / 4 * self.width**2, self.height)
+        else:
+            self.not_too_many(self.width * self.height)
         return self
 
     def model(self) -> str:
-        return SPECIMEN + (PLATENS if self.platens else "") + PROPERTIES + (STEEL if self.platens else ENDS) + LOADED
+        specimen, platens = (CYLINDER, BOXES) if self.dim == 3 else (SPECIMEN, PLATENS)
+        return self._placed(
+            specimen + (platens if self.platens else "") + PROPERTIES + (STEEL if self.platens else ENDS) + LOADED
+        )
 
     def loading(self) -> str:
-        return LOADING + CRACKS + REPORT
+        return self._placed(LOADING + CRACKS + REPORT)
+
+    def _placed(self, text: str) -> str:
+        """Loaded along y, in space along z."""
+        text = text.replace("UP", "yz"[self.dim - 2]).replace("AREA", "area" if self.dim == 3 else "width")
+        if self.dim == 3:
+            text = in_space(text).replace(", and are free along x", ", and are free across it")
+            text += PICTURE if "pcdc chart" in text else ""
+        return text
 
 
 SPECIMEN = """
 pcdc model new
 pcdc geometry create rectangle (0,0) ([width],[height]) as-layer 'outline'
 pcdc mesh create from-layer 'outline' size [size] irregular group 'rock' set 'body'
+"""
+CYLINDER = """
+pcdc model new dim 3
+area = math.pi * width**2 / 4
+pcdc geometry create cylinder (0,0,0) (0,0,[height]) [width/2] as-layer 'outline'
+pcdc mesh create from-layer 'outline' size [size] group 'rock' set 'body'
+"""
+BOXES = """
+half = 0.5 * platen_width
+for low in (-platen_height, height):
+    pcdc mesh structured ([-half],[-half],[low]) ([half],[half],[low + platen_height]) \\
+        cells [max(2, round(platen_width/size/2))] [max(2, round(platen_width/size/2))] \\
+        [max(1, round(platen_height/size/2))] group 'platen' set 'body'
 """
 PLATENS = """
 side = 0.5 * (width - platen_width)
@@ -79,18 +110,18 @@ pcdc element property density 7850 young 200e9 poisson-ratio 0.3 range group 'pl
 pcdc element-face property friction [platen_friction] range face-of 'platen' set 'body'
 
 # The outer sides of the platens are moved.
-pcdc node group 'below' set 'moved' range y [-platen_height] [-platen_height]
-pcdc node group 'above' set 'moved' range y [height + platen_height] [height + platen_height]
+pcdc node group 'below' set 'moved' range UP [-platen_height] [-platen_height]
+pcdc node group 'above' set 'moved' range UP [height + platen_height] [height + platen_height]
 """
 ENDS = """
-# The ends of the specimen are moved along y, and are free along x.
-pcdc node group 'below' set 'moved' range y 0 0
-pcdc node group 'above' set 'moved' range y [height] [height]
+# The ends of the specimen are moved along UP, and are free along x.
+pcdc node group 'below' set 'moved' range UP 0 0
+pcdc node group 'above' set 'moved' range UP [height] [height]
 """
 LOADED = """
 # Strain is that between the ends of the specimen.
-pcdc node group 'bottom' set 'ends' range face-of 'rock' set 'body' y 0 0
-pcdc node group 'top' set 'ends' range face-of 'rock' set 'body' y [height] [height]
+pcdc node group 'bottom' set 'ends' range face-of 'rock' set 'body' UP 0 0
+pcdc node group 'top' set 'ends' range face-of 'rock' set 'body' UP [height] [height]
 """
 LOADING = (
     "import numpy as np\n"
@@ -100,14 +131,14 @@ transit = height / speed_of_waves
 speed = 0.5e-3 * height / (transits * transit)   # m/s, of either end, reached within four transits
 for name, sense in (('below', 1), ('above', -1)):
     pcdc table create '[name]' values (0,0) ([4*transit],[sense*speed])
-    pcdc node boundary mech-vel-b-c velocity-y table '[name]' range group '[name]' set 'moved'
+    pcdc node boundary mech-vel-b-c velocity-UP table '[name]' range group '[name]' set 'moved'
 
 pcdc model option energy on
 pcdc model step 1                                # the time step is known from here on
 every = max(1, round(0.1 * transit / pcdc.time))
 for name, at in (('below', 'bottom'), ('above', 'top')):
-    pcdc history create 'force [name]' node value reaction-y sum every [every] range group '[name]' set 'moved'
-    pcdc history create 'way [at]' node value displacement-y mean every [every] range group '[at]' set 'ends'
+    pcdc history create 'force [name]' node value reaction-UP sum every [every] range group '[name]' set 'moved'
+    pcdc history create 'way [at]' node value displacement-UP mean every [every] range group '[at]' set 'ends'
 pcdc history create 'cracks' model value broken-joints every [every]
 pcdc output vtk 'ucs' every [50*every]
 
@@ -116,9 +147,9 @@ stress = strain = peak = 0.0
 cracked = False
 while strain < most_strain and (not cracked or stress >= stop * peak):
     pcdc model solve time [transit]
-    below, above = (pcdc.total('node', 'reaction-y', group=name, set='moved') for name in ('below', 'above'))
-    bottom, top = (pcdc.values('node', 'displacement-y', group=at, set='ends').mean() for at in ('bottom', 'top'))
-    stress, strain = (below - above) / (2 * width), (bottom - top) / height
+    below, above = (pcdc.total('node', 'reaction-UP', group=name, set='moved') for name in ('below', 'above'))
+    bottom, top = (pcdc.values('node', 'displacement-UP', group=at, set='ends').mean() for at in ('bottom', 'top'))
+    stress, strain = (below - above) / (2 * AREA), (bottom - top) / height
     peak = max(peak, stress)
     cracked = cracked or pcdc.history('cracks')[-1, 2] > 0
 pcdc output vtk 'ucs'
@@ -126,7 +157,7 @@ pcdc output vtk 'ucs'
 # The curve: compression is positive from here on.
 below, above, bottom, top = (pcdc.history(name)[:, 2]
                              for name in ('force below', 'force above', 'way bottom', 'way top'))
-stress, strain = (below - above) / (2 * width), (bottom - top) / height
+stress, strain = (below - above) / (2 * AREA), (bottom - top) / height
 curve = list(zip(strain.tolist(), stress.tolist()))
 peak, peak_strain = float(stress.max()), float(strain[stress.argmax()])
 rising = (stress > 0.1 * peak) & (stress < 0.5 * peak) & (strain < peak_strain)
@@ -141,3 +172,8 @@ pcdc chart create 'ucs' x-label 'axial strain (%)' y-label 'axial stress (MPa)'
 pcdc chart add 'ucs' values [points] label 'specimen'
 pcdc chart export 'ucs' 'ucs.png' cracks
 """
+PICTURE = """\
+pcdc output image 'ucs' deformed 10
+pcdc output image 'section' section 'y=0' eye '0,-1,0'
+"""
+"""The specimen, and its middle with what broke."""

@@ -20,7 +20,7 @@ from hpcdem.cli.run import Options, hpcdem, run, speaks_zdem
 from hpcdem.core.errors import EXIT_OK
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.runtime import launch, shutdown
-from hpcdem.session import OF_BLOCKS, Session, greet, prepare
+from hpcdem.session import OF_BLOCKS, OF_PARTICLES, Session, greet, prepare
 
 if TYPE_CHECKING:
     from hpcdem.halo.comm import SerialComm
@@ -36,7 +36,8 @@ STRESS_AND_STRAIN = ("-s", "--strain-stress", "--strin-stres")
 
 
 _BLOCKS = ("blocks", *OF_BLOCKS)
-KERNELS = {"particles": ("",), "blocks": _BLOCKS, "coupled": ("", *_BLOCKS, "coupled")} | {
+_PARTICLES = ("", *OF_PARTICLES)
+KERNELS = {"particles": _PARTICLES, "blocks": _BLOCKS, "coupled": (*_PARTICLES, *_BLOCKS, "coupled")} | {
     name: ("", name) for name in PHYSICS
 }
 """Kinds of kernels (`session.KINDS`) in the order in which runs load them."""

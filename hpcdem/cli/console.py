@@ -1,21 +1,37 @@
-"""`hpcdem console`: PCDC commands and Python, line by line."""
+"""`hpcdem console`: PCDC commands and Python, or ZDEM commands, line by line."""
 
 from __future__ import annotations
 
+import json
+import sys
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import IO, Any, NoReturn, Protocol
 
 import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
-from hpcdem.core.errors import UsageError
+from hpcdem.core.errors import HpcdemError, UsageError
+from hpcdem.lang.completion import completion
+from hpcdem.page.pipe import DONE, MARK, READY
 from hpcdem.runtime import launch, shutdown
 from hpcdem.session import Session, enter
 
 
+class Talk(Protocol):
+    """What carries out texts, of either language."""
+
+    def carry_out(self, text: str, name: str = "") -> bool:
+        """Carry out a text, or the script `name`; whether there was a command in it. HpcdemError."""
+
+    def show(self) -> Path | None:
+        """Write the present state as a frame."""
+
+
 @click.command(context_settings=HELP)
+@click.option("--zdem", is_flag=True, help="ZDEM commands in place of PCDC commands and Python.")
 @click.option("-j", "threads", type=click.IntRange(1), metavar="N", help="Threads [what srun -c gives, else 1].")
 @click.option("--outdir", type=PATH, metavar="DIR", help="Results [data in this folder].")
+@click.option("--pipe", is_flag=True, hidden=True)
 def console(**options: Any) -> None:
     """Take PCDC commands and Python line by line, on one rank. Tab completes; exit() or Ctrl-D ends."""
 
@@ -28,33 +44,109 @@ def start(words: list[str]) -> NoReturn:
         comm = launch.start_mpi()
 
     def work() -> None:
-        from hpcdem.lang.pcdc.console import Console
-        from hpcdem.lang.pcdc.execute import Interpreter
         from hpcdem.runtime.progress import Log
         from hpcdem.runtime.run_folder import Job
         from hpcdem.runtime.stop_requests import StopRequests
 
         if comm.size > 1:
-            raise UsageError(f"hpcdem console is for one rank, this are {comm.size}; a script runs on many")
+            raise UsageError(f"hpcdem console is for one rank, these are {comm.size}; a script runs on many")
         log = Log(comm.rank)
         for warning in warnings:
             log.warn(warning)
         session = Session(comm, log, StopRequests(), threads, Path(), options["outdir"], figure=False)
-        session.job = Job("", "pcdc", (), threads)
-        project = session.project()
-        session.interpreter = Interpreter(project)
+        session.job = Job("", "zdem" if options["zdem"] else "pcdc", (), threads)
         enter(session)
-
-        def begin() -> None:
-            """Ctrl-C stops a run, and is forgotten then."""
-            session.stop.uninstall()
-            session.stop = project.blocks.stop = StopRequests().install()
-
         try:
-            Console(session.interpreter, begin=begin).run()
+            (_zdem if options["zdem"] else _pcdc)(session, options["pipe"])
         except BaseException as error:
             session.close(error)
             raise
         session.close()
 
     shutdown.leave(shutdown.run_together(comm, work))
+
+
+def _pcdc(session: Session, piped: bool) -> None:
+    from hpcdem.lang.pcdc.console import Console
+    from hpcdem.lang.pcdc.execute import Interpreter
+    from hpcdem.runtime.stop_requests import StopRequests
+
+    project = session.project()
+    session.interpreter = Interpreter(project)
+    enter(session)
+
+    def begin() -> None:
+        """Ctrl-C stops a run, and is forgotten then."""
+        session.stop.uninstall()
+        session.stop = project.blocks.stop = StopRequests().install()
+
+    talk = Console(session.interpreter, begin=begin)
+    if piped:
+        serve(talk, begin, sys.stdin, sys.stdout)
+    else:
+        talk.run()
+
+
+def _zdem(session: Session, piped: bool) -> None:
+    from hpcdem.lang.zdem.complete import candidates
+    from hpcdem.lang.zdem.console import PROMPT, WELCOME, Conversation
+    from hpcdem.runtime.stop_requests import StopRequests
+
+    session.prepare("")
+    talk = Conversation(lambda: session.simulation(log=session.log), session.finish)
+
+    def begin() -> None:
+        """Ctrl-C stops a run, and is forgotten then."""
+        session.stop.uninstall()
+        session.stop = StopRequests().install()
+        if talk.sim is not None:
+            talk.sim.stop = session.stop
+
+    if piped:
+        serve(talk, begin, sys.stdin, sys.stdout)
+        return
+    print(WELCOME)
+    with completion(candidates):
+        while True:
+            try:
+                text = input(PROMPT)
+                begin()
+                talk.carry_out(text)
+            except EOFError:
+                print()
+                return
+            except HpcdemError as error:
+                print(error)
+            except KeyboardInterrupt:
+                print("\n(interrupted; Ctrl-D ends)")
+
+
+def serve(talk: Talk, begin: Any, requests: IO[str], answers: IO[str]) -> None:
+    """For a program at the other end of a pipe (page/console.py): each line of requests is {"text": ..., "name": ...}.
+    What is said is text; lines that begin with MARK tell that it is ready, and how a request ended."""
+
+    def mark(**content: Any) -> None:
+        answers.write(f"\n{MARK}{json.dumps(content)}\n")
+        answers.flush()
+
+    mark(what=READY)
+    for line in requests:
+        wanted = json.loads(line)
+        begin()
+        good, shown = True, None
+        try:
+            try:
+                told = talk.carry_out(wanted["text"], wanted.get("name", ""))
+            finally:
+                answers.flush()
+            if told:
+                shown = talk.show()
+        except SystemExit:
+            return
+        except HpcdemError as error:
+            good = False
+            answers.write(f"{error}\n")
+        except KeyboardInterrupt:
+            good = False
+            answers.write("interrupted\n")
+        mark(what=DONE, good=good, frame=None if shown is None else str(shown))

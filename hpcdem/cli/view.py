@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, NoReturn
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
-from hpcdem.core.errors import EXIT_OK
+from hpcdem.core.errors import EXIT_OK, UsageError
 from hpcdem.runtime import launch
+
+if TYPE_CHECKING:
+    from hpcdem.page.desk import Desk
 
 
 @click.command(context_settings=HELP, no_args_is_help=True)
-@click.argument("paths", type=PATH, nargs=-1, required=True, metavar="DIR|FILE...")
+@click.argument("paths", type=PATH, nargs=-1, metavar="DIR|FILE...")
+@click.option("--run", "script", is_flag=False, flag_value="", metavar="[SCRIPT]", help="A console for commands and an "
+              "editor for the scripts of a folder: whoever can open the page can run programs.")  # fmt: skip
+@click.option("-j", "threads", type=click.IntRange(1), default=1, metavar="N", help="Threads of the console [1].")
 @click.option("--view", "view_file", type=PATH, metavar="FILE", help="Begin with this view *.mv [everything].")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="[a free one].")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
@@ -25,6 +32,24 @@ def view(**options: Any) -> None:
     """
 
 
+def desk_of(options: dict[str, Any]) -> Desk | None:
+    """What --run asks for: scripts lie beside SCRIPT, else in this folder; results go to DIR, else to data there."""
+    if options["script"] is None:
+        if options["threads"] != 1:
+            raise UsageError("-j goes with --run: the threads of its console")
+        return None
+    from hpcdem.page.desk import SCRIPT, Desk
+
+    script = Path(options["script"])
+    folder = script.parent if options["script"] else Path()
+    if options["script"] and (not script.is_file() or SCRIPT.fullmatch(script.name) is None):
+        raise UsageError(f"--run {script}: expected a script *.py or *.sc that is there")
+    outdir = options["paths"][0] if options["paths"] else folder / "data"
+    if outdir.exists() and not outdir.is_dir():
+        raise UsageError(f"{outdir}: expected the folder of the results")
+    return Desk(folder.resolve(), outdir.resolve(), script.name, options["threads"])
+
+
 def start(words: list[str]) -> NoReturn:
     """The program `hpcdem view`."""
     with messages_only(), launch.one_voice():
@@ -34,7 +59,12 @@ def start(words: list[str]) -> NoReturn:
             launch.prepare_environment(1)
             from hpcdem.page.viewer import serve
 
-            serve(
-                [*options["paths"]], options["view_file"], options["port"], not options["no_browser"], click.echo
-            )  # fmt: skip
+            paths, desk = [*options["paths"]], desk_of(options)
+            if desk is not None:
+                from hpcdem.page.desk import FOLDER
+
+                paths = [desk.console.outdir, desk.console.outdir / FOLDER, *paths[1:]]
+            elif not paths:
+                raise UsageError("expected a folder or file with frames, or --run [SCRIPT]")
+            serve(paths, options["view_file"], options["port"], not options["no_browser"], click.echo, desk)
     sys.exit(EXIT_OK)

@@ -17,7 +17,7 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frames import FrameFile
 from hpcdem.post import movie
 from hpcdem.post.view.model import ModelView
-from hpcdem.post.view.moment import DISCS, FACES, POLYGONS, SOLIDS, Moment, read_moment
+from hpcdem.post.view.moment import DISCS, FACES, POLYGONS, RODS, SOLIDS, Moment, read_moment
 from hpcdem.post.view.paper import Paper, draw
 from hpcdem.post.view.scene import Painted, common_spans, scene, seen_of
 
@@ -91,7 +91,7 @@ def drawing(moment: Moment, view: ModelView) -> bytes:
 
 def _dxf_layer(out: Any, painted: Painted, near: np.ndarray) -> None:
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in painted.layer.label).upper() or "LAYER"
-    if painted.kind_of_shape in (SOLIDS, FACES):  # what is seen, where it is in space
+    if painted.kind_of_shape in (SOLIDS, FACES, RODS):  # what is seen, where it is in space
         points, cells, of, _ = painted.shape
         for corners, kind in zip(cells, painted.kind[of]):
             out.add_3dface(points[corners[corners >= 0]], layer=name, color=int(near[kind]))

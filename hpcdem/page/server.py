@@ -24,8 +24,8 @@ from hpcdem.core.errors import HpcdemError, UsageError
 LOOPBACK = "127.0.0.1"
 NAMES = frozenset((LOOPBACK, "localhost", "::1"))
 """Host names of an address that a browser on this machine, or at the other end of `ssh -L`, opens."""
-LARGEST_REQUEST = 64 * 1024
-"""Bytes of a request's body: sixty rows of a table and ten numbers are 4 KiB."""
+LARGEST_REQUEST = 1024 * 1024
+"""Bytes of a request's body: a script of the editor, at most."""
 CONVERSATIONS = 32
 """Requests at a time; a browser makes six."""
 PATIENCE = 20.0

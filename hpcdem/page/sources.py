@@ -38,16 +38,21 @@ class Source:
 
 
 class Sources:
-    """All that was named on the command line. HpcdemError where there is nothing to show."""
+    """All that was named on the command line. HpcdemError where there is nothing to show, unless it may come (empty).
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.paths = list(paths)
+    The first folder is that of the run; below it may lie what a console shows of its model (commands/present.py).
+    """
+
+    def __init__(self, paths: Sequence[Path], empty: bool = False) -> None:
+        self.paths, self.empty = list(paths), empty
         self.found: list[Source] = []
         self.moments: OrderedDict[tuple[str, int, int], Moment] = OrderedDict()
         self.lock = threading.Lock()
         self.look()
         for path in self.paths:
-            if path.is_dir() and run_folder.running(path) is None and not any(s.folder == path for s in self.found):
+            if empty or not path.is_dir() or run_folder.running(path) is not None:
+                continue
+            if not any(s.folder == path for s in self.found):
                 raise HpcdemError(f"no frame all_*.vtkhdf, all_*.dat or <name>_*.vtkhdf in {path}")
         self._see_one()
 
@@ -68,6 +73,8 @@ class Sources:
         found: list[Source] = []
         for path in self.paths:
             if not path.is_dir():
+                if self.empty and not path.exists():
+                    continue
                 if not path.is_file():
                     raise HpcdemError(f"cannot read {path}: there is no such file")
                 found.append(Source(path.name, None, [FrameFile(path, read_moment(path).step, False)]))
@@ -117,11 +124,16 @@ class Sources:
         return [path for path in self.paths if path.is_dir()]
 
     def state(self) -> dict[str, Any]:
-        """Frames by source, and of the first folder whether a run writes there, how far it is, and its histories."""
+        """Frames by source, with what tells whether the last one was written again; of the first folder whether a run
+        writes there, how far it is, and its histories."""
         self.look()
         told: dict[str, Any] = {
             "sources": [
-                {"name": source.name, "frames": [[file.step, file.ini] for file in source.frames]}
+                {
+                    "name": source.name,
+                    "frames": [[file.step, file.ini] for file in source.frames],
+                    "stamp": _stamp(source.frames[-1].path),
+                }
                 for source in self.found
             ],
             "run": None,
@@ -169,6 +181,13 @@ class Sources:
         except OSError as problem:
             raise HpcdemError(f"process {holder['pid']} cannot be reached: {problem.strerror}") from None
         return f"process {holder['pid']}: {SIGNALS[what].name}"
+
+
+def _stamp(path: Path) -> str:
+    try:
+        return str(os.stat(path).st_mtime_ns)
+    except OSError:
+        return ""
 
 
 def _run(folder: Path) -> dict[str, Any] | None:

@@ -20,6 +20,7 @@ import numpy as np
 from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.core.looks import COLOURS, EYES, OBJECTS
 from hpcdem.page import exports
+from hpcdem.page.desk import Desk
 from hpcdem.page.lifetime import live, static
 from hpcdem.page.maker import packed
 from hpcdem.page.server import Answer, Call, PageServer, as_json
@@ -45,6 +46,7 @@ KINDS = {
     "icon.svg": "image/svg+xml",
     "viewer.js": "text/javascript; charset=utf-8",
     "viewer_words.js": "text/javascript; charset=utf-8",
+    "desk.js": "text/javascript; charset=utf-8",
     "words.js": "text/javascript; charset=utf-8",
     "server.js": "text/javascript; charset=utf-8",
 }
@@ -60,15 +62,20 @@ FINE = 2
 
 def serve(
     paths: list[Path], view: Path | None = None, port: int = 0, browser: bool = True,
-    say: Callable[[str], None] = print,
+    say: Callable[[str], None] = print, desk: Desk | None = None,
 ) -> None:  # fmt: skip
-    """Serve the page until Ctrl-C or SIGTERM. view: a file *.mv to begin with. HpcdemError if there is nothing to show,
-    or the port cannot be had."""
-    viewer = Viewer(Sources(paths), read_view(view) if view is not None else None)
+    """Serve the page until Ctrl-C or SIGTERM. view: a file *.mv to begin with; desk: what runs scripts, if it may.
+    HpcdemError if there is nothing to show, or the port cannot be had."""
+    viewer = Viewer(Sources(paths, empty=desk is not None), read_view(view) if view is not None else None)
     page = static(KINDS)
-    server = PageServer(page | {"": page["viewer.html"]}, viewer.calls(), port)
+    calls = viewer.calls() | ({} if desk is None else desk.calls())
+    server = PageServer(page | {"": page["viewer.html"], "desk": as_json({"run": desk is not None})}, calls, port)
     threading.Thread(target=viewer.warm_up, daemon=True).start()
-    live(server, browser, say)
+    try:
+        live(server, browser, say)
+    finally:
+        if desk is not None:
+            desk.console.end()
 
 
 class Viewer:

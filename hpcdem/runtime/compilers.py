@@ -104,6 +104,15 @@ def name_kernels_apart() -> None:
     counter._unique_ids = itertools.count(int.from_bytes(os.urandom(7), "little"))
 
 
+def spare_c_entries() -> None:
+    """Make kernels without the entry for programs in C that numba gives each of them, and nobody calls here: a
+    fourteenth of the time of compiling."""
+    from numba.core.compiler import Flags
+
+    option: Any = Flags.options["no_cfunc_wrapper"]  # type: ignore[attr-defined]
+    option._default = True
+
+
 # -- in one of these processes -----------------------------------------------------------------------------------------
 
 
@@ -114,6 +123,7 @@ def main() -> None:
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job.cores)
     name_kernels_apart()
+    spare_c_entries()
     gc.set_threshold(50_000, 20, 100)  # a compiler makes many objects and few circles
     filled: set[Path] = set()
     _write_in_turn(job, filled)

@@ -25,7 +25,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.runtime import cgroups, launch
-from hpcdem.runtime.compilers import Part, compile_in_processes, name_kernels_apart
+from hpcdem.runtime.compilers import Part, compile_in_processes, name_kernels_apart, spare_c_entries
 from hpcdem.runtime.launch import patient_barrier, version
 
 if TYPE_CHECKING:
@@ -37,10 +37,10 @@ UNUSED_DAYS = 60
 
 
 KERNELS = {
-    "shared": 31, "": 126, "blocks": 195, "coupled": 17, "bolts": 8, "liners": 11, "flow": 10,
-    "flow-space": 6, "proppant": 12, "heat": 21,
-    "yielding": 38, "creep": 11, "tangent": 10, "plastic-tangent": 6, "space": 56,
-    "yielding-space": 16, "creep-space": 13, "tangent-space": 10, "hexes": 14, "pictures": 8,
+    "shared": 31, "": 96, "energy": 17, "clumps": 10, "blocks": 195, "coupled": 17, "bolts": 8, "liners": 11,
+    "flow": 10, "flow-space": 6, "proppant": 12, "heat": 21, "yielding": 38, "creep": 11, "tangent": 10,
+    "plastic-tangent": 6, "space": 56, "yielding-space": 16, "creep-space": 13, "tangent-space": 10,
+    "hexes": 14, "pictures": 8,
 }  # fmt: skip
 """About how many kernels a folder of each kind has."""
 QUIET_SECONDS = 5.0
@@ -186,6 +186,7 @@ def load_kernels(folder: Path, warm: Callable[[], None]) -> bool:
     try:
         count = len(late)
         name_kernels_apart()
+        spare_c_entries()
         _protect_complete_folders()
         warm()
         if building is not None:

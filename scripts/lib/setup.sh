@@ -49,7 +49,15 @@ once() {
         if command -v flock >/dev/null; then flock 9; fi
         if [[ -e $stamp && $(<"$stamp") == "$key" ]]; then exit; fi
         "${@:4}" && printf '%s\n' "$key" >"$stamp"
-    ) 9>.setup.lock
+    ) 9>"${1%/}.setup.lock"
+}
+
+# in_turn COMMAND...: building hpcdem writes into the sources: not for two environments at the same time.
+in_turn() {
+    (
+        if command -v flock >/dev/null; then flock 8; fi
+        "$@"
+    ) 8>.setup.lock
 }
 
 # wheels_venv DIR EXTRAS: everything from wheels, MPI included; no root, any Linux.
@@ -60,32 +68,82 @@ wheels_venv() {
 }
 
 fill_from_wheels() {
-    say "Setting up $1 from wheels with $("$2" --version) (once; some 15 s where the network is quick) ..."
+    local uv_at filled= extras=
+    if [[ $3 != mpi ]]; then extras=[$3]; fi
+    say "Setting up $1 from wheels with $("$2" --version) (once; some 10 s where the network is quick) ..."
+    uv_at=$(mktemp -d)
+    if get_uv "$uv_at" "$2" "$1" && fill_with_uv "$uv_at" "$1" "$2" "$extras"; then filled=yes; fi
+    rm -r "$uv_at"
+    if [[ -n $filled ]]; then return; fi
     make_venv "$1" "$2" || return
-    if ! install_locked "$1" || [[ $3 != mpi ]]; then install "$1" --editable ".[$3]"; fi
+    if ! install_locked "$1" || [[ -n $extras ]]; then in_turn install "$1" --editable ".[$3]"; fi
 }
 
-# install_locked DIR: hpcdem with the extra mpi, in the versions of requirements.lock, each checked by its hash; half of
-# them at a time, as pip takes one after the other. Where they do not fit, as with a Python or processor that has no such
-# wheels, it says so and leaves the choice to the ranges of pyproject.toml. pip would compile all modules of all packages
-# to byte code, half of its time. Those that every run begins with are compiled here, on all cores; Python does the
-# others when it first imports them.
+# lock_without_uv FILE / lock_of_uv FILE: requirements.lock is what is installed, and the installer.
+lock_without_uv() { awk '/^[^# ]/ { skip = /^uv==/ } !skip' requirements.lock >"$1"; }
+lock_of_uv() { awk '/^[^# ]/ { take = /^uv==/ } take' requirements.lock >"$1"; }
+
+# get_uv WHERE PYTHON DIR: the installer uv, by pip: that of PYTHON, or else of the environment DIR. It does with half
+# the work and all at a time what pip takes one after the other.
+get_uv() {
+    local pip=("$2" -m pip)
+    if ! "${pip[@]}" --version >/dev/null 2>&1; then
+        make_venv "$3" "$2" || return
+        pip=("$3/bin/pip")
+    fi
+    lock_of_uv "$1/lock"
+    "${pip[@]}" install -qq --disable-pip-version-check --no-compile --no-deps --only-binary :all: --require-hashes \
+        --target "$1/uv" --requirement "$1/lock" >/dev/null 2>&1
+}
+
+# fill_with_uv WHERE DIR PYTHON [EXTRAS]: hpcdem with the extra mpi, in the versions of requirements.lock, each checked by
+# its hash; then EXTRAS in versions of their own. It is silent where it does not work: pip knows more ways, and says more.
+fill_with_uv() {
+    local uv=$1/uv/bin/uv index job failed=
+    make_venv "$2" "$3" --without-pip || return
+    # uv does not read the settings of pip; these are what it takes to reach the packages.
+    index=$("$3" -m pip config list 2>/dev/null | sed -n "s/^[^=]*[.]index-url='\(.*\)'$/\1/p" | tail -n 1)
+    if [[ -n $index ]]; then export UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-$index}; fi
+    if [[ -n ${PIP_CERT:-} ]]; then export SSL_CERT_FILE=${SSL_CERT_FILE:-$PIP_CERT}; fi
+    lock_without_uv "$1/lock"
+    "$uv" pip install -q --python "$2/bin/python" --require-hashes --only-binary :all: --no-deps --requirement "$1/lock" \
+        >/dev/null 2>&1 &
+    job=$!
+    in_turn "$uv" pip install -q --python "$2/bin/python" --no-deps --editable . pip >/dev/null 2>&1 || failed=yes
+    wait "$job" || failed=yes
+    if [[ -z $failed && -n ${4:-} ]]; then
+        in_turn "$uv" pip install -q --python "$2/bin/python" --editable ".$4" >/dev/null 2>&1 || failed=yes
+    fi
+    [[ -z $failed ]] && compile_modules "$2"
+}
+
+# compile_modules DIR: pip and uv leave modules uncompiled here, as all of them would take longer than to install them.
+# Those that every run begins with are compiled on all cores; Python does the others when it first imports them.
+compile_modules() {
+    local packages
+    packages=$("$1/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["platlib"])')
+    "$1/bin/python" -m compileall -q -j 0 -x '/tests?/' "$packages"/{numpy,numba,llvmlite,pydantic} || true
+}
+
+# install_locked DIR: the same by pip, half of the packages at a time, as pip takes one after the other. Where they do not
+# fit, as with a Python or processor that has no such wheels, it says so and leaves the choice to the ranges of
+# pyproject.toml.
 install_locked() {
-    local parts job jobs=() failed= packages
+    local parts job jobs=() failed=
     parts=$(mktemp -d)
-    awk -v all="$(grep -c '^[^# ]' requirements.lock)" -v dir="$parts" \
-        '/^[^# ]/ { n++ } !/^#/ { print > (dir "/" (2 * n > all)) }' requirements.lock
+    lock_without_uv "$parts/lock"
+    awk -v all="$(grep -c '^[^# ]' "$parts/lock")" -v dir="$parts" \
+        '/^[^# ]/ { n++ } !/^#/ { print > (dir "/" (2 * n > all)) }' "$parts/lock"
     for job in 0 1; do
         "$1/bin/pip" install -q --disable-pip-version-check --require-hashes --only-binary :all: --no-compile --no-deps \
             --requirement "$parts/$job" >"$parts/said-$job" 2>&1 &
         jobs+=($!)
     done
-    "$1/bin/pip" install -q --disable-pip-version-check --no-deps --editable . >"$parts/said-2" 2>&1 &
+    in_turn "$1/bin/pip" install -q --disable-pip-version-check --no-deps --editable . >"$parts/said-2" 2>&1 &
     jobs+=($!)
     for job in "${jobs[@]}"; do wait "$job" || failed=yes; done
     if [[ -z $failed ]]; then
-        packages=$("$1/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()["platlib"])')
-        "$1/bin/python" -m compileall -q -j 0 "$packages"/{numpy,numba,llvmlite,pydantic} || true
+        compile_modules "$1"
     else
         say "The versions of requirements.lock cannot be had for $("$1/bin/python" --version 2>&1) on $(uname -sm):"
         say "  $(cat "$parts"/said-* | grep -i error | tail -n 1)"
@@ -164,7 +222,7 @@ fill_from_debian() {
     make_venv "$1" /usr/bin/python3 --system-site-packages &&
         # Debian's binaries hold to the numpy they were built with.
         /usr/bin/python3 -c 'import numpy; print("numpy==" + numpy.__version__)' >"$1/constraints.txt" &&
-        install "$1" --constraint "$1/constraints.txt" --editable ".[$2]" &&
+        in_turn install "$1" --constraint "$1/constraints.txt" --editable ".[$2]" &&
         # pip does not see Debian's h5py and brings its own without MPI, which would hide it.
         "$1/bin/pip" uninstall -qq --yes h5py
 }

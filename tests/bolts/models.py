@@ -14,6 +14,8 @@ from tests.blocks.models import COHESIVE, WEAK
 from tests.blocks.support import ROCK, rectangle, shaken
 from tests.bolts.support import STEEL, state
 from tests.parallel.model import Found, Model
+from tests.space.support import ROCK as SOLID
+from tests.space.support import box
 
 WEAKER = {
     **STEEL, "tensile_yield_force": 4e3, "tension_failure_strain": 2e-3, "friction_rock_grout": 25.0,
@@ -73,6 +75,38 @@ def excavate(sim: Blocks) -> None:
         sim.option(dynamic=True)
 
 
+def in_space(sim: Blocks) -> None:
+    """A jointed bar of tetrahedra with bolts along and across it is torn apart while it flies along itself, through the
+    strips of the ranks."""
+    sim.take_mesh(box((14, 2, 2), (1.4, 0.2, 0.2), 5, shaken=0.2))
+    mesh = sim.mesh
+    changes.element_model(sim, None, "mech_iso_elastic", {**SOLID, "young": 1e9, "friction": 20.0, "damp_factor": 0.05})
+    edges = mesh.edges()
+    sim.joint_model(edges.faces[edges.inner][:, 0], COHESIVE, {**WEAK, "penalty_normal": 1e10, "tensile_strength": 1e5})
+    sim.initial_stress(None, yy=-2e4, xz=1e4)
+    x = mesh.points[:, 0]
+    for one in np.unique(np.round(x, 1)):
+        at = np.flatnonzero(np.round(x, 1) == one)
+        changes.set_velocity(sim, at, 100.0 + 6.0 * float(one), 4.0 * float(one), -3.0 * float(one))
+    bolts = Bolts.of(sim)
+    for line in ([(0.0, 0.05, 0.08), (1.4, 0.13, 0.11)], [(0.1, 0.0, 0.2), (0.4, 0.1, 0.1), (1.0, 0.2, 0.0)]):
+        _, elements = bolts.create(line, plate=True)
+        bolts.assign(elements, {**WEAKER, "pretension_force": 1e3, "spacing": 1.0})
+
+
+def more_in_space(sim: Blocks) -> None:
+    """What happens to them."""
+    bolts = Bolts.of(sim)
+    if sim.clock.step == 300:
+        at = np.column_stack([diagnostics.values(sim, f"position_{axis}") for axis in "xyz"])
+        _, elements = bolts.create([tuple(at[4]), tuple(at[-5])], length=0.05, grout=(0.2, 9.0), plate=True)
+        bolts.assign(elements, {**WEAKER, "pretension_force": 2e3, "spacing": 1.0})
+        bolts.condition(np.array([0]), force_z=-500.0, does_y=kernels.VELOCITY, at_y=2.0)
+    if sim.clock.step == 500:
+        host = bolts.nodes["host"]
+        changes.null(sim, np.unique(host[(bolts.nodes["bar"] == 0) & (host >= 0)])[:6])
+
+
 def result(sim: Blocks, notes: dict[str, Any]) -> Found:
     """All that may not depend on ranks."""
     found = {name: diagnostics.values(sim, name) for name in ("position_x", "velocity_y", "stress_xx", "damage")}
@@ -101,8 +135,16 @@ def bars_rupture(found: Found) -> None:
     assert found["bolts_work_on_rock"] == found["energy_work_bolts"] > 50.0
 
 
+def in_pieces(found: Found) -> None:
+    grout_slips(found)
+    bars = found["element_state"]
+    assert (bars & kernels.RUPTURED).any() and not (bars & kernels.RUPTURED).all() and found["counts"][2] > 20
+    assert np.abs(found["node_x"][:, 1:] - found["node_origin"][:, 1:]).max() > 1e-3
+
+
 # Checkpoints after rupture, excavation, and the change to motion.
 MODELS = {
     "bolts torn": Model(breaking, result, bars_rupture, more, steps=1400, middle=1101),
+    "bolts in space": Model(in_space, result, in_pieces, more_in_space, steps=900, middle=601),
     "bolts at rest": Model(relaxing, result, grout_slips, excavate, steps=1400, middle=1101),
 }

@@ -70,7 +70,8 @@ def test_frames_hold_a_table_and_figures_show_it(bench: Bench, tmp_path: Path) -
     bolts = Bolts.of(bench.blocks)
     state = read_mesh_frame(tmp_path / "data" / "f_0000000030.vtkhdf")
     for kind, name in (("bolt-node", "nodes"), ("bolt-element", "elements")):
-        for quantity in QUANTITIES[kind]:
+        assert not any(quantity.endswith("_z") for quantity in state.supports["bolts"][name])
+        for quantity in [quantity for quantity in QUANTITIES[kind] if not quantity.endswith("_z")]:
             assert np.array_equal(state.supports["bolts"][name][quantity], bolts.values(kind, quantity)), quantity
     assert np.array_equal(state.supports["bolts"]["elements"]["first_node"], bolts.first)
     assert np.array_equal(state.supports["bolts"]["nodes"]["bolt"], bolts.nodes["bar"])

@@ -77,13 +77,16 @@ def test_blocks_go_the_cheaper_way(tmp_path) -> None:
 
 
 def test_what_implicit_steps_refuse_is_stepped(tmp_path) -> None:
-    """Wells, motion; with the reason. What neither can do is refused."""
+    """Motion; with the reason. What neither can do is refused."""
     rock = Rock(tmp_path, STRIP.replace("BULK", "1e9"))
-    rock("pcdc well create 'w' range x 4 4 y 1 1\npcdc model solve hydraulic auto time 1e-3\n")
-    assert "auto: explicit" in said(rock, "auto")[0] and "know no wells" in said(rock, "auto")[0]
+    rock("pcdc model option mechanical on\npcdc model solve hydraulic auto time 1e-3\n")
+    assert "auto: explicit" in said(rock, "auto")[0] and "dynamic off" in said(rock, "auto")[0]
     assert Flow.of(rock.blocks).cycles > 0
-    with pytest.raises(ScriptError, match="know no wells"):
-        rock("pcdc model option dynamic off\npcdc model solve hydraulic auto time 1e-3\n")
+    with pytest.raises(ScriptError, match="velocities"):
+        rock(
+            "pcdc node boundary mech-vel-b-c velocity-x 1 range x 4 4\n"
+            "pcdc model option dynamic off\npcdc model solve hydraulic auto time 1e-3\n"
+        )
     with pytest.raises(ScriptError, match="auto goes with time"):
         rock("pcdc model solve hydraulic auto steady\n")
     with pytest.raises(ScriptError, match="auto goes with hydraulic"):

@@ -14,6 +14,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import PRESSURE, RATE, SHUT
 from hpcdem.pre.mesh import structured
 from tests.blocks.support import JOINT, ROCK, jointed, model, near, rectangle, shaken
 from tests.flow import exact
@@ -38,6 +39,9 @@ def test_derivatives_are_those_of_differences() -> None:
     changes.crack(sim, joints[:4])
     flow.prescribe(at(sim, 0.0), kernels.SURFACE, 0.1)
     flow.prescribe(np.array([7]), kernels.RATE, -1e-6)
+    flow.drill("full", np.array([9, 10, 11]))
+    flow.drill("dry", np.array([13, 14]))
+    flow.stage("full", RATE, 1e-3, math.inf, 1e9)
     sim.velocity_condition(None, vx=0.0, vy=0.0)
     rng = np.random.default_rng(3)
     with Coupled(sim, 1.0) as run:
@@ -46,20 +50,22 @@ def test_derivatives_are_those_of_differences() -> None:
         fluid.fluid = rng.uniform(0.0, 1e-5, fluid.n)
         step, _ = fluid.begin(1e-3, run.x)
         u = rng.choice([0.4, 0.05, -0.3, -0.9], fluid.n) * rng.uniform(0.8, 1.2, fluid.n)
+        for name, value in (("full", 1e3 / fluid.p0), ("dry", -0.4)):  # full: the highest of its nodes has no pressure
+            u[np.searchsorted(fluid.numbers, flow.well(name).points[0])] = value
         x = run.x + rng.uniform(-1e-6, 1e-6, run.x.shape)
         now = fluid.balance(step, u, x)
         matrix_of = np.zeros((2 * (count + fluid.n),) * 2)
         for piece in fluid.pieces(step, now, u, x, count):
             for node, part in zip(piece.node, piece.stiffness):
                 rows = np.column_stack([2 * node, 2 * node + 1]).reshape(-1)
-                matrix_of[np.ix_(rows, rows)] += part
+                np.add.at(matrix_of, np.ix_(rows, rows), part)  # both ends of a channel may count as one
         residual = slice(2 * count, None, 2)
         assert now.held.any() and not now.held.all() and (now.lost > 0.0).any()
         for i in range(fluid.n):
             h = 1e-6
             ends = [fluid.balance(step, u + s * h * np.eye(fluid.n)[i], x) for s in (1.0, -1.0)]
             wanted = (ends[0].residual - ends[1].residual) / (2.0 * h)
-            found = np.where(step.known, 0.0, matrix_of[residual, 2 * (count + i)])
+            found = np.where(step.known | fluid.tied, 0.0, matrix_of[residual, 2 * (count + i)])
             assert found == pytest.approx(wanted, abs=2e-6 * np.abs(wanted).max())
         for i in rng.choice(count, 20, replace=False):
             for axis in range(2):
@@ -193,6 +199,141 @@ def test_tables_are_followed() -> None:
     assert flow.values("flow-node", "pressure", at(sim, 0.0, 0.0))[0] == pytest.approx(5e5, rel=1e-12)
 
 
+# ---- wells --------------------------------------------------------------------------------------------------------
+
+
+def drilled(nodes: np.ndarray | None = None, **changed: float) -> tuple[Blocks, Flow]:
+    """A channel of 1 m that is full, with a well at its left end or at these nodes."""
+    sim, flow = line(4, 1.0, aperature_initial=1e-4, **changed)
+    flow.fill(None, saturation=1.0)
+    flow.drill("w", at(sim, 0.0, 0.0) if nodes is None else nodes)
+    return sim, flow
+
+
+def test_the_rate_of_a_well_is_that_of_a_condition() -> None:
+    sim, flow = drilled()
+    flow.stage("w", RATE, 2e-8, math.inf, math.inf)
+    other, beside = line(4, 1.0, aperature_initial=1e-4)
+    beside.fill(None, saturation=1.0)
+    beside.prescribe(at(other, 0.0, 0.0), kernels.RATE, 2e-8)
+    for one in (sim, other):
+        over(one, 1.0, 10)
+    assert flow.nodes == pytest.approx(beside.nodes, rel=1e-12) and flow.state[0, kernels.P] > 1e5
+    assert flow.well_value("w", "injected") == pytest.approx(2e-8, rel=1e-12)
+    assert flow.well_value("w", "rate") == pytest.approx(2e-8, rel=1e-12)
+    assert flow.well_value("w", "pressure") == flow.state[0, kernels.P]
+    assert flow.account()["relative"] < 1e-13
+
+
+def test_steps_end_with_stages() -> None:
+    """Volumes are exact, pressures those of their stage, though the longest step does not fit; afterwards shut in."""
+    sim, flow = drilled()
+    sim.table("ramp", [(0.0, 0.0), (100.0, 1e6)])
+    given = flow.account()["given"]
+    stages = (RATE, 2e-8, 1.05), (SHUT, 0.0, 0.5), (RATE, -1e-8, 0.2025), (PRESSURE, "ramp", 0.4)
+    for does, value, duration in stages:
+        flow.stage("w", does, value, duration, math.inf)
+    volumes, pressures, lengths = [], [], []
+    with Coupled(sim, 0.1) as run:
+        while flow.time < 3.0 - 1e-12:
+            began, stage = flow.time, flow.well("w").number(flow.time)
+            run.advance(3.0)
+            lengths.append(flow.time - began)
+            volumes.append((flow.time, flow.well_value("w", "injected")))
+            pressures.append((stage, flow.time, flow.well_value("w", "pressure"), flow.well_value("w", "rate")))
+    times = np.array([time for time, _ in volumes])
+    for time, volume in ((1.05, 2.1e-8), (1.55, 2.1e-8), (1.7525, 2.1e-8 - 2.025e-9)):
+        k = int(np.argmin(np.abs(times - time)))
+        assert times[k] == pytest.approx(time, abs=1e-12) and volumes[k][1] == pytest.approx(volume, rel=1e-11)
+    held = [(time, p) for _, time, p, _ in pressures if 1.76 < time <= 2.1525 + 1e-12]
+    assert len(held) >= 4 and all(p == pytest.approx(1e4 * time, rel=1e-12) for time, p in held)
+    assert pressures[-1][3] == 0.0 and flow.well_value("w", "stage") == 0.0
+    assert max(lengths) == pytest.approx(0.1) and lengths[-2] == pytest.approx(0.1, rel=0.3)  # long again at once
+    assert flow.account()["given"] - given == pytest.approx(flow.well_value("w", "injected"), rel=1e-9)
+    assert flow.account()["relative"] < 1e-13
+
+
+def test_a_limit_holds_and_takes_nothing_back() -> None:
+    """The rate below it, less at it; above it, where others press, nothing comes and nothing goes."""
+    found = {}
+    for limit in (math.inf, 2e5):
+        sim, flow = drilled()
+        flow.stage("w", RATE, 1e-7, math.inf, limit)
+        with Coupled(sim, 0.05) as run:
+            run.advance(0.05)
+            first = flow.well_value("w", "rate")
+            while flow.time < 1.0 - 1e-12:
+                run.advance(1.0)
+        found[limit] = first, flow.well_value("w", "pressure"), flow.well_value("w", "injected")
+    assert found[math.inf][1] > 1e6 and found[math.inf][2] == pytest.approx(1e-7, rel=1e-12)
+    assert found[2e5][0] == pytest.approx(1e-7, rel=1e-12)  # below the limit
+    assert found[2e5][1] == pytest.approx(2e5, rel=1e-9)
+    assert found[2e5][2] == pytest.approx(flow.nodes[:, kernels.V].sum() * 2e5 / 2.2e9, rel=1e-3)  # full of it
+    hold(flow, at(sim, 1.0, 0.0), 5e5)
+    before = flow.well_value("w", "injected")
+    over(sim, 5.0, 10)
+    assert flow.well_value("w", "injected") == before and flow.well_value("w", "rate") == 0.0
+    assert flow.well_value("w", "pressure") == pytest.approx(5e5, rel=1e-3)
+
+
+def test_a_well_draws_no_more_than_there_is() -> None:
+    sim, flow = drilled()
+    flow.stage("w", RATE, -1.0, math.inf, math.inf)
+    over(sim, 1.0, 4)
+    assert flow.nodes[0, kernels.W] == pytest.approx(0.0, abs=1e-12) and flow.nodes[:, kernels.W].min() > -1e-18
+    assert 0.0 < -flow.well_value("w", "injected") <= 1e-4 and flow.account()["relative"] < 1e-12
+
+
+def test_nodes_of_a_well_are_one_room_in_implicit_steps() -> None:
+    """Upright, 2 m: half full first, then under a head; as by explicit steps (test_wells.py)."""
+    sim, flow = standing(rectangle(1, 4, 0.5, 2.0, y0=0.0), fluid_bulk=1e6)
+    sim.close_model()
+    points = np.intersect1d(at(sim, 0.0), flow.numbers("flow-node"))
+    flow.fill(points[:2], saturation=0.6)
+    flow.drill("w", points)
+    over(sim, 1e-12, 1)
+    own = np.searchsorted(flow.number, points)
+    share = flow.state[own, kernels.S]
+    assert np.ptp(share) < 1e-9 and share[0] == pytest.approx(
+        flow.nodes[own, kernels.W].sum() / flow.nodes[own, kernels.V].sum(), rel=1e-9
+    )
+    sim.gravity(0.0, -9.81)
+    flow.stage("w", PRESSURE, 5e4, 1.0, math.inf)
+    over(sim, 1.0, 2)
+    y, p = sim.mesh.points[points, 1], flow.state[own, kernels.P]
+    assert p == pytest.approx(5e4 + 9810.0 * (y.max() - y), rel=1e-9)
+    assert flow.well_value("w", "pressure") == pytest.approx(5e4, rel=1e-12)
+    flow.stage("w", RATE, -1.12e-3, 1e-3, math.inf)  # out of the upper ones
+    over(sim, 1e-3, 1)
+    p = flow.state[own, kernels.P]
+    assert p.min() == 0.0 < p.max() and flow.well_value("w", "pressure") == 0.0
+    assert flow.well_value("w", "rate") == pytest.approx(-1.12e-3, rel=1e-12)
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_steady_flow_between_two_wells() -> None:
+    """What one pumps in the other takes out; no time passes, tables are those of now."""
+    sim, flow = drilled()
+    sim.table("later", [(0.0, 1e4), (1.0, 1e9)])
+    flow.drill("out", at(sim, 1.0, 0.0))
+    flow.stage("w", RATE, 1e-8, math.inf, math.inf)
+    flow.stage("out", PRESSURE, "later", math.inf, math.inf)
+    with Coupled(sim, 1.0) as run:
+        run.steady()
+    drop = flow.well_value("w", "pressure") - flow.well_value("out", "pressure")
+    assert drop == pytest.approx(1e-8 * 12.0 * 1e-3 / 1e-12, rel=1e-6) and flow.time == 0.0
+    assert flow.well_value("out", "pressure") == pytest.approx(1e4)
+    assert flow.well_value("out", "rate") == pytest.approx(-1e-8, rel=1e-6)
+
+
+def test_a_well_in_nothing_is_refused_by_implicit_steps() -> None:
+    sim, flow = drilled(at(line(4, 1.0)[0], 1.0, 0.0))
+    flow.stage("w", RATE, 1e-6, math.inf, math.inf)
+    changes.null(sim, np.flatnonzero(sim.mesh.centroids()[:, 0] > 0.7))
+    with pytest.raises(CommandError, match="well 'w' has no flow node any more"), Coupled(sim, 1.0):
+        pass
+
+
 # ---- flow and equilibrium ------------------------------------------------------------------------------------------
 
 LENGTH, HEIGHT = 4.0, 2.0
@@ -264,6 +405,27 @@ def test_a_joint_is_pumped_open() -> None:
     assert diagnostics.unbalanced_ratio(sim) < 1e-6 and run.count.steps >= 40
 
 
+def test_a_well_opens_a_joint_and_is_shut_in() -> None:
+    """The same as a rate that is prescribed, then nothing comes or goes, and the fracture stays open."""
+    found = {}
+    for drill in (True, False):
+        sim, flow = plate()
+        equilibrium.solve_elastic(sim)
+        if drill:
+            flow.drill("w", at(sim, 0.0, 0.0))
+            flow.stage("w", RATE, 1e-5, 10.0, math.inf)
+        else:
+            flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-5)
+        over(sim, 10.0, 20)
+        found[drill] = flow.values("flow-node", "pressure")
+        if drill:
+            over(sim, 10.0, 20)
+            assert flow.account()["given"] == pytest.approx(1e-4, rel=1e-12)
+            assert 1e6 < flow.well_value("w", "pressure") < found[True][0]
+            assert flow.well_value("w", "rate") == 0.0 and diagnostics.unbalanced_ratio(sim) < 1e-6
+    assert found[True] == pytest.approx(found[False], rel=1e-6, abs=1.0)
+
+
 def test_one_way_fluid_does_not_push() -> None:
     sim, flow = plate()
     equilibrium.solve_elastic(sim)
@@ -326,8 +488,7 @@ SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}
      (lambda sim: sim.parts(hydraulic=False), "hydraulic on"),
      (lambda sim: sim.velocity_condition(np.array([0]), vx=1e-3), "velocities"),
      (lambda sim: changes.element_model(sim, None, "mech_mohr_coulomb", SOIL), "yield"),
-     (lambda sim: Bolts.of(sim), "bolts"),
-     (lambda sim: Flow.of(sim).drill("w", at(sim, 0.0, 0.0)), "wells")],
+     (lambda sim: Bolts.of(sim), "bolts")],
 )  # fmt: skip
 def test_what_implicit_steps_cannot_do_is_refused(spoil, words) -> None:
     sim, _ = plate(4)

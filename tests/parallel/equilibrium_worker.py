@@ -10,6 +10,7 @@ and are dug out; one after the other. Files are RUN.npz.
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from hpcdem.physics.flow import kernels
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.flow.wells import QUANTITIES, RATE, SHUT
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import CONCENTRATION, Proppant
@@ -113,12 +115,16 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
     equilibrium.solve_elastic(sim)
     flow = Flow.of(sim)
     flow.assign(joints, {**WATER, "aperature_initial": 5e-6})
-    flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
     if propped:
+        flow.prescribe(np.flatnonzero((x < 1e-9) & (np.abs(y) < 1e-9)), kernels.RATE, 5e-5)
         proppant = Proppant.of(sim)
         proppant.assign(joints, SAND)
         proppant.prescribe(None, CONCENTRATION, 0.2)
-        sim.gravity(5.0, 0.0)
+    else:
+        flow.drill("pump", np.flatnonzero((x < 0.25) & (np.abs(y) < 1e-9)))
+        flow.stage("pump", RATE, 5e-5, 0.83, math.inf)
+        flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
+    sim.gravity(5.0, 0.0)
     with Coupled(sim, 0.05, solver) as run:
         while flow.time < 1.0:
             run.advance(1.0)
@@ -127,6 +133,7 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
         found[name] = flow.values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])
+    found["wells"] = np.array([flow.well_value(one.name, name) for one in flow.wells for name in QUANTITIES])
     if propped:
         found |= {name: flow.values("flow-node", name) for name in ("concentration", "proppant")}
         found["sand"] = np.array(list(proppant.account().values())[:5])

@@ -62,6 +62,8 @@ def test_rock_that_yields_is_in_balance(yielding):
 def test_fluid_opens_the_joint(runs):
     found = runs(1, "direct-pumped")
     assert found["joints"][2] > 3 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
+    pressure, rate, injected, stage = found["wells"]
+    assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(5e-5 * 0.83, rel=1e-12)
 
 
 def test_slurry_opens_it_too(runs):

@@ -27,6 +27,11 @@ def alternatives(kind: type[Case]) -> list[Case]:
     for name, field in kind.model_fields.items():
         if chooses(field) and isinstance(field.default, bool):
             made.append(kind(**{name: not field.default}))
+    if "dim" in kind.model_fields:
+        for one in list(made):
+            given = {name: getattr(one, name) for name in one._given()}
+            if "guided" not in given:  # of the plane
+                made.append(kind(dim=3, **given))
     return made
 
 
@@ -107,6 +112,8 @@ def test_help_shows_every_parameter_with_its_default():
         ({"width": 0.06}, "UCS: platen_width is 0.056, expected at least width, 0.06 m"),
         ({"size": 1e-6}, r"UCS: size is 1e-06: that are 1\.3e\+10 elements, expected at most 5e\+06"),
         ({"platens": 3}, "UCS: platens is 3, expected"),
+        ({"dim": 4}, "UCS: dim is 4, expected 2 or 3"),
+        ({"dim": 3, "size": 1e-4}, r"that are 1\.9e\+09 elements"),
         ({"size": None}, "UCS: size is None, expected a valid number"),
     ],
 )
@@ -114,6 +121,14 @@ def test_what_is_wrong_is_named(given, said):
     with pytest.raises(ScriptError, match=said) as found:
         find("ucs")(**given)
     assert found.value.file == __file__
+
+
+def test_what_is_of_space_is_refused_in_the_plane():
+    with pytest.raises(ScriptError, match="thickness: expected dim 3"):
+        find("brazilian")(thickness=0.02)
+    with pytest.raises(ScriptError, match="guided: expected no in three dimensions"):
+        find("brazilian")(dim=3, guided=True)
+    assert find("ucs")(dim="3") == find("ucs")(dim=3)
 
 
 def test_a_script_is_told_its_line(tmp_path):

@@ -44,7 +44,8 @@ def here(pins_of_one: list[Requirement]) -> list[Requirement]:
 
 
 def wanted() -> Iterator[Requirement]:
-    for line in PROJECT["dependencies"] + PROJECT["optional-dependencies"]["mpi"]:
+    extras = PROJECT["optional-dependencies"]
+    for line in PROJECT["dependencies"] + extras["mpi"] + extras["setup"]:
         yield Requirement(line)
 
 
@@ -131,7 +132,8 @@ def test_each_package_of_the_lock_is_asked_for_once(tmp_path):
     done, asked = install_locked(tmp_path, f'for last; do :; done; cat "$last" >>{tmp_path}/parts || true')
     assert done.stdout.endswith("done\n") and asked.count("install") == 3
     both = (tmp_path / "parts").read_text()
-    assert sorted(ENTRY.findall(both)) == sorted(ENTRY.findall(LOCK.read_text(encoding="utf-8"))) != []
+    entries = ENTRY.findall(LOCK.read_text(encoding="utf-8"))
+    assert sorted(ENTRY.findall(both)) == sorted(entry for entry in entries if not entry[0].startswith("uv==")) != []
 
 
 @pytest.mark.parametrize("said", ["ERROR: No matching distribution found for numba==0.68.1", ""])
@@ -139,6 +141,43 @@ def test_where_the_lock_does_not_fit_the_ranges_are_taken(tmp_path, said):
     done, _ = install_locked(tmp_path, f'echo "{said}" >&2; exit 1')
     assert done.returncode == 0 and done.stdout == "not\n"
     assert said in done.stderr and "Python 3.99" in done.stderr and "pyproject.toml" in done.stderr
+
+
+UV = """
+mkdir -p {0}/bin
+printf '#!/bin/bash\necho "$*" >>{0}/asked; for last; do :; done; cat "$last" >>{0}/parts 2>/dev/null || true\n{1}' \
+    >{0}/bin/python
+chmod +x {0}/bin/python
+source scripts/lib/setup.sh
+get_uv() {{ mkdir -p "$1/uv/bin" && cp {0}/bin/python "$1/uv/bin/uv"; }}
+make_venv() {{ echo "venv ${{*:3}}"; }}
+install_locked() {{ echo "pip"; }}
+compile_modules() {{ echo "compiled"; }}
+cd {0}; cp $OLDPWD/requirements.lock .
+fill_from_wheels venv {0}/bin/python mpi
+"""
+"""What fills an environment, with an installer of our own that notes what it is asked."""
+
+
+@pytest.mark.parametrize(("code", "steps"), [("exit 0", ["venv --without-pip", "compiled"]), ("exit 1", ["pip"])])
+def test_the_quick_installer_takes_the_lock_or_leaves_it_to_pip(tmp_path, code, steps):
+    done = subprocess.run(
+        ["bash", "-c", UV.format(tmp_path, code)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert [line for line in steps if line not in done.stdout.splitlines()] == [], done.stdout + done.stderr
+    assert ("pip" in done.stdout.splitlines()) == (code == "exit 1")
+    asked = (tmp_path / "asked").read_text()
+    assert asked.count("--require-hashes --only-binary :all:") == 1
+    locked = ENTRY.findall(LOCK.read_text(encoding="utf-8"))
+    got = ENTRY.findall((tmp_path / "parts").read_text())
+    assert sorted(got) == sorted(entry for entry in locked if not entry[0].startswith("uv==")) != []
+
+
+def test_the_quick_installer_is_of_the_lock(tmp_path):
+    command = f"source scripts/lib/setup.sh; lock_of_uv {tmp_path}/lock"
+    subprocess.run(["bash", "-c", command], cwd=ROOT, check=True)
+    ((pin, hashes, _),) = ENTRY.findall((tmp_path / "lock").read_text())
+    assert pin.startswith("uv==") and hashes.count("sha256") > 5
 
 
 def test_another_lock_is_another_environment():

@@ -18,7 +18,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.runtime import compilers
 from hpcdem.runtime import kernels as kernels_
 from hpcdem.runtime.progress import Log
-from hpcdem.session import OF_BLOCKS
+from hpcdem.session import OF_BLOCKS, OF_PARTICLES
 
 KERNELS = """
 import numba
@@ -125,7 +125,8 @@ print(kernels.late, len(list(folder.rglob("*.nbc"))), sum(one.is_end for _, one 
         ("shared",),
         pytest.param(("shared", ""), marks=pytest.mark.slow),
         pytest.param(("shared", "blocks"), marks=pytest.mark.slow),
-        pytest.param(("shared", "", "blocks", "coupled"), marks=pytest.mark.slow),
+        pytest.param(("shared", "", *OF_PARTICLES), marks=pytest.mark.slow),
+        pytest.param(("shared", "", "energy", "blocks", "coupled"), marks=pytest.mark.slow),
         pytest.param(("shared", "blocks", *OF_BLOCKS), marks=pytest.mark.slow),
     ],
 )
@@ -408,7 +409,9 @@ def hits() -> dict[str, tuple[int, int]]:
 
 def test_several_processes_fill_a_folder(processes, base, tmp_path):
     said = processes("curious")
-    assert said.splitlines() == ["compiling about 126 kernels (first run of this version on this machine)"]
+    first, *later = said.splitlines()
+    assert first == "compiling about 96 kernels (first run of this version on this machine)"
+    assert all(re.match(r"\d of about 96 kernels are compiled", line) for line in later)  # on a busy machine
     # The second call of `twice` depends on what only the compiler can do: it was left to this process.
     assert hits() == {"twice": (1, 1), "of_an_intrinsic": (1, 0)}
     (folder,) = base.iterdir()
@@ -422,7 +425,7 @@ def test_several_processes_fill_a_folder(processes, base, tmp_path):
 
 def test_who_waits_for_processes_is_told_how_long(processes, monkeypatch):
     monkeypatch.setattr(kernels_, "QUIET_SECONDS", 0.0)
-    assert re.search(r"^[1-5] of about 126 kernels are compiled, some \d+ s left$", processes("warm"), re.MULTILINE)
+    assert re.search(r"^[1-5] of about 96 kernels are compiled, some \d+ s left$", processes("warm"), re.MULTILINE)
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,8 @@ KNOWN = {
     # Laws in a Python file that the user's own script names; files of data never do (physics/user_files.py).
     ("physics/user_files.py", "exec"),
     ("physics/user_files.py", "compile"),
+    # The console that `hpcdem view --run` was asked for: what the user types there, behind the key of the page.
+    ("page/desk.py", "subprocess.Popen"),
     # Modules of this package, by names from its own tables.
     ("__init__.py", "importlib.import_module"),
     ("cases/__init__.py", "importlib.import_module"),
@@ -64,7 +66,7 @@ KNOWN = {
     ("sweep/member.py", "subprocess.Popen"),
     ("sweep/array.py", "subprocess.run"),
     # Gmsh, with a description as JSON; it answers with arrays of numbers in a file of a folder made for that.
-    ("pre/mesh/fill.py", "subprocess.run"),
+    ("pre/mesh/apart.py", "subprocess.run"),
     # The same to compile kernels; what is pickled goes from the parent to its child through a pipe.
     ("runtime/compilers.py", "subprocess.Popen"),
     ("runtime/compilers.py", "import pickle"),

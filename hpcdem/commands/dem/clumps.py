@@ -52,6 +52,7 @@ def clump(
     inertia are density times the area and polar second moment of area in the file.
     """
     _need_discs(sim)
+    sim.prepare_kernels("clumps")
     try:
         bodies = on_first(sim.comm, lambda: read_clumps(path))
     except HpcdemError as problem:
@@ -122,6 +123,7 @@ def join(sim: Simulation, where: Selection | None = None, group: str | None = No
     damping or fixed directions.
     """
     _need_discs(sim)
+    sim.prepare_kernels("clumps")
     sim.open()
     p = sim.particles
     which = chosen(sim, where)

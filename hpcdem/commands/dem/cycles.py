@@ -241,6 +241,7 @@ def start(
     """What every command that steps particles begins with: sim.progress, the account of energy, the `_ini` frame.
     steps: None if their number is not known beforehand. The model is ready to step. Collective."""
     if sim.settings.energy > 0 and sim.energy is None:
+        sim.prepare_kernels("energy")
         sim.energy = Budget()
     first = sim.clock.step
     sim.progress = {

@@ -15,6 +15,51 @@ from hpcdem.physics.dem.simulation import Simulation
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = _model(threads)
+    sim.particles["x"][0] += 0.1  # much faster than all others
+    sim.rebuild()
+    sim.check_soon()
+    sim.step()
+    bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
+    bonds.break_bonds(sim, Ids(0, 1))
+    settings.set_option(sim, "frac", 0.1)
+    cycles.prepare(sim)
+    walls.wall(sim, 0, xv=0.1)
+    cycles.prepare(sim)
+    sim.rebuild()
+    sim.step()
+    diagnostics.highest_frequency(sim)
+    diagnostics.frame(sim)
+    diagnostics.critical_dt(sim)
+    laws.tangent_normal_stiffness(1.0, 1.0, 1.0, 1.0)  # SET frac where nothing touches
+
+
+def with_energy(threads: int = 1) -> None:
+    """The same for the account of energy."""
+    sim = _model(threads)
+    sim.energy = Budget()
+    sim.energy.begin(sim)
+    walls.wall(sim, 0, xv=0.1)
+    bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
+    cycles.prepare(sim)
+    sim.rebuild()
+    sim.step()
+    sim.energy.look(sim)
+
+
+def with_clumps(threads: int = 1) -> None:
+    """The same for clumps."""
+    sim = _model(threads)
+    clumps.join(sim, Ids(4, 6))
+    cycles.prepare(sim)
+    sim.step()
+    diagnostics.highest_frequency(sim)
+    diagnostics.frame(sim)
+    diagnostics.critical_dt(sim)
+
+
+def _model(threads: int) -> Simulation:
+    """Particles of all kinds between walls, after a step."""
     sim = Simulation(SerialComm(), threads=threads, outdir=Path("."))
     particles.start(sim)
     settings.set_option(sim, "dt", 1e-4)
@@ -26,25 +71,4 @@ def warm_up(threads: int = 1) -> None:
     properties.prop(sim, density=1.0, shear=1e3, poiss=0.2, hertz=True)
     cycles.prepare(sim)
     sim.step()
-    clumps.join(sim, Ids(4, 6))
-    cycles.prepare(sim)
-    sim.step()
-    sim.particles["x"][0] += 0.1  # much faster than all others
-    sim.rebuild()
-    sim.check_soon()
-    sim.step()
-    bonds.bond(sim, Ids(0, 3), ebmod=1.0, gbmod=1.0, tstrength=1e9, sstrength=1e9)
-    bonds.break_bonds(sim, Ids(0, 1))
-    settings.set_option(sim, "frac", 0.1)
-    cycles.prepare(sim)
-    walls.wall(sim, 0, xv=0.1)
-    cycles.prepare(sim)
-    sim.energy = Budget()
-    sim.energy.begin(sim)
-    sim.rebuild()
-    sim.step()
-    sim.energy.look(sim)
-    diagnostics.highest_frequency(sim)
-    diagnostics.frame(sim)
-    diagnostics.critical_dt(sim)
-    laws.tangent_normal_stiffness(1.0, 1.0, 1.0, 1.0)  # SET frac where nothing touches
+    return sim

@@ -17,7 +17,7 @@ Number = float | str
 
 def create(
     project: Project,
-    points: Sequence[tuple[float, float]],
+    points: Sequence[Sequence[float]],
     segments: int | None = None,
     length: float | None = None,
     grout: tuple[float, float] | None = None,
@@ -46,11 +46,13 @@ def velocity(
     vy: Number | None = None,
     ax: Number | None = None,
     ay: Number | None = None,
+    vz: Number | None = None,
+    az: Number | None = None,
     where: Range | None = None,
 ) -> None:
     """Velocity [m/s] or acceleration [m/s2] of nodes of bolts; a text is the name of a table of time."""
     changes: dict[str, Number] = {}
-    for axis, speed, push in (("x", vx, ax), ("y", vy, ay)):
+    for axis, speed, push in (("x", vx, ax), ("y", vy, ay), ("z", vz, az)):
         if speed is not None and push is not None:
             raise CommandError(f"velocity and acceleration in {axis} cannot both be prescribed")
         if speed is not None:
@@ -60,8 +62,14 @@ def velocity(
     supports.condition(project, BOLT_NODE, changes, where)
 
 
-def force(project: Project, fx: Number | None = None, fy: Number | None = None, where: Range | None = None) -> None:
+def force(
+    project: Project,
+    fx: Number | None = None,
+    fy: Number | None = None,
+    fz: Number | None = None,
+    where: Range | None = None,
+) -> None:
     """Force [N] on each of these nodes of one bolt."""
-    given = {"force_x": fx, "force_y": fy}
+    given = {"force_x": fx, "force_y": fy, "force_z": fz}
     changes = {name: value for name, value in given.items() if value is not None}
     supports.condition(project, BOLT_NODE, changes, where)

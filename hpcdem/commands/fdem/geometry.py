@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from hpcdem.core.errors import CommandError
-from hpcdem.pre.mesh import dxf, solids
+from hpcdem.pre.mesh import cad, dxf, solids
 from hpcdem.pre.mesh import geometry as shapes
 from hpcdem.pre.mesh.once import made_once
 
@@ -25,22 +25,49 @@ SHAPES: dict[str, Callable[..., shapes.Curve]] = {
 def shape(kind: str, *values: Any) -> list[Any]:
     """The curves [m] of a polyline or polygon (points), rectangle (two corners), circle (centre, radius), arc (the same
     and two angles [degrees], counter-clockwise), or of single points (point); in space the solid [m] of a box (two
-    corners), sphere (centre, radius) or cylinder (middles of its ends, radius)."""
-    if kind in solids.KINDS:
+    corners), sphere (centre, radius), cylinder or cone (middles of its ends, its radius or radii), or the surface of a
+    polygon (corners), disc (centre, normal, radius) or plane (point, normal)."""
+    if kind in solids.KINDS and (kind not in SHAPES or len(values[0][0]) == 3):
         return [solids.made(kind, *values)]
     return [shapes.point(at) for at in values[0]] if kind == "point" else [SHAPES[kind](*values)]
 
 
 def create(project: Project, kind: str, layer: str, *values: Any) -> None:
     """Add a shape to a layer; see `shape`."""
-    if (kind in solids.KINDS) != (project.dim == 3):
+    if kind not in (solids.KINDS if project.dim == 3 else (*SHAPES, "point")):
         raise CommandError(f"a {kind} is for a model in {2 if project.dim == 3 else 3} dimensions: model new dim")
     project.layers.add(layer, *shape(kind, *values))
 
 
+def extrude(project: Project, layer: str, of: str, along: Vector) -> None:
+    """The polygons of a layer, drawn along a way [m], as bodies of another."""
+    project.layers.add(layer, *(solids.made("extrude", one.corners, along) for one in _polygons(project, of)))
+
+
+def revolve(
+    project: Project, layer: str, of: str, axis: Vector, about: Vector = (0.0, 0.0, 0.0), angle: float = solids.FULL
+) -> None:
+    """The polygons of a layer, turned about an axis through a point [m] by an angle [degrees], as bodies of another."""
+    made = (solids.made("revolve", one.corners, about, axis, angle) for one in _polygons(project, of))
+    project.layers.add(layer, *made)
+
+
+def _polygons(project: Project, layer: str) -> list[solids.Polygon]:
+    found = project.layers[layer]
+    if not all(isinstance(one, solids.Polygon) for one in found):
+        raise CommandError(f"layer '{layer}' has something beside polygons")
+    return found
+
+
 def import_file(project: Project, layer: str, path: str, of: str | None = None) -> None:
-    """The lines of a DXF file, or of one of its layers. Collective."""
+    """The lines of a DXF file, or of one of its layers; in space the solids of a STEP or BREP file, or what the
+    triangles of an STL or DXF file enclose. Collective."""
     file = project.to_read(path)
+    if project.dim == 3:
+        if of is not None and file.suffix.lower() != ".dxf":
+            raise CommandError(f"{file}: layers are of DXF files")
+        project.layers.add(layer, *made_once(project.comm, lambda: cad.read(file, of)))
+        return
     found = made_once(project.comm, lambda: dxf.read_dxf(file, {of} if of else None))
     project.layers.add(layer, *(curve for curves in found.values() for curve in curves))
 

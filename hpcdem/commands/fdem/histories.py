@@ -14,6 +14,7 @@ from hpcdem.core.errors import CommandError
 from hpcdem.core.units import label
 from hpcdem.io.columns import append_rows
 from hpcdem.io.files import write_sections
+from hpcdem.physics import supports
 from hpcdem.physics.fdem import connectivity, diagnostics, tetrahedra, user_laws
 from hpcdem.physics.fdem.connectivity import nearest_point
 from hpcdem.physics.fdem.groups import ELEMENT, FLOW, JOINT, NODE, SUPPORTS, Ids, Range
@@ -78,6 +79,8 @@ def create(
         raise CommandError(f"in three dimensions a history of the model can follow {', '.join(IN_SPACE)}, not {value}")
     if kind in (ELEMENT, NODE, JOINT) and value in diagnostics.QUANTITIES:
         diagnostics.quantity(project.ready(use=False), value)
+    if kind in SUPPORTS:
+        supports.of(project.ready(use=False), kind).check(kind, value)
     project.histories[name] = History(kind, value, numbers, well or how, every, dim=project.dim)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from hpcdem.physics.fdem import changes, hexahedra
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
-from hpcdem.pre.mesh import fill, fractures, geometry, imported, quality, structured, structured_space
+from hpcdem.pre.mesh import fill, fracture_discs, fractures, geometry, imported, quality, structured, structured_space
 from hpcdem.pre.mesh import glue as glue_of
 from hpcdem.pre.mesh.once import made_once
 from hpcdem.pre.mesh.regions import polygon_of
@@ -38,23 +39,27 @@ def create(
     cracks: Sequence[str] = (),
     irregular: bool = False,
     smooth: bool = False,
+    bodies: bool = False,
 ) -> None:
     """Mesh the inside of a layer with Gmsh; kind: "tri" or "quad"; irregular: triangles in no pattern; smooth: inner
     points in the middle of their neighbours. Collective.
 
     refine: (layer, size there [m], distance over which it grows [m] or None); holes: layers whose inside stays empty;
     regions: (layer, group) of parts with a group of their own; embedded: layers that become edges; cracks: layers that
-    become edges with a crack.
+    become edges with a crack. In space embedded and cracks are layers of surfaces, which become faces; bodies: each
+    body of the outline is a group of its own, by its name in the file it is of, else by the layer and its number.
     """
     for layer in (outline, *(name for name, *_ in refine), *holes, *(name for name, _ in regions), *embedded, *cracks):
         _ = project.layers[layer]
     if project.dim == 3:
-        others = {"type": kind != "tri", "embed": embedded, "crack": cracks, "irregular": irregular, "smooth": smooth}
+        others = {"type": kind != "tri", "irregular": irregular, "smooth": smooth}
         lost = [word for word, said in others.items() if said]
         if lost:
             raise CommandError(f"{lost[0]} of mesh create is for two dimensions")
-        _fill(project, outline, size, group, set_name, refine, holes, regions)
+        _fill(project, outline, size, group, set_name, refine, holes, regions, embedded, cracks, bodies)
         return
+    if bodies:
+        raise CommandError("bodies of mesh create is for three dimensions")
     first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
     wishes = Wishes(
         [Region(outline, group, set_name), *(Region(layer, name, set_name) for layer, name in regions)],
@@ -82,17 +87,28 @@ def _fill(
     refine: Sequence[tuple[str, float, float | None]],
     holes: Sequence[str],
     regions: Sequence[tuple[str, str]],
+    embedded: Sequence[str],
+    cracks: Sequence[str],
+    bodies: bool,
 ) -> None:
     layers = project.layers
+    own = [(getattr(one, "name", "") or f"{outline} {k + 1}", [one]) for k, one in enumerate(layers[outline])]
     wishes = fill.Wishes(
         layers[outline],
         size,
         [one for layer in holes for one in layers[layer]],
-        [(name, layers[layer]) for layer, name in regions],
+        [*(own if bodies else ()), *((name, layers[layer]) for layer, name in regions)],
         [(layers[layer], fine, distance) for layer, fine, distance in refine],
+        [(layer, layers[layer]) for layer in (*embedded, *cracks)],
     )
-    points, cells, groups = made_once(project.comm, lambda: fill.filled(wishes, group))
-    _add(project, Mesh.of(points, cells, {set_name: groups}))
+    made: fill.Filled = made_once(project.comm, lambda: fill.filled(wishes, group))
+    for note in made.notes:
+        _say(project, note)
+    mesh = Mesh.of(made.points, made.cells, {set_name: made.groups}, made.faces)
+    first = 0 if project.mesh is None else int(project.mesh.crack_sets.max(initial=-1)) + 1
+    for k, layer in enumerate(cracks):
+        mesh = cracks_of.with_cracks(mesh, made.faces[layer], first + k)
+    _add(project, mesh)
 
 
 def box(
@@ -164,10 +180,16 @@ def import_file(
 
 def intersect(project: Project, layer: str, follow: bool = False) -> None:
     """The joints on a layer become cracks. follow: its lines are no edges of the mesh, those that follow them best are
-    taken."""
+    taken; in space its surfaces are no faces of the mesh, those between the elements on either side are."""
     mesh = project.whole_mesh()
     number = int(mesh.crack_sets.max(initial=-1)) + 1
-    if follow:
+    if mesh.dim == 3:
+        if layer in mesh.layers and not follow:
+            faces = mesh.layers[layer]
+        else:
+            faces = (cracks_of.between_sides if follow else cracks_of.faces_on)(mesh, project.layers[layer])
+        cracked = cracks_of.with_layer(cracks_of.with_cracks(mesh, faces, number), layer, faces)
+    elif follow:
         size = float(np.sqrt(mesh.areas().mean()))
         cracked = cracks_of.follow(mesh, fractures.of_curves(project.layers[layer], number, size))
     else:
@@ -249,6 +271,16 @@ def fracture_network(
     found = made_once(project.comm, make)
     project.layers.add(layer, *(geometry.polyline(ends.tolist()) for ends in found.ends))
     _say(project, f"layer '{layer}': {len(found)} fractures of together {found.lengths().sum():g} m")
+
+
+def disc_network(project: Project, layer: str, inside: str, *, seed: int, **statistics: Any) -> None:
+    """A set of discs with given statistics (see `values.disc_set`) about the bodies of a layer becomes surfaces of
+    another. Collective."""
+    bodies, one = project.layers[inside], values.disc_set(**statistics)
+    number, project.networks = project.networks, project.networks + 1
+    found = made_once(project.comm, lambda: fracture_discs.discs(one, bodies, seed, number))
+    project.layers.add(layer, *found)
+    _say(project, f"layer '{layer}': {len(found)} discs of together {fracture_discs.area(found):g} m2")
 
 
 def _add(project: Project, mesh: Mesh) -> None:

@@ -170,7 +170,7 @@ class History:
     @property
     def unit(self) -> str:
         unit = UNITS[self.kind].get(self.value) or user_laws.unit(self.value)
-        if self.dim == 2 or self.kind == CHANNEL:  # what flows in a channel is that of a metre of it
+        if self.dim == 2 or self.kind == CHANNEL or self.kind in SUPPORTS:  # of a metre of a channel; of one bolt
             return unit
         return {**diagnostics.PER_METRE, "m2": "m3"}.get(unit, unit)
 

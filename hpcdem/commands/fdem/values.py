@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.sizes import spaced
 
@@ -37,11 +38,27 @@ def fracture_set(
 ) -> FractureSet:
     """Statistics of fractures. orientation: (kind, mean, spread) [degrees], length: (kind, value, spread, least,
     greatest) [m], density: (p10, p20 or p21, value), scanline [degrees], ends_at, reached: see FractureSet."""
-    longest = math.inf if length[4] is None else length[4]
     return FractureSet(
-        Orientation(*orientation), Length(*length[:4], longest), *density, scanline,
+        Orientation(*orientation), length_law(length), *density, scanline,
         "reached" if reached else "random", ends_at,
     )  # fmt: skip
+
+
+def disc_set(
+    orientation: tuple[str, float, float, float],
+    radius: tuple[str, float, float, float, float | None],
+    density: tuple[str, float],
+    along: tuple[float, ...],
+    reached: bool,
+) -> DiscSet:
+    """Statistics of discs. orientation: (kind, dip, dip direction, spread) [degrees], radius: (kind, value, spread,
+    least, greatest) [m], density: (p10, p30 or p32, value), along: direction of the scan line, reached: see DiscSet."""
+    return DiscSet(Poles(*orientation), length_law(radius), *density, along, reached)
+
+
+def length_law(given: tuple[str, float, float, float, float | None]) -> Length:
+    """(kind, value, spread, least, greatest or None) [m]."""
+    return Length(*given[:4], math.inf if given[4] is None else given[4])
 
 
 def history_name(name: str) -> str:

@@ -124,6 +124,11 @@ def _shape(kind: str, *names: str) -> Callable[[Call], None]:
 
 
 def _fractures(call: Call) -> None:
+    if call.project.dim == 3:
+        fdem.meshes.disc_network(
+            call.project, call["as-layer"], call["inside"], **trial.disc_words(call.arguments), seed=call["seed"]
+        )
+        return
     fdem.meshes.fracture_network(
         call.project, call["as-layer"], call["inside"], **trial.fracture_words(call.arguments), seed=call["seed"],
         holes=call.get("hole", []), least=call.get("shortest", 0.0),
@@ -138,7 +143,7 @@ def _mesh_create(call: Call) -> None:
         holes=call.get("hole", []),
         regions=[(r["value"], r.get("group", r["value"])) for r in call.get("region", [])],
         embedded=call.get("embed", []), cracks=call.get("crack", []), irregular=call.get("irregular", False),
-        smooth=call.get("smooth", False),
+        smooth=call.get("smooth", False), bodies=call.get("bodies", False),
     )  # fmt: skip
 
 
@@ -400,6 +405,13 @@ BINDINGS: dict[str, Callable[[Call], None]] = {
     "geometry create box": _shape("box", "first", "second"),
     "geometry create sphere": _shape("sphere", "centre", "radius"),
     "geometry create cylinder": _shape("cylinder", "first", "second", "radius"),
+    "geometry create cone": _shape("cone", "first", "second", "radius", "other"),
+    "geometry create disc": _shape("disc", "centre", "normal", "radius"),
+    "geometry create plane": _shape("plane", "point", "normal"),
+    "geometry create extrude": lambda c: fdem.geometry.extrude(c.project, c["as-layer"], c["layer"], c["along"]),
+    "geometry create revolve": lambda c: fdem.geometry.revolve(
+        c.project, c["as-layer"], c["layer"], **c.given("as-layer", "layer")
+    ),
     "geometry import": lambda c: fdem.geometry.import_file(c.project, c["as-layer"], c["file"], c.get("dxf-layer")),
     "geometry transform": lambda c: fdem.geometry.transform(c.project, **c.given()),
     "geometry delete": lambda c: fdem.geometry.delete(c.project, c["layer"]),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import codeop
-import contextlib
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
 
 from hpcdem.core.errors import HpcdemError, ScriptError
+from hpcdem.lang.completion import completion
 from hpcdem.lang.pcdc import source
 from hpcdem.lang.pcdc.complete import candidates
 from hpcdem.lang.pcdc.execute import Interpreter
@@ -36,7 +37,7 @@ class Console:
     def run(self) -> None:
         """Until the end of input or exit(). What goes wrong is told, and the conversation goes on."""
         self.say(WELCOME)
-        with completion(self.interpreter):
+        with completion(_words, self.interpreter.namespace):
             while True:
                 try:
                     text = self._block()
@@ -82,13 +83,29 @@ class Console:
         except (SyntaxError, ValueError, OverflowError):
             return True
 
+    def carry_out(self, text: str, name: str = "") -> bool:
+        """Carry out a statement, whose value is shown, or several; name: of a script. Whether there was a command in
+        it. HpcdemError, SystemExit."""
+        self.count += 1
+        script = self.interpreter.read(text, name or f"console {self.count}")
+        self.interpreter.load_laws(script)
+        if not name and _statements(script.python) <= 1:
+            self.interpreter.line(script)
+        else:
+            self.interpreter.lines(script)
+        return bool(script.statements)
+
+    def show(self) -> Path | None:
+        """Write the present state where pages look for it; its path, None if there is nothing yet."""
+        from hpcdem.commands import present  # brings kernels with it
+
+        return present.blocks(self.interpreter.project)
+
     def _carried_out(self, text: str) -> bool:
         """False if it was the end."""
-        self.count += 1
         self.begin()
         try:
-            script = self.interpreter.read(text, f"console {self.count}")
-            self.interpreter.line(script)
+            self.carry_out(text)
         except SystemExit:
             return False
         except HpcdemError as error:
@@ -98,33 +115,14 @@ class Console:
         return True
 
 
-@contextlib.contextmanager
-def completion(interpreter: Interpreter) -> Iterator[None]:
-    """Tab completes words of commands, and names of Python, where there is a terminal that can."""
+def _statements(python: str) -> int:
+    """How many statements of Python a text has; 1 if that cannot be said."""
     try:
-        import readline
-        import rlcompleter
-    except ImportError:
-        yield
-        return
-    names = rlcompleter.Completer(interpreter.namespace)
-    found: list[str] = []
+        return len(ast.parse(python).body)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return 1
 
-    def complete(text: str, state: int) -> str | None:
-        nonlocal found
-        line = readline.get_line_buffer()[: readline.get_endidx()]
-        if not line.lstrip().startswith("pcdc "):
-            return names.complete(text, state)
-        if state == 0:
-            found = candidates(line)
-        return found[state] + " " if state < len(found) else None
 
-    before: Any = readline.get_completer(), readline.get_completer_delims()
-    readline.set_completer(complete)
-    readline.set_completer_delims(" \t\n()[]{},=+*/'\"")
-    readline.parse_and_bind("tab: complete")
-    try:
-        yield
-    finally:
-        readline.set_completer(before[0])
-        readline.set_completer_delims(before[1])
+def _words(line: str) -> list[str] | None:
+    """What a command that was begun may go on with; None for Python."""
+    return candidates(line) if line.lstrip().startswith("pcdc ") else None

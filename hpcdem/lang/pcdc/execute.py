@@ -101,6 +101,10 @@ class Interpreter:
         """The same for what was typed: the value of an expression is shown."""
         self._execute(script, "single")
 
+    def lines(self, script: Source) -> None:
+        """The same for several statements, whose values are not shown."""
+        self._execute(script, "exec")
+
     def include(self, text: str, file: str, names: dict[str, Any]) -> None:
         """Carry out a text from within a script or program, with variables of its own: those in `names`, which holds
         all of them afterwards. The log, checkpoints and --resume know it by the line of the script that called.

@@ -206,6 +206,8 @@ BOOL = Kind("on|off", "on or off", _boolean, words=("on", "off", "true", "false"
 VECTOR = Kind("<v>", "a vector (x,y)", _vector(2))
 OPTIONAL_VECTOR = Kind("[<v>]", "a vector (x,y)", _vector(2), optional=True)
 VECTORS = Kind("<v> <v> ...", "vectors (x,y)", _vector(2), many=True)
+"""In any model, as of tables and charts."""
+PLACES = Kind("<v> <v> [...]", "vectors (x,y)", _vector(2), many=True)
 CORNER = Kind("(<f>,<f>)", "a vector (x,y)", _vector(2))
 """Of a picture, in space too."""
 EYE = Kind("<s>", f"one of {', '.join(EYES)}, or a direction towards the eye as '1,-2,0.5'", _read_by(eye_of))
@@ -216,11 +218,11 @@ THIRD_COUNT, THIRD_POSITIVE = (replace(kind, dims=(3,)) for kind in (COUNT, POSI
 _FREEDOM = replace(FREEDOM, meaning="0 free, 1 held, 2 along a vector or 3 across it", check=whole(0, 3))
 _IN_SPACE = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=kind.meaning.replace("(x,y)", "(x,y,z)"), check=_vector(3))
-    for kind in (VECTOR, OPTIONAL_VECTOR)
+    for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
 }
 _IN_ANY = {FREEDOM.pattern: _FREEDOM} | {
     kind.pattern: replace(kind, meaning=f"{kind.meaning} or (x,y,z)", check=_vector(2, 3))
-    for kind in (VECTOR, OPTIONAL_VECTOR)
+    for kind in (VECTOR, OPTIONAL_VECTOR, PLACES)
 }
 
 

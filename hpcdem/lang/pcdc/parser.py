@@ -199,7 +199,10 @@ class _Line:
         self.unknown(token, [*options, RANGE] if command.ranged else options)
 
     def require(self, options: Sequence[Option], given: dict[str, Any]) -> None:
-        missing = [option.keyword.notation for option in options if option.required and option.name not in given]
+        missing = [
+            option.keyword.notation for option in options if option.required and option.name not in given
+            and (self.dim in option.dims if self.dim else len(option.dims) > 1)
+        ]  # fmt: skip
         if missing:
             raise ValueError(f"'{self.context}' lacks {_joined(missing)}")
 

@@ -32,6 +32,7 @@ from hpcdem.lang.pcdc.kinds import (
     NOT_NEGATIVE,
     OPTIONAL_VECTOR,
     PART,
+    PLACES,
     POINTS,
     POSITIVE,
     SECTION,
@@ -428,22 +429,23 @@ BOLT = Model(
     "stiffness are those of one bolt; the model divides them by the spacing. The strength of the grout per length is "
     "the smaller of pi (diameter + 2 grout-thickness) (cohesion-rock-grout - sigma tan friction-rock-grout) and pi "
     "diameter (cohesion-grout-bolt - sigma tan friction-grout-bolt), sigma: stress across the bar in the rock if it is "
-    "pressure. Given again, the force in the bar stays, but for the difference of the pretension.",
+    "pressure, in space the mean in all directions across. Given again, the force in the bar stays, but for the "
+    "difference of the pretension. In space each bolt is there by itself: spacing is 1.",
     declared(
         BOLT_PROPERTIES, "den{sity}", "y{oung}", "d{iameter}", "t{ensile}-y{ield}-f{orce}",
         "c{ompressive}-y{ield}-f{orce}", "t{ension}-f{ailure}-s{train}", "s{hear}-s{tiffness}-r{ock}-b{olt}",
         "g{rout}-t{hickness}", "c{ohesion}-r{ock}-g{rout}", "c{ohesion}-g{rout}-b{olt}", "f{riction}-r{ock}-g{rout}",
         "f{riction}-g{rout}-b{olt}", "spac{ing}", "pre{tension}-f{orce}", "d{amp}-f{actor}", uniform=True,
     ),
-    of=BOLT_PROPERTIES,
+    of=BOLT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 BOLT_VELOCITY = Model(
     "b{olt}-n{ode}-c{onstrain}", "20", "Velocity or acceleration of nodes of bolts. Components that are not given stay "
-    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True,
+    "free: along the bar by its forces, across it with the rock.", VELOCITY.options, any_of=True, dims=BOTH,
 )  # fmt: skip
 BOLT_FORCE = Model(
     "b{olt}-n{ode}-f{orce}-b{oundary}-c{ondition}", "21", "Force on each node of one bolt; across the bar the rock "
-    "takes it.", FORCE.options, any_of=True,
+    "takes it.", FORCE.options, any_of=True, dims=BOTH,
 )  # fmt: skip
 
 # ---- liners, beyond the manual -------------------------------------------------------------------------------------
@@ -523,9 +525,10 @@ RECORDED = {
         "shear-stress-middle": "Pa", "shear-stress-last": "Pa",
     },
     "bolt-node": {
-        "position-x": "m", "position-y": "m", "displacement-x": "m", "displacement-y": "m", "velocity-x": "m/s",
-        "velocity-y": "m/s", "bond-force": "N/m", "slip": "m", "bond-state": "1", "reaction-x": "N",
-        "reaction-y": "N", "host": "1", "distance": "m",
+        "position-x": "m", "position-y": "m", "position-z": "m", "displacement-x": "m", "displacement-y": "m",
+        "displacement-z": "m", "velocity-x": "m/s", "velocity-y": "m/s", "velocity-z": "m/s", "bond-force": "N/m",
+        "slip": "m", "bond-state": "1", "reaction-x": "N", "reaction-y": "N", "reaction-z": "N", "host": "1",
+        "distance": "m",
     },
     "bolt-element": {"axial-force": "N", "axial-strain": "1", "plastic-strain": "1", "bolt-state": "1"},
     "flow-node": {"pressure": "Pa", "saturation": "1", "fluid": "m2", "volume": "m2", "inflow": "m2/s",
@@ -569,7 +572,7 @@ def _group_command(kind: str, notation: str) -> Command:
         f"{notation} group", f"Puts {kind}s into a group; each is in one group of a set at most, and leaves the one it "
         "was in.", (f"pcdc {kind} group 'top' set 'bc' range y 9.9 10.1",),
         (_leading("group", STRING, "name of the group"),), (SET,), ranged=kind,
-        dims=BOTH if kind in ("element", "element-face", "face-joint", "node") else PLANE,
+        dims=BOTH if kind in ("element", "element-face", "face-joint", "node", "bolt-element", "bolt-node") else PLANE,
     )  # fmt: skip
 
 
@@ -678,18 +681,17 @@ _MODEL = (
                      Option("ela{stic}", (), "at once, without steps"),
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
-                            "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
+                            "may pass their peak and break; with mechanical off, flow alone"),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
                             "and joints may pass their peak and break; with mechanical off, heat alone", dims=PLANE),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
-                            "shorter where joints break or no balance is found", "s", "a hundredth of the time",
-                            dims=PLANE),
+                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
                             "where an estimate says that these cost less, or where implicit ones are refused; the log "
-                            "has both estimates", dims=PLANE),
+                            "has both estimates"),
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
-                            "passes", dims=PLANE),
+                            "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
                             "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
                             "it is there, from 400 000 unknowns on, in space from 20 000", default="auto"),
@@ -728,13 +730,19 @@ _MODEL = (
              Option("great{est}", (POSITIVE,), "with change: longest creep step", "s", "100 dt")), dims=BOTH),
 )  # fmt: skip
 
+_LENGTHS = (
+    Option("spr{ead}", (NOT_NEGATIVE,), "lognormal: standard deviation", "m"),
+    Option("least", (NOT_NEGATIVE,), "no shorter ones", "m", "0"),
+    Option("great{est}", (POSITIVE,), "no longer ones", "m", "none"),
+)
+
 _GEOMETRY = (
     Command("geom{etry} cr{eate} p{olyline}", "Straight lines from point to point.",
             ("pcdc geometry create polyline ([i],0) (0,[i]) as-layer ['line'+ str(i)]",),
             (_leading("points", VECTORS, "the points; or a list of vectors", "m"),), (_LAYER,), manual=True),
-    Command("geom{etry} cr{eate} polyg{on}", "A closed line.",
+    Command("geom{etry} cr{eate} polyg{on}", "A closed line; in three dimensions the flat surface within.",
             ("pcdc geometry create polygon (0,0) (4,0) (2,3) as-layer 'block'",),
-            (_leading("points", VECTORS, "the corners", "m"),), (_LAYER,)),
+            (_leading("points", PLACES, "the corners", "m"),), (_LAYER,), dims=BOTH),
     Command("geom{etry} cr{eate} rec{tangle}", "A rectangle along the axes.",
             ("pcdc geometry create rectangle (0,0) (10,5) as-layer 'box'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
@@ -750,32 +758,37 @@ _GEOMETRY = (
     Command("geom{etry} cr{eate} poi{nt}", "Single points, which become points of the mesh.",
             ("pcdc geometry create point (1,1) as-layer 'gauge'",),
             (_leading("points", VECTORS, "the points", "m"),), (_LAYER,)),
-    Command("geom{etry} cr{eate} frac{tures}", "A set of fractures with given statistics, as straight lines; for mesh "
-            "create crack, or mesh intersect.",
+    Command("geom{etry} cr{eate} frac{tures}", "A set of fractures with given statistics, as straight lines, in three "
+            "dimensions discs; for mesh create crack, or mesh intersect.",
             ("pcdc geometry create fractures orientation fisher 30 spread 20 length exponential 2 p21 1.5 inside 'out' "
              "seed 7 as-layer 'set1'",),
             options=(
                 Option("ori{entation}", (choice("fixed", "uniform", "normal", "fisher"), FLOAT),
-                       "distribution and mean of the angle to x, counter-clockwise", "degrees", required=True,
+                       "distribution and mean of the angle to x, counter-clockwise; in three dimensions fixed or "
+                       "fisher, and the dip", "degrees", required=True,
                        more=(Option("spr{ead}", (NOT_NEGATIVE,), "uniform: half width; normal: standard deviation "
-                                    "[degrees]; fisher: kappa", default="0"),)),
+                                    "[degrees]; fisher: kappa", default="0"),
+                             Option("tow{ards}", (FLOAT,), "dip direction, clockwise from y as seen from above",
+                                    "degrees", "0", dims=SPACE))),
                 Option("len{gth}", (choice("fixed", "exponential", "lognormal", "power"), FLOAT),
                        "distribution of the length, and its value: the length, the mean, the mean, the exponent", "m",
-                       required=True,
-                       more=(Option("spr{ead}", (NOT_NEGATIVE,), "lognormal: standard deviation", "m"),
-                             Option("least", (NOT_NEGATIVE,), "no shorter ones", "m", "0"),
-                             Option("great{est}", (POSITIVE,), "no longer ones", "m", "none"))),
+                       required=True, more=_LENGTHS, dims=PLANE),
+                Option("rad{ius}", (choice("fixed", "exponential", "lognormal", "power"), FLOAT),
+                       "the same of the radius of discs", "m", required=True, more=_LENGTHS, dims=SPACE),
                 Option("p10", (POSITIVE,), "density: fractures per length of a scan line", "1/m"),
-                Option("p20", (POSITIVE,), "density: fractures per area", "1/m2"),
-                Option("p21", (POSITIVE,), "density: length of fractures per area", "1/m"),
-                Option("scan-l{ine}", (FLOAT,), "direction of the line of p10", "degrees", "0"),
-                Option("reached", (), "p20 or p21 is met as nearly as whole fractures can, not in the mean"),
+                Option("p20", (POSITIVE,), "density: fractures per area", "1/m2", dims=PLANE),
+                Option("p21", (POSITIVE,), "density: length of fractures per area", "1/m", dims=PLANE),
+                Option("p30", (POSITIVE,), "density: fractures per volume", "1/m3", dims=SPACE),
+                Option("p32", (POSITIVE,), "density: area of fractures per volume", "1/m", dims=SPACE),
+                Option("scan-l{ine}", (FLOAT,), "direction of the line of p10", "degrees", "0", dims=PLANE),
+                Option("scan-dir{ection}", (VECTOR,), "direction of the line of p10", "", "(0,0,1)", dims=SPACE),
+                Option("reached", (), "p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean"),
                 Option("ends-at", (NOT_NEGATIVE,), "share of the crossings with earlier fractures at which one ends",
-                       "1", "0"),
+                       "1", "0", dims=PLANE),
                 Option("ins{ide}", (STRING,), "the layer that bounds them", required=True),
-                Option("hole", (STRING,), "none inside of this layer", repeated=True),
-                Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0"),
-                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER)),
+                Option("hole", (STRING,), "none inside of this layer", repeated=True, dims=PLANE),
+                Option("shortest", (NOT_NEGATIVE,), "shorter pieces at the rim are left out", "m", "0", dims=PLANE),
+                Option("seed", (ZERO_OR_MORE,), "another seed, another network", required=True), _LAYER), dims=BOTH),
     Command("geom{etry} cr{eate} box", "A box along the axes.",
             ("pcdc geometry create box (0,0,0) (10,5,4) as-layer 'rock'",),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
@@ -787,9 +800,34 @@ _GEOMETRY = (
             ("pcdc geometry create cylinder (0,0,0) (0,0,0.1) 0.025 as-layer 'core'",),
             (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
              _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
-    Command("geom{etry} imp{ort}", "Lines of a DXF file.", ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
+    Command("geom{etry} cr{eate} con{e}", "A round cone, or a part of one.",
+            ("pcdc geometry create cone (0,0,0) (0,0,1) 0.5 0.2 as-layer 'tip'",),
+            (_leading("first", VECTOR, "middle of one end", "m"), _leading("second", VECTOR, "of the other", "m"),
+             _leading("radius", NOT_NEGATIVE, "radius at the first end", "m"),
+             _leading("other", NOT_NEGATIVE, "radius at the other", "m")), (_LAYER,), dims=SPACE),
+    Command("geom{etry} cr{eate} disc", "The surface of a round disc: meshes are cut along it.",
+            ("pcdc geometry create disc (0,0,0) (0,0,1) 2 as-layer 'crack'",),
+            (_leading("centre", VECTOR, "centre", "m"), _leading("normal", VECTOR, "normal of any length"),
+             _leading("radius", POSITIVE, "radius", "m")), (_LAYER,), dims=SPACE),
+    Command("geom{etry} cr{eate} plane", "A plane without end.",
+            ("pcdc geometry create plane (0,0,1) (0,0.2,1) as-layer 'fault'",),
+            (_leading("point", VECTOR, "a point of it", "m"), _leading("normal", VECTOR, "normal of any length")),
+            (_LAYER,), dims=SPACE),
+    Command("geom{etry} cr{eate} ext{rude}", "The bodies that the polygons of a layer become, drawn along a way.",
+            ("pcdc geometry create extrude layer 'profile' along (0,10,0) as-layer 'slope'",),
+            options=(Option("layer", (STRING,), "of polygons", required=True),
+                     Option("along", (VECTOR,), "the way", "m", required=True), _LAYER), dims=SPACE),
+    Command("geom{etry} cr{eate} rev{olve}", "The bodies that the polygons of a layer become, turned about an axis in "
+            "their plane.", ("pcdc geometry create revolve layer 'profile' axis (0,0,1) as-layer 'ring'",),
+            options=(Option("layer", (STRING,), "of polygons", required=True),
+                     Option("axis", (VECTOR,), "direction of the axis", required=True),
+                     Option("about", (VECTOR,), "a point of it", "m", "(0,0,0)"),
+                     Option("angle", (POSITIVE,), "right-handed, up to 360", "degrees", "360"), _LAYER), dims=SPACE),
+    Command("geom{etry} imp{ort}", "Lines of a DXF file; in three dimensions the solids of a STEP or BREP file, or "
+            "what the triangles of an STL or DXF file (3DFACE) enclose.",
+            ("pcdc geometry import 'slope.dxf' as-layer 'slope'",),
             (_leading("file", FILE, "name of the file"),),
-            (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all"))),
+            (_LAYER, Option("dxf-l{ayer}", (STRING,), "only this layer of the file", "", "all")), dims=BOTH),
     Command("geom{etry} trans{form}", "Moves, turns or scales a layer.",
             ("pcdc geometry transform 'hole' rotate 30 about (0,0) move (1,0)",),
             (_leading("layer", STRING, "name of the layer"),),
@@ -816,9 +854,12 @@ _MESH = (
                 Option("hole", (STRING,), "what is inside of this layer stays empty", repeated=True),
                 Option("reg{ion}", (STRING,), "what is inside of this layer is a group of its own", repeated=True,
                        more=(Option("group", (STRING,), "its name", default="the name of the layer"),)),
-                Option("emb{ed}", (STRING,), "lines that become edges of the mesh", repeated=True, dims=PLANE),
-                Option("crack", (STRING,), "lines that become edges with a crack from the beginning", repeated=True,
-                       dims=PLANE),
+                Option("emb{ed}", (STRING,), "lines that become edges of the mesh; in three dimensions surfaces, which "
+                       "become faces", repeated=True),
+                Option("crack", (STRING,), "lines that become edges with a crack from the beginning; in three "
+                       "dimensions surfaces", repeated=True),
+                Option("bodies", (), "each body of the layer is a group of its own: by its name in its file, else by "
+                       "the layer and its number", dims=SPACE),
                 Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
                 Option("irr{egular}", (), "triangles in no pattern: rows of equilateral ones lead cracks", dims=PLANE),
                 Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
@@ -848,8 +889,9 @@ _MESH = (
              Option("scale", (POSITIVE,), "metres in a unit of the file", "m", "1")), dims=BOTH),
     Command("mesh int{ersect}", "Joints on a layer become cracks: the edges of the mesh that lie on it.",
             ("pcdc mesh intersect layer 'fault'",),
-            options=(Option("layer", (STRING,), "its lines are edges of the mesh", required=True),
-                     Option("follow", (), "they are not: the edges that follow them best are taken"))),
+            options=(Option("layer", (STRING,), "its lines are edges of the mesh, its surfaces faces", required=True),
+                     Option("follow", (), "they are not: the edges that follow them best are taken, the faces between "
+                            "elements on either side")), dims=BOTH),
     Command("mesh glue", "Bodies that were meshed separately hang together where their faces coincide: these become "
             "joints, as between the elements of a body. Faces that lie on each other only in part are refused.",
             ("pcdc mesh glue", "pcdc mesh glue tolerance 1e-4 between 'lining' 'rock' set 'domain'"),
@@ -984,30 +1026,30 @@ _OBJECTS = (
             "Bolts have no weight and no stiffness in bending.",
             ("pcdc bolt create polyline (0,2) (0,5) length 0.1 grout 0.5 3 plate group 'roof'",
              "pcdc bolt create polyline [points]"),
-            (_leading("points", VECTORS, "the points, from the head on; or a list of vectors", "m"),),
+            (_leading("points", PLACES, "the points, from the head on; or a list of vectors", "m"),),
             (Option("seg{ments}", (COUNT,), "elements of each straight part"),
              Option("len{gth}", (POSITIVE,), "of an element, at most", "m", "to the edges of the elements of the mesh"),
              Option("grout", (NOT_NEGATIVE, POSITIVE), "from where to where along the bolt there is grout; without "
                     "the rest is free", "m", "all of it"),
              Option("plate", (), "the first node is tied to the rock: a face plate"),
              Option("group", (STRING,), "the group that its elements and nodes are put into", "", "none",
-                    more=(SET,)))),
+                    more=(SET,))), dims=BOTH),
     Command("bolt c-m{odel}", "The properties of elements of bolts, which act from then on.",
             ("pcdc bolt c-model mech-e-p property density 7850 young 200e9 diameter 0.025 tensile-yield-force 250e3 "
              "shear-stiffness-rock-bolt 1e9 grout-thickness 0.0125 cohesion-rock-grout 1.5e6 cohesion-grout-bolt 2e6 "
              "spacing 1.5 pretension-force 50e3 range group 'roof'",),
-            models=(BOLT,), ranged="bolt-element"),
+            models=(BOLT,), ranged="bolt-element", dims=BOTH),
     _group_command("bolt-element", "bolt-e{lement}"),
     _group_command("bolt-node", "bolt-n{ode}"),
     Command("bolt-n{ode} bou{ndary}", "What is prescribed at nodes of bolts.",
             ("pcdc bolt-node boundary b-n-c velocity-y -1e-3 range id 0",
              "pcdc bolt-node boundary b-n-f-b-c force-y -50e3 range group 'heads'"),
-            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node"),
+            models=(BOLT_VELOCITY, BOLT_FORCE), ranged="bolt-node", dims=BOTH),
     Command("bolt-n{ode} bou{ndary} rem{ove}", "Takes it back.",
-            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node"),
+            ("pcdc bolt-node boundary remove range group 'heads'",), ranged="bolt-node", dims=BOTH),
     Command("bolt del{ete}", "Takes elements of bolts out at once, with their part of the grout. Their numbers go with "
             "them, those of the others stay; without RANGE all of them.",
-            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element"),
+            ("pcdc bolt delete range group 'roof'",), ranged="bolt-element", dims=BOTH),
     Command("liner cr{eate}",
             "Puts a liner on the free faces that the range chooses, as things are now: at any stage of a run, "
             "without force in it. A face has one beam; where faces or liners meet at a point of the mesh they are "

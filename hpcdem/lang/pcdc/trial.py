@@ -194,11 +194,35 @@ def _frames(arguments: Mapping[str, Any]) -> None:
 
 
 def _bolt(arguments: Mapping[str, Any]) -> None:
-    layout.checked(arguments["points"])
+    points = arguments["points"]
+    layout.checked(points, len(points[0]) if points else 2)
 
 
 def _fractures(arguments: Mapping[str, Any]) -> None:
+    if "radius" in arguments:
+        values.disc_set(**disc_words(arguments)).check("fractures")
+        return
     values.fracture_set(**fracture_words(arguments)).check("fractures")
+
+
+def disc_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The statistics of `geometry create fractures` in three dimensions, as `values.disc_set` takes them."""
+    densities = [name for name in ("p10", "p30", "p32") if name in arguments]
+    if len(densities) != 1:
+        raise CommandError("fractures need one density: p10, p30 or p32")
+    orientation, radius = arguments["orientation"], _given_word(arguments, "radius")
+    return {
+        "orientation": (*orientation["value"], orientation.get("towards", 0.0), orientation.get("spread", 0.0)),
+        "radius": (*radius["value"], radius.get("spread", 0.0), radius.get("least", 0.0), radius.get("greatest")),
+        "density": (densities[0], arguments[densities[0]]),
+        "along": arguments.get("scan-direction", (0.0, 0.0, 1.0)), "reached": arguments.get("reached", False),
+    }  # fmt: skip
+
+
+def _given_word(arguments: Mapping[str, Any], name: str) -> Any:
+    if name not in arguments:  # it was not known yet how many dimensions there are
+        raise CommandError(f"fractures in {'three' if name == 'radius' else 'two'} dimensions need a {name}")
+    return arguments[name]
 
 
 def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -206,7 +230,7 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
     densities = [name for name in ("p10", "p20", "p21") if name in arguments]
     if len(densities) != 1:
         raise CommandError("fractures need one density: p10, p20 or p21")
-    orientation, length = arguments["orientation"], arguments["length"]
+    orientation, length = arguments["orientation"], _given_word(arguments, "length")
     return {
         "orientation": (*orientation["value"], orientation.get("spread", 0.0)),
         "length": (*length["value"], length.get("spread", 0.0), length.get("least", 0.0), length.get("greatest")),
@@ -217,7 +241,8 @@ def fracture_words(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 _TRIALS: dict[str, Callable[[Mapping[str, Any]], None]] = {
     **{f"geometry create {name}": _make_shape(name) for name in
-       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder")},
+       ("polyline", "polygon", "rectangle", "circle", "arc", "point", "box", "sphere", "cylinder", "cone", "disc",
+        "plane")},
     "geometry create fractures": _fractures,
     "bolt create polyline": _bolt,
     "mesh structured": _rectangle,

@@ -132,7 +132,7 @@ class View:
         if name.startswith("_"):
             raise AttributeError(name)
         if self._kind == "node" and name in _VECTORS:
-            return Vector(self.value(f"{name}_x"), self.value(f"{name}_y"))
+            return Vector(*(self.value(f"{name}_{axis}") for axis in "xyz"[: self._model._project.dim]))
         return self.value(name)
 
     def value(self, name: str) -> float:

@@ -120,7 +120,7 @@ class Interpreter:
         saved_script: text of the script that wrote it; UsageError if the two differ in what was done so far.
         """
         refuse_unexecuted(self.script.statements)
-        self._refuse_lost_files(sim)
+        self.refuse_lost_files(sim)
         self.load_laws(sim)
         tell_warnings(self.script, sim)
         sim.script = self.script.text
@@ -141,8 +141,8 @@ class Interpreter:
             if law and law != dem.properties.LINEAR:
                 self._guarded(statement, partial(dem.properties.load_law, sim, law, self.script.directory))
 
-    def _refuse_lost_files(self, sim: Any) -> None:
-        """Rank 0 looks, so that all ranks agree."""
+    def refuse_lost_files(self, sim: Any) -> None:
+        """The function of this name; rank 0 looks, so that all ranks agree."""
         comm, error = getattr(sim, "comm", None), None
         if comm is None or comm.rank == 0:
             try:

@@ -49,8 +49,9 @@ def read_script(path: str | Path, table: t.Table = t.ZDEM) -> Script:
     return parse_text(source, str(path), table)
 
 
-def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDEM) -> Script:
-    """Read and check the text of a script; ScriptError at the first wrong line. `file` is the name messages show."""
+def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDEM, whole: bool = True) -> Script:
+    """Read and check the text of a script; ScriptError at the first wrong line. `file` is the name messages show;
+    whole: nothing follows, so there must be a command and a use for each parameter."""
     if isinstance(source, str):
         source = source.encode("utf-8", errors="surrogatepass")
     statements: list[Statement] = []
@@ -65,9 +66,10 @@ def parse_text(source: bytes | str, file: str = "script", table: t.Table = t.ZDE
         statements.append(statement)
         if statement.command == "STOP":
             break
-    if not statements:
-        raise ScriptError(file, 1, f"there is no command in the script; the first must be {rules.BEGINNINGS}")
-    parameters.check()
+    if whole:
+        if not statements:
+            raise ScriptError(file, 1, f"there is no command in the script; the first must be {rules.BEGINNINGS}")
+        parameters.check()
     plan.follow(statements)
     return Script(file, tuple(statements), source.decode("utf-8", errors="replace"), parameters.known)
 

@@ -2,6 +2,7 @@
 // under way per window, the newest wish wins; while something moves they are JPEG, at rest one finer PNG follows.
 
 import { ask, Refusal } from "./server.js";
+import * as desk from "./desk.js";
 import * as words from "./words.js";
 import "./viewer_words.js";
 
@@ -19,6 +20,8 @@ let playing = null;
 let theme = "auto";
 let drawn = 0;
 let history = null;
+let beginning = false;
+let shownNow = false;  // the model of the console was put on show once
 
 // ---- asking ----------------------------------------------------------------------------------------------------------
 
@@ -578,25 +581,61 @@ function label_play() {
 // ---- a run that goes on ----------------------------------------------------------------------------------------------
 
 async function look() {
+  look.waiting = null;
   try {
-    const before = state.sources.map((source) => source.frames.length);
+    const before = state.sources;
     state = await json("state", {});
     sources();
-    if (!about && state.sources.length) await begin();
+    if (!about && !beginning && state.sources.length) {
+      beginning = true;
+      try { await begin(); } finally { beginning = false; }
+    }
     if (about) {
+      let anew = false;
       windows.forEach((one) => {
-        const n = state.sources[one.source]?.frames.length ?? 0;
-        if ($("follow").checked && one.frame === before[one.source] - 1 && n > before[one.source]) {
-          one.frame = n - 1;
-          one.redraw();
-        }
+        const old = before[one.source];
+        const found = state.sources.findIndex((source) => source.name === old?.name);
+        if (found < 0) return;
+        one.source = found;  // others may have come before it
+        const now = state.sources[found], n = now.frames.length;
+        if (one.frame !== old.frames.length - 1) return;
+        if (now.stamp === old.stamp && n === old.frames.length) return;
+        if (now.stamp !== old.stamp && n === old.frames.length) anew = true;  // the same frame was written again
+        else if (!$("follow").checked) return;
+        one.frame = n - 1;
+        one.redraw();
       });
+      if (anew) await renewed();
       controls();
       histories();
     }
     run();
   } catch (error) { complain(error); }
-  setTimeout(look, LOOK);
+  look.waiting = setTimeout(look, LOOK);
+}
+
+/** The model itself may be another one: its objects, and where it lies. */
+async function renewed() {
+  const { whole, box } = about;
+  about = { ...await json("about", { source: current.source, frame: -1 }), colours: about.colours };
+  if (JSON.stringify([whole, box]) !== JSON.stringify([about.whole, about.box])) {
+    for (const one of windows) {
+      for (const layer of about.view.layers) {
+        if (!one.view.layers.some((other) => other.object === layer.object)) one.view.layers.push(layer);
+      }
+      one.fit();
+      one.redraw();
+    }
+  }
+  speak();
+}
+
+/** Something was carried out: the present state is shown, wherever one is. */
+async function carried() {
+  if (look.waiting) { clearTimeout(look.waiting); await look(); }
+  const now = state.sources.findIndex((source) => source.name.startsWith("now: "));
+  if (about && now >= 0 && current.source !== now && !shownNow) { $("source").value = now; await switched(); }
+  shownNow = shownNow || now >= 0;
 }
 
 function run() {
@@ -735,6 +774,7 @@ function speak() {
     tree(); controls(); run();
   }
   label_play();
+  desk.speak();
   paint();
 }
 
@@ -855,3 +895,4 @@ speak();
 connectFirst();
 told(say("keys"));
 look();
+desk.begin(complain, carried);

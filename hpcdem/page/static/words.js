@@ -131,6 +131,7 @@ export function translate(root = document) {
   for (const e of root.querySelectorAll("[data-t]")) e.textContent = say(e.dataset.t);
   for (const e of root.querySelectorAll("[data-t-label]")) e.setAttribute("aria-label", say(e.dataset.tLabel));
   for (const e of root.querySelectorAll("[data-t-title]")) e.title = say(e.dataset.tTitle);
+  for (const e of root.querySelectorAll("[data-t-hint]")) e.placeholder = say(e.dataset.tHint);
 }
 
 /** What was remembered under a name; storage may be forbidden. */

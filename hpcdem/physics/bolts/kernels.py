@@ -1,7 +1,8 @@
 """Arithmetic of bolts: forces of bars and grout, and the motion of their nodes along them.
 
 A node moves along the bar by itself; across it goes with the rock. Rows of nodes (n,) are bar after bar; element e of
-(m,) lies between the nodes first[e] and first[e] + 1. Forces and masses are per metre of thickness.
+(m,) lies between the nodes first[e] and first[e] + 1. Vectors are (n, d), in the plane d = 2, where forces and masses
+are per metre of thickness, in space 3.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from hpcdem.physics.fdem.kernels import laws
 
 FREE, VELOCITY, ACCELERATION = 0, 1, 2
 """What a component of a node does."""
-# Columns of the table of conditions (n, 6) at a moment: what x and y do, at which value, and the force on the node.
-DOES_X, AT_X, DOES_Y, AT_Y, FORCE_X, FORCE_Y = range(6)
+# Columns of the table of conditions (n, 9) at a moment, of the component c: what it does is DOES + 2 c, at which value
+# AT + 2 c, the force on the node FORCE + c.
+DOES, AT, FORCE = 0, 1, 6
 # Bits of the state of an element, and of the grout at a node.
 IN_TENSION, IN_COMPRESSION, WAS_IN_TENSION, WAS_IN_COMPRESSION, RUPTURED = 1, 2, 4, 8, 16
 SLIPS, SLIPPED = 1, 2
@@ -24,7 +26,7 @@ SLIPS, SLIPPED = 1, 2
 STIFFNESS, LENGTH, TENSION, COMPRESSION, FAILURE = range(5)
 # Columns of the table of nodes (n, 7): mass, dashpot, grout: stiffness, cohesion and friction on both its faces.
 MASS, DRAG, GROUT, ROCK_COHESION, ROCK_FRICTION, BOLT_COHESION, BOLT_FRICTION = range(7)
-# Work (5,) [J/m]: on the rock; lost in bars, in the grout, and by dashpots; by conditions.
+# Work (5,) [J/m], in space [J]: on the rock; lost in bars, in the grout, and by dashpots; by conditions.
 ON_ROCK, IN_BARS, IN_GROUT, IN_DASHPOTS, BY_CONDITIONS = range(5)
 WORK = 5
 CRUSHED = 0.5
@@ -32,74 +34,103 @@ CRUSHED = 0.5
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def dot(a, b):
+    """a . b, of vectors (d,)."""
+    found = a[0] * b[0] + a[1] * b[1]
+    if len(a) == 3:
+        found += a[2] * b[2]
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def apart(a, b):
+    """Distance of two places (d,)."""
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    square = ux * ux + uy * uy
+    if len(a) == 3:
+        uz = b[2] - a[2]
+        square += uz * uz
+    return math.sqrt(square)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def led(conditions, dim):
+    """Whether a node moves as its conditions (9,) say, in one direction at least."""
+    found = conditions[DOES] != FREE or conditions[DOES + 2] != FREE
+    return found or (dim == 3 and conditions[DOES + 4] != FREE)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def directions(first, x, state, along, tangent):
-    """Unit vectors along elements (m, 2), and at nodes (n, 2) along the mean of those beside them that are whole; where
+    """Unit vectors along elements (m, d), and at nodes (n, d) along the mean of those beside them that are whole; where
     none is, they stay."""
-    new = np.zeros(tangent.shape)
+    new, dim = np.zeros(tangent.shape), x.shape[1]
     for e in range(len(first)):
         i = first[e]
         if state[e] & RUPTURED:
             continue
-        ux, uy = x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1]
-        length = math.sqrt(ux * ux + uy * uy)
-        along[e, 0], along[e, 1] = ux / length, uy / length
-        for k in (i, i + 1):
-            new[k, 0] += along[e, 0]
-            new[k, 1] += along[e, 1]
+        length = apart(x[i], x[i + 1])
+        for c in range(dim):
+            along[e, c] = (x[i + 1, c] - x[i, c]) / length
+            new[i, c] += along[e, c]
+            new[i + 1, c] += along[e, c]
     for i in range(len(x)):
-        size = math.sqrt(new[i, 0] ** 2 + new[i, 1] ** 2)
+        size = math.sqrt(dot(new[i], new[i]))
         if size > 0.0:
-            tangent[i, 0], tangent[i, 1] = new[i, 0] / size, new[i, 1] / size
+            for c in range(dim):
+                tangent[i, c] = new[i, c] / size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def host_points(node, row, weight, x, seen):
-    """Where the rock is at nodes whose host is held here: rows (k,) of seen (n, 3) get weight (n, 4) times the corners
-    of x (rows, 8 or more)."""
+def host_points(node, row, weight, x, stride, seen):
+    """Where the rock is at nodes whose host is held here: rows (k,) of seen (n, d + 1) get weight (n, 4) times the
+    corners of x (rows, 4 stride or more), of which one begins every `stride` words."""
+    dim = seen.shape[1] - 1
     for m in range(len(node)):
         i, r = node[m], row[m]
-        px = py = 0.0
-        for c in range(4):
-            if weight[i, c] != 0.0:
-                px += weight[i, c] * x[r, 2 * c]
-                py += weight[i, c] * x[r, 2 * c + 1]
-        seen[i, 0], seen[i, 1] = px, py
+        for d in range(dim):
+            p = 0.0
+            for c in range(4):
+                if weight[i, c] != 0.0:
+                    p += weight[i, c] * x[r, stride * c + d]
+            seen[i, d] = p
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def node_forces(first, along, tangent, force, grout, plate, hosted, carrier, share, conditions, total, on_rock):
-    """Forces of bars and conditions on the nodes, total (n, 2), and of nodes on the rock, on_rock (n, 2) [N/m].
+    """Forces of bars and conditions on the nodes, total (n, d), and of nodes on the rock, on_rock (n, d) [N/m].
 
     The rock at a node gets the force of the grout, what bars pull across the bar, and under a plate all of it. Nodes
     without a host are carried, across the bar, by the nodes carrier (n, 2), share (n,) by the second.
     """
+    dim = total.shape[1]
     for i in range(len(total)):
-        total[i, 0], total[i, 1] = conditions[i, FORCE_X], conditions[i, FORCE_Y]
+        for c in range(dim):
+            total[i, c] = conditions[i, FORCE + c]
     for e in range(len(first)):
         i = first[e]
-        fx, fy = force[e] * along[e, 0], force[e] * along[e, 1]
-        total[i, 0] += fx
-        total[i, 1] += fy
-        total[i + 1, 0] -= fx
-        total[i + 1, 1] -= fy
+        for c in range(dim):
+            f = force[e] * along[e, c]
+            total[i, c] += f
+            total[i + 1, c] -= f
     on_rock[:] = 0.0
+    across = np.zeros(dim)
     for i in range(len(total)):
-        tx, ty = tangent[i, 0], tangent[i, 1]
-        led = conditions[i, DOES_X] != FREE or conditions[i, DOES_Y] != FREE
-        f = total[i, 0] * tx + total[i, 1] * ty
-        across_x, across_y = (0.0, 0.0) if led else (total[i, 0] - f * tx, total[i, 1] - f * ty)
+        leads = led(conditions[i], dim)
+        f = dot(total[i], tangent[i])
+        for c in range(dim):
+            across[c] = 0.0 if leads else total[i, c] - f * tangent[i, c]
         if hosted[i]:
-            on_rock[i, 0] += across_x - grout[i] * tx
-            on_rock[i, 1] += across_y - grout[i] * ty
-            if plate[i] and not led:
-                on_rock[i, 0] += (f + grout[i]) * tx
-                on_rock[i, 1] += (f + grout[i]) * ty
+            for c in range(dim):
+                on_rock[i, c] += across[c] - grout[i] * tangent[i, c]
+                if plate[i] and not leads:
+                    on_rock[i, c] += (f + grout[i]) * tangent[i, c]
         else:
             for k in range(2):
-                c, part = carrier[i, k], share[i] if k == 1 else 1.0 - share[i]
-                if c >= 0:
-                    on_rock[c, 0] += part * across_x
-                    on_rock[c, 1] += part * across_y
+                by, part = carrier[i, k], share[i] if k == 1 else 1.0 - share[i]
+                if by >= 0:
+                    for c in range(dim):
+                        on_rock[by, c] += part * across[c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -107,30 +138,32 @@ def move(
     first, x, v, point, before, tangent, total, grout, plate, hosted, carrier, share, conditions, nodes, dt, alpha,
     reaction, step, rock, work,
 ):  # fmt: skip
-    """Move the nodes over a step dt in which the rock at them went from before to point (n, 2) [m].
+    """Move the nodes over a step dt in which the rock at them went from before to point (n, d) [m].
 
     Along the bar with the force of bars, conditions and grout: m dw / dt = F - c w, the dashpot at the mean velocity
-    (any c dt / m is stable); alpha: local damping in its place. Fills step (n, 2), the way of each node, rock (n, 2),
-    that of the rock, and reaction (n, 2), what conditions had to add [N/m].
+    (any c dt / m is stable); alpha: local damping in its place. Fills step (n, d), the way of each node, rock (n, d),
+    that of the rock, and reaction (n, d), what conditions had to add [N/m].
     """
+    dim = x.shape[1]
     for i in range(len(x)):
         if hosted[i]:
-            rock[i, 0], rock[i, 1] = point[i, 0] - before[i, 0], point[i, 1] - before[i, 1]
+            for c in range(dim):
+                rock[i, c] = point[i, c] - before[i, c]
     for i in range(len(x)):
         if not hosted[i]:
-            rock[i, 0] = rock[i, 1] = 0.0
+            rock[i] = 0.0
             for k in range(2):
-                c, part = carrier[i, k], share[i] if k == 1 else 1.0 - share[i]
-                if c >= 0:
-                    rock[i, 0] += part * rock[c, 0]
-                    rock[i, 1] += part * rock[c, 1]
+                by, part = carrier[i, k], share[i] if k == 1 else 1.0 - share[i]
+                if by >= 0:
+                    for c in range(dim):
+                        rock[i, c] += part * rock[by, c]
     for i in range(len(x)):
-        tx, ty = tangent[i, 0], tangent[i, 1]
-        f = total[i, 0] * tx + total[i, 1] * ty + grout[i]
+        f = dot(total[i], tangent[i]) + grout[i]
         m, drag = nodes[i, MASS], 0.0
-        w = v[i, 0] * tx + v[i, 1] * ty
+        w = dot(v[i], tangent[i])
         if plate[i] and hosted[i]:
-            dx, dy = rock[i, 0], rock[i, 1]
+            for c in range(dim):
+                step[i, c] = rock[i, c]
         else:
             if alpha > 0.0:
                 new = w + dt / m * laws.damped(f, w, alpha)
@@ -138,29 +171,24 @@ def move(
                 drag = nodes[i, DRAG]
                 g = 0.5 * drag * dt / m
                 new = ((1.0 - g) * w + dt / m * f) / (1.0 + g)
-            slide = new * dt - (rock[i, 0] * tx + rock[i, 1] * ty)
-            dx, dy = rock[i, 0] + slide * tx, rock[i, 1] + slide * ty
-        reaction[i, 0] = reaction[i, 1] = 0.0
-        led_x, led_y = conditions[i, DOES_X] != FREE, conditions[i, DOES_Y] != FREE
-        if led_x:
-            at = conditions[i, AT_X]
-            dx = dt * (at if conditions[i, DOES_X] == VELOCITY else v[i, 0] + at * dt)
-        if led_y:
-            at = conditions[i, AT_Y]
-            dy = dt * (at if conditions[i, DOES_Y] == VELOCITY else v[i, 1] + at * dt)
-        mean = 0.5 * (w + (dx * tx + dy * ty) / dt)
-        if led_x:
-            reaction[i, 0] = m * (dx / dt - v[i, 0]) / dt - total[i, 0] - (grout[i] - drag * mean) * tx
-        if led_y:
-            reaction[i, 1] = m * (dy / dt - v[i, 1]) / dt - total[i, 1] - (grout[i] - drag * mean) * ty
+            slide = new * dt - dot(rock[i], tangent[i])
+            for c in range(dim):
+                step[i, c] = rock[i, c] + slide * tangent[i, c]
+        for c in range(dim):
+            does, at = conditions[i, DOES + 2 * c], conditions[i, AT + 2 * c]
+            if does != FREE:
+                step[i, c] = dt * (at if does == VELOCITY else v[i, c] + at * dt)
+        mean = 0.5 * (w + dot(step[i], tangent[i]) / dt)
         work[IN_DASHPOTS] += drag * mean * mean * dt
-        mean_x, mean_y = 0.5 * (v[i, 0] * dt + dx), 0.5 * (v[i, 1] * dt + dy)  # forces of a moment, see energy.py
-        work[BY_CONDITIONS] += (reaction[i, 0] + conditions[i, FORCE_X]) * mean_x
-        work[BY_CONDITIONS] += (reaction[i, 1] + conditions[i, FORCE_Y]) * mean_y
-        step[i, 0], step[i, 1] = dx, dy
-        v[i, 0], v[i, 1] = dx / dt, dy / dt
-        x[i, 0] += dx
-        x[i, 1] += dy
+        for c in range(dim):
+            reaction[i, c] = 0.0
+            if conditions[i, DOES + 2 * c] != FREE:
+                held = (grout[i] - drag * mean) * tangent[i, c]
+                reaction[i, c] = m * (step[i, c] / dt - v[i, c]) / dt - total[i, c] - held
+            both = 0.5 * (v[i, c] * dt + step[i, c])  # forces of a moment, see energy.py
+            work[BY_CONDITIONS] += (reaction[i, c] + conditions[i, FORCE + c]) * both
+            v[i, c] = step[i, c] / dt
+            x[i, c] += step[i, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -171,9 +199,7 @@ def stretch(first, x, elements, length, force, state, plastic, work):
     become longer than L0 by the failure strain, or shorter than CRUSHED L0, is broken for good.
     """
     for e in range(len(first)):
-        i = first[e]
-        ux, uy = x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1]
-        now = math.sqrt(ux * ux + uy * uy)
+        now = apart(x[first[e]], x[first[e] + 1])
         du, f = now - length[e], force[e]
         length[e] = now
         state[e] &= ~(IN_TENSION | IN_COMPRESSION)
@@ -207,8 +233,7 @@ def hold(tangent, step, rock, hosted, nodes, normal, grout, slip, state, work):
         state[i] &= ~SLIPS
         if not hosted[i] or k == 0.0:
             continue
-        tx, ty = tangent[i, 0], tangent[i, 1]
-        du = (rock[i, 0] - step[i, 0]) * tx + (rock[i, 1] - step[i, 1]) * ty
+        du = dot(rock[i] - step[i], tangent[i])
         sigma, f = min(0.0, normal[i]), grout[i]
         most = min(
             nodes[i, ROCK_COHESION] - sigma * nodes[i, ROCK_FRICTION],
@@ -224,22 +249,39 @@ def hold(tangent, step, rock, hosted, nodes, normal, grout, slip, state, work):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add(node, row, weight, on_rock, applied):
-    """Add forces of nodes (k,) on the rock to the corners of their hosts, applied (rows, 8) [N/m]."""
+def add(node, row, weight, on_rock, stride, applied):
+    """Add forces of nodes (k,) on the rock to the corners of their hosts, applied (rows, 4 stride) [N/m]."""
     for m in range(len(node)):
         i, r = node[m], row[m]
         for c in range(4):
             if weight[i, c] != 0.0:
-                applied[r, 2 * c] += weight[i, c] * on_rock[i, 0]
-                applied[r, 2 * c + 1] += weight[i, c] * on_rock[i, 1]
+                for d in range(on_rock.shape[1]):
+                    applied[r, stride * c + d] += weight[i, c] * on_rock[i, d]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def work_on_rock(before, after, rock, work):
-    """Add what the mean of the forces (n, 2) at both ends of a step did on the rock."""
+    """Add what the mean of the forces (n, d) at both ends of a step did on the rock."""
     for i in range(len(rock)):
-        work[ON_ROCK] += 0.5 * (before[i, 0] + after[i, 0]) * rock[i, 0]
-        work[ON_ROCK] += 0.5 * (before[i, 1] + after[i, 1]) * rock[i, 1]
+        for c in range(rock.shape[1]):
+            work[ON_ROCK] += 0.5 * (before[i, c] + after[i, c]) * rock[i, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def across(stress, tangent, out):
+    """Normal stress across unit vectors t (n, d), of stresses (n, 4 or 6): xx, yy, xy, zz, in space xz, yz.
+
+    In the plane that in it; in space the mean in all directions across, (tr s - t s t) / 2.
+    """
+    for i in range(len(tangent)):
+        s, tx, ty = stress[i], tangent[i, 0], tangent[i, 1]
+        if tangent.shape[1] == 2:
+            out[i] = s[0] * ty * ty + s[1] * tx * tx - 2.0 * s[2] * tx * ty
+        else:
+            tz = tangent[i, 2]
+            along = s[0] * tx * tx + s[1] * ty * ty + s[3] * tz * tz
+            along += 2.0 * (s[2] * tx * ty + s[4] * tx * tz + s[5] * ty * tz)
+            out[i] = 0.5 * (s[0] + s[1] + s[3] - along)
 
 
 def first_nodes(bar: np.ndarray) -> np.ndarray:

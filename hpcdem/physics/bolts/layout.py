@@ -1,4 +1,4 @@
-"""Where the nodes of a bolt are, and in which elements: functions of the present mesh."""
+"""Where the nodes of a bolt are, and in which elements: functions of the present mesh, in the plane and in space."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.physics.fdem.tetrahedra import FACES
 
 SHORTEST = 0.1
 """Crossings of edges that are nearer to each other than this part of the mean edge count once."""
@@ -16,31 +17,39 @@ INSIDE = 1e-9
 """Barycentric coordinates of points on an edge are as low as this below zero."""
 
 
-def checked(points: Sequence[tuple[float, float]]) -> np.ndarray:
-    """The points (k, 2) [m] of a bolt. CommandError unless two at least, finite, each away from the one before."""
-    line = np.asarray(points, np.float64).reshape(-1, 2)
+def checked(points: Sequence[Sequence[float]], dim: int) -> np.ndarray:
+    """The points (k, dim) [m] of a bolt. CommandError unless two at least, finite, each away from the one before."""
+    if any(len(point) != dim for point in points):
+        raise CommandError(f"the points of a bolt are vectors of {dim} numbers")
+    line = np.asarray(points, np.float64).reshape(-1, dim)
     if len(line) < 2:
         raise CommandError(f"a bolt goes through two points at least, got {len(line)}")
     if not np.isfinite(line).all():
         raise CommandError("the points of a bolt must be finite")
     twice = np.flatnonzero((np.diff(line, axis=0) == 0.0).all(axis=1))
     if len(twice):
-        x, y = line[twice[0]]
-        raise CommandError(f"two points of the bolt that follow each other are the same, ({x:g},{y:g})")
+        at = ",".join(f"{c:g}" for c in line[twice[0]])
+        raise CommandError(f"two points of the bolt that follow each other are the same, ({at})")
     return line
+
+
+def lengths(ways: np.ndarray) -> np.ndarray:
+    """Of vectors (n, 2 or 3)."""
+    found: np.ndarray = np.hypot.reduce(ways, axis=1)
+    return found
 
 
 def split(
     line: np.ndarray, corners: np.ndarray, cells: np.ndarray, mean_edge: float, segments: int | None,
     length: float | None,
 ) -> np.ndarray:  # fmt: skip
-    """Nodes (n, 2) [m] along a line: each straight part in so many segments, or in ones no longer than length [m], or
-    at the edges of elements, corners (ne, 4, 2) of cells (ne, 4)."""
+    """Nodes (n, d) [m] along a line: each straight part in so many segments, or in ones no longer than length [m], or
+    at the edges of elements, in space their faces, corners (ne, 4, d) of cells (ne, 4)."""
     nodes = [line[:1]]
     for a, b in pairwise(line):
-        span = float(np.hypot(*(b - a)))
+        span = float(lengths((b - a)[None])[0])
         if segments is None and length is None:
-            t = _crossings(a, b, corners, cells)
+            t = (_crossings if len(a) == 2 else _crossed_faces)(a, b, corners, cells)
             near = SHORTEST * mean_edge / span
             kept = [0.0]
             for one in t.tolist():
@@ -76,11 +85,28 @@ def _crossings(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndar
     return np.sort(t[hit])
 
 
+def _crossed_faces(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Parts (k,) of the way from a to b, ascending, at which it crosses faces of tetrahedra: a + t (b - a) is a point
+    of the face with the barycentric coordinates 1 - u - w, u, w."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    near = (cells[:, 0] >= 0) & (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
+    p, q, r = np.moveaxis(corners[near][:, FACES].reshape(-1, 3, len(a)), 1, 0)
+    d, e, f = b - a, q - p, r - p
+    normal, way = np.cross(e, f), p - a
+    along = normal @ d
+    turned = np.cross(d, way)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (normal * way).sum(axis=1) / along
+        u, w = -(f * turned).sum(axis=1) / along, (e * turned).sum(axis=1) / along
+        hit = (along != 0.0) & (t > 0.0) & (t < 1.0) & (u >= -INSIDE) & (w >= -INSIDE) & (u + w <= 1.0 + INSIDE)
+    return np.sort(t[hit])
+
+
 def hosts(
     points: np.ndarray, corners: np.ndarray, cells: np.ndarray, alive: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """For points (n, 2) [m] the lowest element in which each is, -1: none, and the weights of its corners (n, 4);
-    corners (ne, 4, 2) [m] of cells (ne, 4), of which some are there."""
+    """For points (n, d) [m] the lowest element in which each is, -1: none, and the weights of its corners (n, 4);
+    corners (ne, 4, d) [m] of cells (ne, 4), of which some are there."""
     host, weight = np.full(len(points), -1, np.int64), np.zeros((len(points), 4))
     real = (cells >= 0)[:, :, None]
     low = np.where(real, corners, np.inf).min(axis=1)
@@ -99,8 +125,11 @@ def hosts(
 
 
 def coordinates(at: np.ndarray, corners: np.ndarray, four: bool) -> np.ndarray:
-    """Weights (4,) of the corners (4, 2) of an element at a point, from inside or outside: barycentric in the triangle,
-    of a quad in the half of it that holds the point best."""
+    """Weights (4,) of the corners (4, d) of an element at a point, from inside or outside: barycentric in the triangle
+    or tetrahedron, of a quad in the half of it that holds the point best."""
+    if len(at) == 3:
+        part = np.linalg.solve((corners[1:] - corners[0]).T, at - corners[0])
+        return np.concatenate([[1.0 - part.sum()], part])
     best = np.full(4, -math.inf)
     for half in ((0, 1, 2), (0, 2, 3)) if four else ((0, 1, 2),):
         a, b, c = corners[list(half)]

@@ -23,29 +23,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Condition:
-    """What is prescribed at nodes of bolts: does_x, does_y (kernels.FREE, VELOCITY, ACCELERATION) with its value; the
-    force [N] on one bolt."""
+    """What is prescribed at nodes of bolts: does_x, does_y, does_z (kernels.FREE, VELOCITY, ACCELERATION) with its
+    value; the force [N] on one bolt. See kernels.DOES for the order."""
 
     does_x: int = kernels.FREE
     at_x: Number = 0.0
     does_y: int = kernels.FREE
     at_y: Number = 0.0
+    does_z: int = kernels.FREE
+    at_z: Number = 0.0
     force_x: Number = 0.0
     force_y: Number = 0.0
+    force_z: Number = 0.0
 
 
 NODE_QUANTITIES: dict[str, tuple[str, str]] = {
-    "position_x": ("m", "position in x"),
-    "position_y": ("m", "position in y"),
-    "displacement_x": ("m", "displacement in x since it was installed"),
-    "displacement_y": ("m", "displacement in y since it was installed"),
-    "velocity_x": ("m/s", "velocity in x"),
-    "velocity_y": ("m/s", "velocity in y"),
+    **{f"position_{axis}": ("m", f"position in {axis}") for axis in "xyz"},
+    **{f"displacement_{axis}": ("m", f"displacement in {axis} since it was installed") for axis in "xyz"},
+    **{f"velocity_{axis}": ("m/s", f"velocity in {axis}") for axis in "xyz"},
     "bond_force": ("N/m", "force of the grout per length of one bolt, towards its last point"),
     "slip": ("m", "slip of the bar in the grout, towards its last point"),
     "bond_state": ("1", "slips 1, has slipped 2"),
-    "reaction_x": ("N", "force in x by which conditions act on one bolt"),
-    "reaction_y": ("N", "force in y by which conditions act on one bolt"),
+    **{f"reaction_{axis}": ("N", f"force in {axis} by which conditions act on one bolt") for axis in "xyz"},
     "host": ("1", "element that holds the node, -1: none"),
     "distance": ("m", "distance from the first point along the bolt, as installed"),
 }
@@ -64,9 +63,10 @@ _NODES: Columns = {
     "x": (np.float64, 2), "v": (np.float64, 2), "origin": (np.float64, 2), "point": (np.float64, 2),
     "tangent": (np.float64, 2), "reaction": (np.float64, 2), "grout": (np.float64, 2), "weight": (np.float64, 4),
 }  # fmt: skip
-"""Columns of the nodes, by type and width. bar: which bolt; condition: row; arc: distance along the bolt [m]; bond:
-force of the grout [N/m]; point: where the rock is [m]; tangent: unit vector along the bolt; grout: length in
+"""Columns of the nodes, by type and width in the plane. bar: which bolt; condition: row; arc: distance along the bolt
+[m]; bond: force of the grout [N/m]; point: where the rock is [m]; tangent: unit vector along the bolt; grout: length in
 grout of the halves of the elements before and after the node [m]; weight: of the corners of the host."""
+_VECTORS = ("x", "v", "origin", "point", "tangent", "reaction")
 _ELEMENTS: Columns = {
     "row": (np.int64, 0), "state": (np.int64, 0), "length": (np.float64, 0), "force": (np.float64, 0),
     "plastic": (np.float64, 0),
@@ -94,11 +94,15 @@ class Bolts(Structure):
         """(m, 2) nodes of each element. Not collective."""
         return np.column_stack([self.first, self.first + 1])
 
+    @classmethod
+    def node_columns(cls, dim: int) -> Columns:
+        return {**cls.of_nodes, **{name: (np.float64, dim) for name in _VECTORS}}
+
     # ---- what is said --------------------------------------------------------------------------------------------
 
     def create(
         self,
-        points: Sequence[tuple[float, float]],
+        points: Sequence[Sequence[float]],
         segments: int | None = None,
         length: float | None = None,
         grout: tuple[float, float] | None = None,
@@ -109,18 +113,19 @@ class Bolts(Structure):
         segments: of each straight part; length: of an element at most [m]; else nodes are at the edges of elements.
         grout: from where to where along the bolt there is grout [m]. plate: the first node is tied to the rock.
         """
-        blocks, line = self.blocks, layout.checked(points)
+        blocks, dim = self.blocks, self.blocks.dim
+        line = layout.checked(points, dim)
         if segments is not None and length is not None:
             raise CommandError("segments and length exclude each other: both say where a bolt is divided")
         if (segments is not None and segments < 1) or (length is not None and not 0.0 < length < math.inf):
             raise CommandError("a bolt has one segment at least, of a length above 0")
-        total = float(np.hypot(*np.diff(line, axis=0).T).sum())
+        total = float(layout.lengths(np.diff(line, axis=0)).sum())
         begin, end = (0.0, total) if grout is None else grout
         if not 0.0 <= begin < end or begin >= total:
             raise CommandError(f"grout goes from a distance of 0 or more to a larger one on a bolt of {total:g} m, "
                                f"got {begin:g} to {end:g}")  # fmt: skip
         cells = blocks.the_mesh().cells
-        corners = diagnostics.corner_values(blocks, "position").reshape(-1, 4, 2)
+        corners = diagnostics.corner_values(blocks, "position").reshape(-1, 4, dim)
         x = layout.split(line, corners, np.where(blocks.alive[:, None], cells, -1), blocks.mean_edge, segments, length)
         host, weight = layout.hosts(x, corners, cells, blocks.alive)
         held = np.flatnonzero(host >= 0)
@@ -129,23 +134,22 @@ class Bolts(Structure):
         if plate and host[0] < 0:  # in front of the face: tied to the element in which the bolt begins
             e = int(host[held[0]])
             host[0], weight[0] = e, layout.coordinates(x[0], corners[e], bool(cells[e, 3] >= 0))
-        n, way = len(x), np.diff(x, axis=0)
-        span = np.hypot(way[:, 0], way[:, 1])
+        n, span = len(x), layout.lengths(np.diff(x, axis=0))
         arc = np.concatenate([[0.0], np.cumsum(span)])
         middle = 0.5 * (arc[:-1] + arc[1:])
 
         def within(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return np.maximum(np.minimum(b, end) - np.maximum(a, begin), 0.0)
 
-        new = empty(_NODES, n)
+        new = empty(self.node_columns(dim), n)
         new["bar"][:] = self.nodes["bar"].max(initial=-1) + 1
         new["host"][:], new["weight"][:], new["arc"][:], new["plate"][0] = host, weight, arc, plate
         new["x"][:], new["origin"][:], new["point"][:] = x, x, x
         new["grout"][1:, 0], new["grout"][:-1, 1] = within(middle, arc[1:]), within(arc[:-1], middle)
-        seen = np.zeros((n, 3))
-        kernels.host_points(held, held, weight, np.ascontiguousarray(corners[host].reshape(-1, 8)), seen)
-        new["point"][held] = seen[held, :2]
-        speed = diagnostics.corner_values(blocks, "velocity").reshape(-1, 4, 2)
+        seen = np.zeros((n, dim + 1))
+        kernels.host_points(held, held, weight, np.ascontiguousarray(corners[host].reshape(-1, 4 * dim)), dim, seen)
+        new["point"][held] = seen[held, :dim]
+        speed = diagnostics.corner_values(blocks, "velocity").reshape(-1, 4, dim)
         new["v"][held] = _at(weight[held], cells[host[held]], speed[host[held]])
         bars = empty(_ELEMENTS, n - 1)
         bars["length"][:] = span
@@ -164,6 +168,8 @@ class Bolts(Structure):
         """Give elements (k,) properties. Those that have some take the new ones: the force they carry stays, but for
         the difference of the pretension."""
         values = BOLT.complete(given)
+        if self.blocks.dim == 3 and values["spacing"] != 1.0:
+            raise CommandError(f"in space each bolt is there by itself: spacing must be 1, got {values['spacing']:g}")
         self._check_spacing(elements, values["spacing"])
         blocks, bars = self.blocks, self.elements
         blocks.before_change()
@@ -199,7 +205,7 @@ class Bolts(Structure):
     def _node_value(self, name: str) -> np.ndarray:
         nodes = self.nodes
         stem, _, axis = name.rpartition("_")
-        c = 0 if axis == "x" else 1
+        c = max("xyz".find(axis), 0)
         match stem:
             case "position":
                 return nodes["x"][:, c].copy()
@@ -278,7 +284,7 @@ class Bolts(Structure):
 
     def _led(self) -> np.ndarray:
         """(n,) bool: nodes with a prescribed velocity or acceleration."""
-        rows = [(one.does_x, one.does_y) for one in self.conditions]
+        rows = [(one.does_x, one.does_y, one.does_z) for one in self.conditions]
         return (np.array(rows) != kernels.FREE).any(axis=1)[self.nodes["condition"]]
 
     # ---- tables of the kernels -------------------------------------------------------------------------------------
@@ -286,7 +292,7 @@ class Bolts(Structure):
     def _arrange(self) -> None:
         """All that follows from columns, properties and hosts."""
         nodes, bars = self.nodes, self.elements
-        n, m = len(nodes["bar"]), len(bars["row"])
+        n, m, dim = len(nodes["bar"]), len(bars["row"]), self.blocks.dim
         self.first = kernels.first_nodes(nodes["bar"])
         first = self.first
         self.hosted = nodes["host"] >= 0
@@ -295,11 +301,10 @@ class Bolts(Structure):
         parted[first[there] + 1] = False
         dead = ~self.alive(BOLT_NODE)
         self._carrier, self._share = layout.carriers(np.cumsum(parted), nodes["arc"], nodes["host"])
-        self._along, self._tangent = np.zeros((m, 2)), nodes["tangent"]
-        self._total, self._on_rock = np.zeros((n, 2)), np.zeros((n, 2))
-        self._step, self._rock = np.zeros((n, 2)), np.zeros((n, 2))
-        way = nodes["x"][first + 1] - nodes["x"][first]
-        self._length = np.array([math.sqrt(x * x + y * y) for x, y in way.tolist()])
+        self._along, self._tangent = np.zeros((m, dim)), nodes["tangent"]
+        self._total, self._on_rock = np.zeros((n, dim)), np.zeros((n, dim))
+        self._step, self._rock = np.zeros((n, dim)), np.zeros((n, dim))
+        self._length = np.array([kernels.apart(nodes["x"][i], nodes["x"][i + 1]) for i in first.tolist()])
         spacing, diameter = self._column("spacing", 1.0), self._column("diameter")
         area = 0.25 * math.pi * diameter**2
         young, rho = self._column("young"), self._column("density")
@@ -358,7 +363,7 @@ class Bolts(Structure):
 
     def _conditions_at(self, time: float, middle: float) -> np.ndarray:
         table = super()._conditions_at(time, middle)
-        table[:, kernels.FORCE_X :] /= self._node_spacing[:, None]
+        table[:, kernels.FORCE :] /= self._node_spacing[:, None]
         return table
 
     def _find_forces(self) -> None:
@@ -395,7 +400,7 @@ class Bolts(Structure):
 
     def add_to(self, applied: np.ndarray) -> None:
         """Forces on the rock at the present positions, in the order of nodes [N/m]."""
-        kernels.add(self._mine, self._rows, self.nodes["weight"], self._on_rock, applied)
+        kernels.add(self._mine, self._rows, self.nodes["weight"], self._on_rock, self.blocks.stride, applied)
 
     def follow(self) -> None:
         """The rock has moved: move the nodes over the same step, and find the new forces."""
@@ -409,7 +414,7 @@ class Bolts(Structure):
                 blocks.comm.sum_into(seen.view(np.int64))  # one rank has each row, the others zero: exact
         with blocks.timers("force"):
             static = not blocks.options.dynamic
-            point, normal = np.ascontiguousarray(seen[:, :2]), np.ascontiguousarray(seen[:, 2])
+            point, normal = np.ascontiguousarray(seen[:, :-1]), np.ascontiguousarray(seen[:, -1])
             time = clock.time if static else clock.time - clock.dt
             conditions = self._conditions_at(time, time if static else clock.time - 0.5 * clock.dt)
             work = self.work if self._account is not None and not static else np.zeros(kernels.WORK)
@@ -433,15 +438,16 @@ class Bolts(Structure):
             kernels.work_on_rock(before, self._on_rock, self._rock, work)
 
     def _seen(self) -> np.ndarray:
-        """(n, 3) of the nodes whose host is owned here: where the rock is [m], and its stress across the bar [Pa]."""
-        blocks, seen = self.blocks, np.zeros((len(self), 3))
-        kernels.host_points(self._mine, self._rows, self.nodes["weight"], blocks.x, seen)
+        """(n, d + 1) of the nodes whose host is owned here: where the rock is [m], and its stress across the bar
+        [Pa]."""
+        blocks, seen = self.blocks, np.zeros((len(self), self.blocks.dim + 1))
+        kernels.host_points(self._mine, self._rows, self.nodes["weight"], blocks.x, blocks.stride, seen)
         if self._rubs and len(self._mine):
             rows, place = np.unique(self._rows, return_inverse=True)
             stress, _ = blocks.local.stresses(rows - blocks.n_left, energies=False, flow=False)
-            xx, yy, xy, _ = stress[place.reshape(-1)].T
-            tx, ty = self._tangent[self._mine].T
-            seen[self._mine, 2] = xx * ty * ty + yy * tx * tx - 2.0 * xy * tx * ty
+            across = np.empty(len(self._mine))
+            kernels.across(stress[place.reshape(-1)], self._tangent[self._mine], across)
+            seen[self._mine, -1] = across
         return seen
 
     def balance(self) -> tuple[np.ndarray, np.ndarray]:
@@ -487,5 +493,5 @@ class Bolts(Structure):
 
 
 def _at(weight: np.ndarray, cells: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values (k, 4, 2) of the corners of elements (k, 4) at points in them."""
+    """Values (k, 4, d) of the corners of elements (k, 4) at points in them."""
     return (weight[:, :, None] * np.where(cells[:, :, None] >= 0, values, 0.0)).sum(axis=1)

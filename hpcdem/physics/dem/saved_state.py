@@ -256,6 +256,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     sim.lost = state.get("lost", 0)
     sim.rows = [(int(first), int(end)) for first, end in state.get("rows", [])]
     if state.get("energy") is not None:
+        sim.prepare_kernels("energy")
         sim.energy = Budget.restored(state["energy"], sim.comm.rank == 0)
     sim._longest2 = state["longest2"]
     sim.restart_step = sim.clock.step
@@ -267,6 +268,7 @@ def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Table
     sim.trail.begin()
     sim.clumps = Clumps(**state.get("clumps", {}))
     if sim.clumps:
+        sim.prepare_kernels("clumps")
         _take_clumps(sim, tables)
     tables.clear()  # the close needs the room
     if state["closed"]:

@@ -228,6 +228,8 @@ def _bad_numbers(mesh: Mesh) -> str | None:
 
 def _bad_hexes(mesh: Mesh) -> str | None:
     """All tetrahedra of both overlays have a volume."""
+    if not len(mesh.hexes):
+        return None
     points = mesh.hexes[:, :8]
     if ((points < 0) | (points >= len(mesh.points))).any():
         return f"a hexahedron names a point outside 0 to {len(mesh.points) - 1}"

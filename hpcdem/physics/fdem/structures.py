@@ -54,7 +54,7 @@ class Structure(SurfaceLoad):
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self.nodes, self.elements = empty(self.of_nodes, 0), empty(self.of_elements, 0)
+        self.nodes, self.elements = empty(self.node_columns(blocks.dim), 0), empty(self.of_elements, 0)
         self.rows: list[tuple[float, ...]] = []
         self.conditions: list[Any] = [self.condition_type()]
         self.work = np.zeros(self.flows)
@@ -82,6 +82,11 @@ class Structure(SurfaceLoad):
             found = cls(blocks)
             blocks.surface_loads.add(found)
         return found
+
+    @classmethod
+    def node_columns(cls, dim: int) -> Columns:
+        """Columns of the nodes in a model of so many dimensions."""
+        return cls.of_nodes
 
     # ---- what each kind does its way -----------------------------------------------------------------------------
 
@@ -215,18 +220,26 @@ class Structure(SurfaceLoad):
 
     def values(self, kind: str, name: str, numbers: np.ndarray | None = None) -> np.ndarray:
         """A quantity of nodes or elements (None: all), on all ranks. Not collective."""
-        known = self.quantities[kind]
-        if name not in known:
-            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(known)}")
+        self.check(kind, name)
         found = self._value(kind, name)
         return np.asarray(found if numbers is None else found[numbers], np.float64)
 
     def columns(self) -> dict[str, dict[str, np.ndarray]]:
         """What frames hold: all quantities of "elements" and "nodes". Not collective."""
         return {
-            table: {name: self.values(kind, name) for name in self.quantities[kind]}
+            table: {name: self.values(kind, name) for name in self._known(kind)}
             for table, kind in zip(("elements", "nodes"), self.parts, strict=True)
         }
+
+    def check(self, kind: str, name: str) -> None:
+        """CommandError if there is no such quantity here. Not collective."""
+        known = self._known(kind)
+        if name not in known:
+            raise CommandError(f"there is no quantity {name} of a {kind}; there are {', '.join(known)}")
+
+    def _known(self, kind: str) -> list[str]:
+        """What can be asked of them here: nothing along z in the plane."""
+        return [name for name in self.quantities[kind] if self.blocks.dim == 3 or not name.endswith("_z")]
 
     def work_done(self) -> float:
         """On the rock, since the account of energy began [J/m]. Not collective."""
@@ -280,7 +293,7 @@ class Structure(SurfaceLoad):
     def restored(cls, blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> None:
         """Inverse of both: the blocks, whose budget is back already, have these."""
         made = cls.of(blocks)
-        made.nodes = _wide(tables[f"{cls.word}_nodes"], cls.of_nodes)
+        made.nodes = _wide(tables[f"{cls.word}_nodes"], cls.node_columns(blocks.dim))
         made.elements = _wide(tables[f"{cls.word}_elements"], cls.of_elements)
         made.rows = [tuple(row) for row in state["rows"]]
         made.conditions = [cls.condition_type(**one) for one in state["conditions"]]

@@ -11,20 +11,27 @@ any bulk modulus in channels of any width converges. At u = 0 the derivative has
 Sun 1993). Seepage faces, and rates that take more than there is, are complementarities: max(u, R) = 0 and
 min(u + 1, R) = 0.
 
+The nodes of a well are one room (wells.py): one variable y, that of its first node, says what all of them hold, y < 0:
+the saturation 1 + y, y > 0: the head y p0 above the lowest of them, p = max(y p0 - (E - E_lowest), 0). Its equation is
+the sum of theirs. A rate with a limit y_l of the pressure: the median of what the room lacks R, of what came in and of
+y - y_l is 0, so that the rate comes in below the limit, less at it, nothing above.
+
 Everything here is known to all ranks and is the same on all: the numbers of a solve are few beside its factors.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcdem.physics.fdem.connectivity import corner_counts, face_points
 from hpcdem.physics.fdem.linear import Pieces
-from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow import kernels, kernels_space
+from hpcdem.physics.flow.network import LINKS
+from hpcdem.physics.flow.wells import Asked, Well
 
 if TYPE_CHECKING:
     from hpcdem.physics.flow.model import Flow
@@ -42,8 +49,9 @@ class Balance:
 
     residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; rounding:
     what else counts as such, where pressure and height nearly balance; fluid, volume (n,) [m2]; state (n,
-    kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; table (m,
-    kernels.CHANNEL), q [m2/s], lost [m2] (m,): of channels, see kernels.py.
+    kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; pumped: by
+    well the fluid that came in [m2], None: what its nodes lack; table (l, kernels.CHANNEL), q [m2/s], lost [m2] (l,):
+    of the links of channels, see kernels.py. In space m3 for m2.
     """
 
     residual: np.ndarray
@@ -54,6 +62,7 @@ class Balance:
     volume: np.ndarray
     state: np.ndarray
     held: np.ndarray
+    pumped: list[float | None]
     table: np.ndarray
     q: np.ndarray
     lost: np.ndarray
@@ -62,13 +71,14 @@ class Balance:
 @dataclass
 class Step:
     """One implicit step: before, after [s]; fluid (n,) [m2]: at its beginning; conditions (rows, 2): at its end;
-    known (n,) bool: nodes of which they say the pressure."""
+    known (n,) bool: nodes of which they say the pressure; asked: by well."""
 
     before: float
     after: float
     fluid: np.ndarray
     conditions: np.ndarray
     known: np.ndarray
+    asked: list[Asked]
 
     @property
     def dt(self) -> float:
@@ -77,9 +87,12 @@ class Step:
 
 @dataclass
 class Fluid:
-    """The network of a model, as arrays. u (n,): variable of each flow node; at (m, 4): nodes of the blocks at the
-    corners a, b of the lower face and p, q of the other (p faces b); face_at (k, 2), face_node (k, 2): nodes of
-    the blocks and flow nodes at the ends of faces of this rank that fluid pushes on, face_key (k,): their numbers."""
+    """The network of a model, as arrays. u (n,): variable of each flow node; first (n,): rows of the nodes whose
+    variable counts for them, tied (n,) bool: another one's; wells: with the rows of their nodes; at (m, 4): nodes of
+    the blocks at the corners a, b of the lower face and p, q of the other (p faces b), in space (m, 6): a, b, c and p,
+    q, r (p faces a, r faces b); ends (l, 2): of links, `of` each channel; face_at (k, dim), face_node (k, dim): nodes
+    of the blocks and flow nodes at the corners of faces of this rank that fluid pushes on, face_key (k,): their
+    numbers."""
 
     flow: Flow
     p0: float
@@ -88,7 +101,7 @@ class Fluid:
 
     def __post_init__(self) -> None:
         flow, blocks = self.flow, self.flow.blocks
-        network, cells = flow.network, blocks.the_mesh().cells
+        network, self.dim = flow.network, blocks.dim
         self.numbers, self.channels = network.nodes, network.channels
         self.n, self.m = len(network.nodes), len(network.channels)
         row_of = np.full(len(network.there), -1, np.int64)
@@ -96,27 +109,41 @@ class Fluid:
         self.ends = row_of[network.ends]
         lower, other = self.channels, blocks.partner[self.channels]
         self.at = np.column_stack([self._corners(faces) for faces in (lower, other)])
-        self.law = (flow.row[self.channels] - 1).astype(np.int64)
+        self.of = np.repeat(np.arange(self.m), LINKS[self.dim])
+        self.law = (flow.row[self.channels] - 1).astype(np.int64)[self.of]
         self.laws, self.bulk = flow.laws(), flow.fluid("fluid_bulk")
         faces = flow.wet() if flow.pushes else np.empty(0, np.int64)
         self.face_key = faces
-        self.face_at, self.face_node = self._corners(faces), row_of[face_points(cells, faces)]
+        self.face_at, self.face_node = self._corners(faces), row_of[blocks.the_mesh().face_points(faces)]
         self.condition = flow.condition[self.numbers]
         self.held_rows = row_of[flow.held]
         leads = blocks.local.leads[self.numbers]
         self.lead = blocks.node.reshape(-1)[leads]
-        self.side = np.concatenate([-np.ones(self.m), np.ones(self.m)])
+        self.side = np.repeat([-1.0, 1.0], len(self.ends))
         self.end = self.ends.T.reshape(-1)
-        self.both = np.tile(np.arange(self.m), 2)
+        self.both = np.tile(np.arange(len(self.ends)), 2)
         self.fluid = self._gathered(flow.nodes[:, kernels.W])
         p, s = self._gathered(flow.state[: flow.owned, kernels.P]), self._gathered(flow.state[: flow.owned, kernels.S])
-        self.u = np.where(p > 0.0, p / self.p0, s - 1.0)
+        self.first = np.arange(self.n)
+        self.wells: list[tuple[Well, np.ndarray]] = []
+        for well in flow.wells:
+            rows = row_of[well.points[network.there[well.points]]]
+            if len(rows):
+                self.wells.append((well, rows))
+                self.first[rows] = rows[0]
+        self.tied = self.first != np.arange(self.n)
+        self.u = self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
+
+    def _variables(self, u: np.ndarray) -> np.ndarray:
+        """From those of each node by itself: of a well that of its lowest node."""
+        for _, rows in self.wells:
+            u[rows[0]] = u[rows].max()
+        return u
 
     def _corners(self, faces: np.ndarray) -> np.ndarray:
-        """(k, 2) nodes of the blocks at both ends of faces."""
+        """(k, dim) nodes of the blocks at the corners of faces."""
         blocks = self.flow.blocks
-        e, k = faces // 4, faces % 4
-        return np.column_stack([blocks.node[e, k], blocks.node[e, (k + 1) % corner_counts(blocks.the_mesh().cells[e])]])
+        return blocks.node.reshape(-1)[blocks.the_mesh().face_corners(faces)]
 
     def _gathered(self, mine: np.ndarray) -> np.ndarray:
         """Values (n,) of all flow nodes from those of this rank."""
@@ -129,43 +156,60 @@ class Fluid:
     # ---- a state -------------------------------------------------------------------------------------------------
 
     def state_of(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, 2)."""
+        """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, dim)."""
         options = self.flow.blocks.options
         state = np.empty((self.n, kernels.STATE))
-        state[:, kernels.P] = np.maximum(u, 0.0) * self.p0
-        state[:, kernels.S] = np.minimum(1.0 + u, 1.0)
         at = x[self.lead]
-        state[:, kernels.E] = -self.flow.fluid("fluid_density") * (options.gx * at[:, 0] + options.gy * at[:, 1])
+        along = options.gx * at[:, 0] + options.gy * at[:, 1]
+        if self.dim == 3:
+            along += options.gz * at[:, 2]
+        state[:, kernels.E] = -self.flow.fluid("fluid_density") * along
+        own = self._own(u, state[:, kernels.E])
+        state[:, kernels.P] = np.maximum(own, 0.0) * self.p0
+        state[:, kernels.S] = np.minimum(1.0 + own, 1.0)
         return state
 
-    def begin(self, dt: float, x: np.ndarray) -> tuple[Step, np.ndarray]:
-        """A step of dt [s] from here, and the variables (n,) to begin with."""
-        after = self.flow.time + dt
-        slurry = self.flow.slurry
+    def _own(self, u: np.ndarray, energy: np.ndarray) -> np.ndarray:
+        """What the variable of each node would be by itself (n,)."""
+        own = u.copy()
+        for _, rows in self.wells:
+            y, above = u[rows[0]], (energy[rows] - energy[rows].min()) / self.p0
+            own[rows] = np.maximum(y - above, 0.0) if y > 0.0 else y
+        return own
+
+    def begin(self, dt: float, x: np.ndarray, passes: bool = True) -> tuple[Step, np.ndarray]:
+        """A step of dt [s] from here, and the variables (n,) to begin with. passes: time does, else conditions are
+        those of now."""
+        flow = self.flow
+        slurry = flow.slurry
         self.thicken = None if slurry is None else slurry.everywhere(self._gathered)
-        conditions = self.flow.conditions_at(after)
+        conditions = flow.conditions_at(flow.time + dt if passes else flow.time)
         does, value = conditions[self.condition].T
         energy = self.state_of(self.u, x)[:, kernels.E]
         level = (does == kernels.SURFACE) & (value > energy)
         known = level | (does == kernels.PRESSURE)
         u = np.where(known, np.where(level, value - energy, value) / self.p0, self.u)
-        return Step(self.flow.time, after, self.fluid, conditions, known), u
+        asked = []
+        for well, rows in self.wells:
+            one = flow.asked_of(well, flow.time, dt, passes)
+            if one.pressure is not None:
+                known[rows], u[rows[0]] = True, (one.pressure + float(np.ptp(energy[rows]))) / self.p0
+            asked.append(one)
+        return Step(flow.time, flow.time + dt, self.fluid, conditions, known, asked), u
 
     def show(self, state: np.ndarray) -> None:
         """Loads are those of this state from now on."""
         self.flow.state[:] = state[self.held_rows]
 
     def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
-        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, 2)."""
-        corners = np.ascontiguousarray(x[self.at].reshape(self.m, 8))
-        begin, table = 8 * np.arange(self.m), np.empty((self.m, kernels.CHANNEL))
-        kernels.geometry(1, begin, begin + 4, self.law, self.laws, corners, self.flow.viscosity, table)
+        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
+        table = self._table_at(x)
         if self.thicken is not None:
             self.thicken(self.ends, table)
         does, value = step.conditions[self.condition].T
         state = self.state_of(u, x)
-        q, lost = np.empty(self.m), np.zeros(self.m)
-        since = self.flow.since[self.channels]
+        q, lost = np.empty(len(table)), np.zeros(len(table))
+        since = self.flow.since[self.channels][self.of]
         leaks = bool(np.isfinite(since).any())
         wet = state.copy()
         wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
@@ -185,10 +229,81 @@ class Fluid:
         dry = (does == kernels.RATE) & (value < 0.0) & ((u + 1.0) * scale <= residual)
         held = step.known | out | dry
         residual = np.where(step.known, 0.0, np.where(out, u * scale, np.where(dry, (u + 1.0) * scale, residual)))
-        head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
-        level = np.bincount(self.end, (table[:, kernels.CONDUCT] * head)[self.both], self.n) * dt
         sizes = np.abs(stored) + passing + gone + np.abs(rate) + ROUNDING * np.abs(fluid)
-        return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, table, q, lost)
+        pumped = [
+            self._well_lacks(rows, asked, u, (plain, volume, state[:, kernels.E]), residual, held, sizes)
+            for (_, rows), asked in zip(self.wells, step.asked)
+        ]
+        head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
+        level = np.bincount(self.end, (np.abs(table[:, kernels.CONDUCT]) * head)[self.both], self.n) * dt
+        return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost)
+
+    def _well_lacks(
+        self, rows: np.ndarray, asked: Asked, u: np.ndarray, of: tuple[np.ndarray, np.ndarray, np.ndarray],
+        residual: np.ndarray, held: np.ndarray, sizes: np.ndarray,
+    ) -> float | None:  # fmt: skip
+        """The equation of a well goes to its first node; of: plain, volume and energy of all nodes. What came in [m2];
+        None: what the nodes lack, as their pressure is given."""
+        plain, volume, energy = of
+        first, y = rows[0], u[rows[0]]
+        residual[rows] = 0.0
+        sizes[first] += abs(asked.amount)
+        if asked.pressure is not None:
+            return None
+        came, room = float(plain[rows].sum()), max(float(volume[rows].sum()), 1e-300)
+        lacks = came - asked.amount
+        if asked.amount > 0.0 and math.isfinite(asked.limit):
+            over = y - (asked.limit + float(np.ptp(energy[rows]))) / self.p0
+            # Compared by what it would store: a larger weight lets Newton's method jump over the limit and back.
+            at_limit = (over * room * self.p0 / self.bulk, over * room, None)
+            ways = [(lacks, lacks, asked.amount), at_limit, (came, came, 0.0)]
+            _, lacks, found = sorted(ways, key=lambda one: one[0])[1]
+        elif asked.amount < 0.0 and (y + 1.0) * room <= lacks:
+            lacks, found = (y + 1.0) * room, None
+        else:
+            found = asked.amount
+        residual[first] = lacks
+        held[rows] = found is None
+        return found
+
+    def _table_at(self, x: np.ndarray) -> np.ndarray:
+        """Apertures, conductances and halves of volumes of links (l, kernels.CHANNEL) at these positions (nn, dim)."""
+        dim, table = self.dim, np.empty((len(self.ends), kernels.CHANNEL))
+        width = self.at.shape[1] * dim
+        corners = np.ascontiguousarray(x[self.at].reshape(self.m, width))
+        begin, args = width * np.arange(self.m), (self.law, self.laws, corners, self.flow.viscosity, table)
+        if dim == 2:
+            kernels.geometry(1, begin, begin + 4, *args)
+        else:
+            near = begin[:, None] + 3 * np.arange(3)
+            kernels_space.geometry(1, near, near + 9, *args)
+        return table
+
+    def _opens(self, x: np.ndarray, delta: np.ndarray) -> np.ndarray:
+        """Derivatives of apertures delta (m,) of channels by the positions of their corners `at`, (m, dim corners)."""
+        law = self.laws[self.law[:: LINKS[self.dim]]]
+        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
+        dilate = law[:, kernels.DILATE, None]
+        at, k = x[self.at], self.dim
+        near, far = at[:, :k], at[:, k:]
+        if k == 2:
+            way = 0.5 * ((near[:, 1] + far[:, 0]) - (near[:, 0] + far[:, 1]))
+            h = np.hypot(way[:, 0], way[:, 1])
+            across, along = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None], way / h[:, None]
+            slip = 0.5 * ((((far[:, 1] - near[:, 0]) + (far[:, 0] - near[:, 1])) * along).sum(axis=1))
+            size, along = np.abs(slip), np.sign(slip)[:, None] * along
+        else:
+            middle = 0.5 * (near + far[:, [0, 2, 1]])
+            across = np.cross(middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0])
+            across /= np.linalg.norm(across, axis=1)[:, None]
+            away = (far.sum(axis=1) - near.sum(axis=1)) / 3.0
+            slip = away - (away * across).sum(axis=1)[:, None] * across
+            size = np.linalg.norm(slip, axis=1)
+            along = slip / np.maximum(size, 1e-300)[:, None]
+        gains = law[:, kernels.DILATE] * size < law[:, kernels.GAIN]
+        opens = across + np.where(gains[:, None], dilate, 0.0) * along
+        side = np.repeat([-1.0, 1.0], k)[:, None] / k
+        return (np.where(moves, 1.0, 0.0)[:, None, None] * side * opens[:, None, :]).reshape(self.m, -1)
 
     # ---- derivatives ---------------------------------------------------------------------------------------------
 
@@ -197,23 +312,30 @@ class Fluid:
         nodes: of channels, on rank 0, of faces of this rank, and of nodes, on rank 0."""
         rank = self.flow.blocks.comm.rank
         mine = slice(None) if rank == 0 else slice(0, 0)
-        own = self._own_pieces(now, u, first)
+        own = [Pieces(one.key[mine], one.node[mine], one.stiffness[mine]) for one in self._own_pieces(now, u, first)]
         return [
-            self._channel_pieces(step, now, u, x, first, mine),
-            Pieces(own.key[mine], own.node[mine], own.stiffness[mine]),
-            self._face_pieces(u, x, first),
-        ]
+            self._channel_pieces(step, now, u, x, first, mine), *own,
+            self._face_pieces(self._rises(u, now)[0], x, first),
+        ]  # fmt: skip
 
-    def _rises(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of pressure and saturation by u."""
-        return np.where(u > 0.0, self.p0, 0.0), np.where(u > 0.0, 0.0, 1.0)
+    def _rises(self, u: np.ndarray, now: Balance) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of pressure and saturation (n,) by the variable that counts for each node."""
+        full = (u > 0.0)[self.first]
+        pressed = full & (~self.tied | (now.state[:, kernels.P] > 0.0))
+        return np.where(pressed, self.p0, 0.0), np.where(full, 0.0, 1.0)
 
-    def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> Pieces:
-        p_u, s_u = self._rises(u)
-        diagonal = np.where(now.held, np.maximum(now.volume, 1e-300), now.volume * (s_u + p_u / self.bulk))
-        stiffness = np.zeros((self.n, 2, 2))
-        stiffness[:, 0, 0] = diagonal
-        return Pieces(np.arange(self.n), first + np.arange(self.n)[:, None], stiffness)
+    def _own_pieces(self, now: Balance, u: np.ndarray, first: int) -> list[Pieces]:
+        """Of storage; and nodes whose variable is another's are no unknowns of their own."""
+        p_u, s_u = self._rises(u, now)
+        room = np.maximum(now.volume, 1e-300)
+        diagonal = np.where(now.held, room, now.volume * (s_u + p_u / self.bulk))
+        tied = np.flatnonzero(self.tied)
+        made = []
+        for key, node, values in ((np.arange(self.n), self.first, diagonal), (tied, tied, room[tied])):
+            stiffness = np.zeros((len(key), self.dim, self.dim))
+            stiffness[:, 0, 0] = values
+            made.append(Pieces(key, first + node[:, None], stiffness))
+        return made
 
     def _channel_pieces(
         self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int, mine: slice
@@ -222,12 +344,12 @@ class Fluid:
         ends, state = self.ends[mine], now.state
         delta, conduct, half, weight = now.table[mine].T
         m, dt = len(ends), step.dt
-        p_u, s_u = self._rises(u)
-        s_u = np.where(u > -1.0, s_u, 0.0)
+        p_u, s_u = self._rises(u, now)
+        s_u = np.where(u[self.first] > -1.0, s_u, 0.0)
         p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
         s = np.maximum(s, 0.0)
         head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1]) * weight
-        mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
+        mean, down = 0.5 * (s[:, 0] + s[:, 1]), (head > 0.0) == (conduct > 0.0)
         up = np.where(down, s[:, 0], s[:, 1])
         wet = np.minimum(mean, up)
         part, slope = wet * wet * (3.0 - 2.0 * wet), 6.0 * wet * (1.0 - wet)
@@ -247,43 +369,38 @@ class Fluid:
                 (now.lost[mine][at] / over)[:, None] * p_u[ends[at]]
                 + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
             )
-        a, b, c, d = (x[self.at[mine, k]] for k in range(4))
-        way = 0.5 * ((b + c) - (a + d))
-        h = np.hypot(way[:, 0], way[:, 1])
-        across = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None]
-        law = self.laws[self.law[mine]]
-        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
-        along = way / h[:, None]
-        slip = 0.5 * ((((d - a) + (c - b)) * along).sum(axis=1))
-        gains = law[:, kernels.DILATE] * np.abs(slip) < law[:, kernels.GAIN]
-        opens = across + np.where(gains, law[:, kernels.DILATE] * np.sign(slip), 0.0)[:, None] * along
-        by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * opens[:, None, :]
-        by_x = by_x.reshape(m, 8)  # of the aperture
-        first_row = 8 if self.flow.blocks.options.mechanical else 0  # blocks that stand still need no columns
+        by_x = self._opens(x, now.table[:: LINKS[self.dim], kernels.APERTURE])[self.of][mine]
+        # Blocks that stand still need no columns.
+        dim, first_row = self.dim, by_x.shape[1] if self.flow.blocks.options.mechanical else 0
         fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
-        out = np.zeros((m, first_row + 4, first_row + 4))
+        out = np.zeros((m, first_row + 2 * dim, first_row + 2 * dim))
         for end in range(2):
-            row = first_row + 2 * end
-            out[:, row, first_row::2] = sign[end] * dt * by_u + leak_u
+            row = first_row + dim * end
+            out[:, row, first_row::dim] = sign[end] * dt * by_u + leak_u
             if first_row:
                 stored = half / delta * fill[ends[:, end]]
-                out[:, row, :8] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
+                out[:, row, :first_row] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
             out[now.held[ends[:, end]], row, :] = 0.0
-        nodes = np.column_stack([self.at[mine], first + ends]) if first_row else first + ends
-        return Pieces(self.channels[mine], nodes, out)
+        of_fluid = first + self.first[ends]
+        nodes = np.column_stack([self.at[self.of][mine], of_fluid]) if first_row else of_fluid
+        return Pieces(self.channels[self.of][mine], nodes, out)
 
-    def _face_pieces(self, u: np.ndarray, x: np.ndarray, first: int) -> Pieces:
-        """Of the forces on faces by the variables at their ends: kernels.loads."""
+    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, first: int) -> Pieces:
+        """Of the forces on faces by the variables at their ends: kernels.loads. p_u (n,): derivatives of pressures."""
         k = len(self.face_key)
-        p_u = np.where(u > 0.0, self.p0, 0.0)[self.face_node]
-        one, two = x[self.face_at[:, 0]], x[self.face_at[:, 1]]
-        normal = np.column_stack([two[:, 1] - one[:, 1], one[:, 0] - two[:, 0]])
-        out = np.zeros((k, 8, 8))
-        for end in range(2):
-            for by in range(2):
-                weight = (2.0 if end == by else 1.0) / 6.0 * p_u[:, by]
-                out[:, 2 * end : 2 * end + 2, 4 + 2 * by] = weight[:, None] * normal
-        return Pieces(self.face_key, np.column_stack([self.face_at, first + self.face_node]), out)
+        p_u = p_u[self.face_node]
+        at, dim = x[self.face_at], self.dim
+        way = at[:, 1:] - at[:, :1]
+        if dim == 2:
+            normal = np.column_stack([way[:, 0, 1], -way[:, 0, 0]]) / 6.0
+        else:
+            normal = np.cross(way[:, 0], way[:, 1]) / 24.0
+        out = np.zeros((k, 2 * dim * dim, 2 * dim * dim))
+        for end in range(dim):
+            for by in range(dim):
+                weight = (2.0 if end == by else 1.0) * p_u[:, by]
+                out[:, dim * end : dim * end + dim, dim * (dim + by)] = weight[:, None] * normal
+        return Pieces(self.face_key, np.column_stack([self.face_at, first + self.first[self.face_node]]), out)
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 
@@ -292,8 +409,14 @@ class Fluid:
         flow = self.flow
         does, value = step.conditions[self.condition].T
         rate = np.where(does == kernels.RATE, value, 0.0) * step.dt
-        given = np.where(now.held, now.plain, rate)
-        fluid = np.where(now.held, now.fluid, now.fluid - now.plain + rate)
+        as_found = now.held | self.tied
+        given = np.where(as_found, now.plain, rate)
+        fluid = np.where(as_found, now.fluid, now.fluid - now.plain + rate)
+        for (well, rows), came in zip(self.wells, now.pumped):
+            missing = 0.0 if came is None else came - float(now.plain[rows].sum())
+            given[rows[0]] = now.plain[rows[0]] + missing
+            fluid[rows[0]] = now.fluid[rows[0]] + missing
+            self._note_well(well, rows, step, now.state, float(now.plain[rows].sum()) if came is None else came)
         gone = np.bincount(self.end, now.lost[self.both], self.n)
         mine = np.searchsorted(self.numbers, flow.number)
         nodes = flow.nodes
@@ -303,10 +426,19 @@ class Fluid:
         nodes[:, kernels.INFLOW] = given[mine] / step.dt
         self.show(now.state)
         if flow.carried is not None:
-            flow.carried = step.dt * now.q[np.searchsorted(self.channels, flow.channels_here)]
-        self.fluid, self.u = fluid, np.where(now.state[:, kernels.P] > 0.0, now.state[:, kernels.P] / self.p0,
-                                             now.state[:, kernels.S] - 1.0)  # fmt: skip
+            each = LINKS[self.dim]
+            of = each * np.searchsorted(self.channels, flow.channels_here)
+            flow.carried = step.dt * now.q[(of[:, None] + np.arange(each)).reshape(-1)]
+        p, s = now.state[:, kernels.P], now.state[:, kernels.S]
+        self.fluid, self.u = fluid, self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
         flow.time = step.after
+
+    def _note_well(self, well: Well, rows: np.ndarray, step: Step, state: np.ndarray, came: float) -> None:
+        """What a well did in a step."""
+        well.pressure = float(state[rows[np.argmax(state[rows, kernels.E])], kernels.P])
+        well.rate = came / step.dt
+        well.injected += came
+        self.flow.tell_stage(well, step.before, step.after)
 
 
 def reference_pressure(flow: Flow, stress: float) -> float:
@@ -315,8 +447,10 @@ def reference_pressure(flow: Flow, stress: float) -> float:
     used = table[np.unique(flow.condition)]
     pressures = used[used[:, 0] == kernels.PRESSURE, 1]
     own = flow.state[: flow.owned, kernels.P].max(initial=0.0)
-    o = flow.blocks.options
-    points = flow.blocks.the_mesh().points[flow.network.nodes]
-    energy = flow.fluid("fluid_density") * np.ptp(points @ np.array([o.gx, o.gy])) if len(points) else 0.0
+    held = [flow.asked_of(well, flow.time, 0.0, False) for well in flow.wells]
+    of_wells = max((one.pressure for one in held if one.pressure is not None), default=0.0)
+    o, mesh = flow.blocks.options, flow.blocks.the_mesh()
+    points, gravity = mesh.points[flow.network.nodes], np.array([o.gx, o.gy, o.gz][: mesh.dim])
+    energy = flow.fluid("fluid_density") * np.ptp(points @ gravity) if len(points) else 0.0
     largest = float(flow.blocks.comm.max_into(np.array([own]))[0])
-    return max(largest, float(pressures.max(initial=0.0)), float(energy), stress, LEAST_PRESSURE)
+    return max(largest, float(pressures.max(initial=0.0)), of_wells, float(energy), stress, LEAST_PRESSURE)

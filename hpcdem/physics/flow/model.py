@@ -30,7 +30,7 @@ from hpcdem.physics.flow.network import LINKS, Network, at_nodes, links_of, wet_
 from hpcdem.physics.flow.properties import FLUID, POROUS
 from hpcdem.physics.flow.wells import PRESSURE as HELD
 from hpcdem.physics.flow.wells import QUANTITIES as OF_WELLS
-from hpcdem.physics.flow.wells import RATE, Stage, Well
+from hpcdem.physics.flow.wells import RATE, Asked, Stage, Well
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -134,7 +134,7 @@ class Flow(SurfaceLoad):
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
         self.dt = self.implicit_dt = 0.0
-        self.since_peak = 0
+        self.since_peak = self.passed = 0
         self._network: Network | None = None
         self._reshaped = False
         self._found_for: list[float] = []
@@ -784,7 +784,10 @@ class Flow(SurfaceLoad):
         surface = [row for row in np.unique(self.condition).tolist() if conditions[row].does == kernels.SURFACE]
         if surface and not any(self._gravity()):
             raise CommandError("flow-surface needs gravity: model gravity comes first")
+        self.check_wells()
 
+    def check_wells(self) -> None:
+        """CommandError for one that would pump into nothing."""
         for well in self.wells:
             if well.will_act(self.time) and not self.network.there[well.points].any():
                 raise CommandError(f"well '{well.name}' has no flow node any more: what was around it is taken out")
@@ -840,7 +843,7 @@ class Flow(SurfaceLoad):
 
     def _pump(self, before: float) -> None:
         """What wells did since then."""
-        there, log = self.network.there, self.blocks.log
+        there = self.network.there
         points = [well.points[there[well.points]] for well in self.wells]
         at = np.concatenate(points)
         row = np.minimum(np.searchsorted(self.number, at), max(len(self.number) - 1, 0))
@@ -855,15 +858,27 @@ class Flow(SurfaceLoad):
         for well, begin, end in zip(self.wells, [0, *ends[:-1].tolist()], ends.tolist()):
             if end > begin:
                 after[begin:end] = well.filled(room[:, begin:end], before, self.time, bulk, value_at)
-            stage = well.number(self.time)
-            if log is not None and stage != well.number(before):
-                does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage any more"
-                log.info(f"well '{well.name}': {f'stage {stage}, ' * bool(stage)}{does}, at {self.time:.6g} s of flow")
+            self.tell_stage(well, before, self.time)
         came = (after - room[0])[mine]
         self.nodes[row, kernels.W] = after[mine]
         self.nodes[row, kernels.GIVEN] += came
         self.nodes[row, kernels.INFLOW] = came / (self.time - before)
         self._find_state(row)
+
+    def tell_stage(self, well: Well, before: float, after: float) -> None:
+        """A word in the log if another stage of a well is on than before."""
+        stage, log = well.number(after), self.blocks.log
+        if log is not None and stage != well.number(before):
+            does = well.stages[stage - 1].does.replace("_", "-") if stage else "no stage any more"
+            log.info(f"well '{well.name}': {f'stage {stage}, ' * bool(stage)}{does}, at {after:.6g} s of flow")
+
+    def asked_of(self, well: Well, time: float, dt: float, passes: bool) -> Asked:
+        """What a well does in an implicit step of dt [s] from this time on; passes: time does, else in so long by what
+        it does now. Not collective."""
+        value = partial(said.now, self.blocks.tables)
+        if passes:
+            return well.asked(time, time + dt, value)
+        return well.asked_now(time, dt, value)
 
     @property
     def _condition(self) -> np.ndarray:
@@ -922,7 +937,7 @@ class Flow(SurfaceLoad):
             "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
             "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
-            "implicit_dt": self.implicit_dt, "since_peak": self.since_peak,
+            "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
         }  # fmt: skip
 
@@ -951,7 +966,7 @@ class Flow(SurfaceLoad):
         made.removed, made.time = dict(state["removed"]), state["time"]
         made.cycles, made.waited = state["cycles"], state["waited"]
         made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
-        made.since_peak = state.get("since_peak", 0)
+        made.since_peak, made.passed = state.get("since_peak", 0), state.get("passed", 0)
         made._reshaped, made._found_for = state["reshaped"], state["found_for"]
         channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
         made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]

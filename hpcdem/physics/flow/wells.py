@@ -39,6 +39,16 @@ class Stage:
     limit: float = math.inf
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a well does in an implicit step: the pressure at its highest node [Pa], or None and an amount [m2]
+    (negative: drawn) that leads to no more than a limit [Pa]."""
+
+    pressure: float | None
+    amount: float
+    limit: float
+
+
 @dataclass
 class Well:
     """points (n,): of the mesh, ascending; see `QUANTITIES` for the rest."""
@@ -72,9 +82,32 @@ class Well:
         """Whether something is pumped or held from this time on."""
         return any(one.does != SHUT and one.end > time for one in self.stages)
 
-    def pumping(self, before: float, after: float) -> list[Stage]:
-        """Stages with a rate that are on at some time between these two."""
-        return [one for one in self.stages if one.does == RATE and one.begin < after and one.end > before]
+    def next_change(self, time: float) -> float:
+        """The first time after this one at which a stage begins or ends; inf: there is none."""
+        ends = [end for one in self.stages for end in (one.begin, one.end)]
+        return min((end for end in ends if end > time * (1.0 + 1e-12)), default=math.inf)
+
+    def pumped(self, before: float, after: float, value: Callable[[Number, float], float]) -> tuple[float, float]:
+        """Volume [m2] that stages with a rate bring between two times, and the pressure [Pa] that it may lead to."""
+        rates = [one for one in self.stages if one.does == RATE and one.begin < after and one.end > before]
+        amount = math.fsum(
+            value(one.value, min(after, one.end)) * (min(after, one.end) - max(before, one.begin)) for one in rates
+        )
+        return amount, min((one.limit for one in rates), default=math.inf)
+
+    def asked(self, before: float, after: float, value: Callable[[Number, float], float]) -> Asked:
+        """What it does in an implicit step, in which no stage ends."""
+        number = self.number(0.5 * (before + after))
+        if number and (one := self.stages[number - 1]).does == PRESSURE:
+            return Asked(value(one.value, after), 0.0, math.inf)
+        return Asked(None, *self.pumped(before, after, value))
+
+    def asked_now(self, time: float, dt: float, value: Callable[[Number, float], float]) -> Asked:
+        """What it would do for so long [s] by the stage that is on from this time on."""
+        one = next((one for one in self.stages if one.begin <= time < one.end), Stage(SHUT))
+        if one.does == PRESSURE:
+            return Asked(value(one.value, time), 0.0, math.inf)
+        return Asked(None, dt * value(one.value, time) if one.does == RATE else 0.0, one.limit)
 
     def filled(
         self, room: np.ndarray, before: float, after: float, bulk: float, value: Callable[[Number, float], float]
@@ -89,11 +122,8 @@ class Well:
             head = value(stage.value, after) + top
             found = volume * (1.0 + (head - energy) / bulk)
         else:
-            rates = self.pumping(before, after)
-            target = w + math.fsum(
-                value(one.value, min(after, one.end)) * (min(after, one.end) - max(before, one.begin)) for one in rates
-            )
-            target, limit = max(target, 0.0), min((one.limit for one in rates), default=math.inf)
+            amount, limit = self.pumped(before, after, value)
+            target = max(w + amount, 0.0)
             if math.isfinite(limit):
                 most = math.fsum((volume * (1.0 + (limit + top - energy) / bulk)).tolist())
                 target = min(target, max(most, w))

@@ -19,7 +19,7 @@ from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
 
 DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
-SOLIDS, FACES = "solids", "faces"
+SOLIDS, FACES, RODS = "solids", "faces", "rods"
 """In space."""
 INSIDE = ("contacts", "bonds", "joints", "channels")
 """Objects that lie between others."""
@@ -63,9 +63,10 @@ def unit_of(name: str, dim: int = 2) -> str:
 class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
     in the fourth column of triangles) or lines (ends (n, 2, 2)); in space tetrahedra (points (k, 3), cells (n, 4), the
-    face (4 n,) that each of their faces lies on, or -1) or faces (points (k, 3), cells (n, 4) as polygons), read when
-    it is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer
-    field; number: the field by which the program numbers them; slow: fields that take a pass over other tables."""
+    face (4 n,) that each of their faces lies on, or -1), faces (points (k, 3), cells (n, 4) as polygons) or rods (ends
+    (n, 2, 3)), read when it is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of
+    the values of an integer field; number: the field by which the program numbers them; slow: fields that take a pass
+    over other tables."""
 
     kind: str
     count: int
@@ -79,14 +80,14 @@ class Objects:
     @property
     def dim(self) -> int:
         """Dimensions of space."""
-        return 3 if self.kind in (SOLIDS, FACES) else 2
+        return 3 if self.kind in (SOLIDS, FACES, RODS) else 2
 
     def centres(self) -> np.ndarray:
         """(n, 2), in space (n, 3) [m]."""
         shape = self.read()
         if self.kind == DISCS:
             return shape[0]
-        if self.kind == LINES:
+        if self.kind in (LINES, RODS):
             return shape[0].mean(axis=1)
         points, cells = shape[:2]
         last = np.where(cells[:, 3] >= 0, cells[:, 3], cells[:, 0])
@@ -163,7 +164,7 @@ class Moment:
                 continue
             shape = objects.read()
             at = shape[0] if shifted is None or name != "elements" else shape[0] + shifted
-            at = at.reshape(-1, 2) if turn is None else at @ turn[:2].T
+            at = at.reshape(-1, 2) if turn is None else at.reshape(-1, 3) @ turn[:2].T
             around = shape[1][:, None] if objects.kind == DISCS else 0.0
             low = np.fmin(low, np.nanmin(np.where(np.isfinite(at), at, np.nan) - around, axis=0))
             high = np.fmax(high, np.nanmax(np.where(np.isfinite(at), at, np.nan) + around, axis=0))
@@ -377,11 +378,12 @@ VECTORS = ("displacement", "velocity")
 def _supports(name: str, tables: Mapping[str, Mapping[str, np.ndarray]]) -> Objects:
     """The elements of bolts, or of liners without those that were deleted."""
     nodes, elements = tables["nodes"], tables["elements"]
-    at = np.column_stack([nodes["position_x"], nodes["position_y"]])
+    at = np.column_stack([nodes[f"position_{axis}"] for axis in "xyz" if f"position_{axis}" in nodes])
     first = elements["first_node"]
     rows = np.arange(len(first))
     if name == "liners":
         rows = np.flatnonzero(elements["liner_state"].astype(np.int64) & liners.DELETED == 0)
     last = elements.get("last_node", first + 1)
     ends = np.stack([at[first[rows]], at[last[rows]]], axis=1)
-    return Objects(LINES, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()})
+    kind = RODS if ends.shape[2] == 3 else LINES
+    return Objects(kind, len(rows), lambda: (ends,), {k: v[rows] for k, v in elements.items()})

@@ -15,7 +15,7 @@ from hpcdem.io.axes import View
 from hpcdem.post import blocks
 from hpcdem.post.view.filter import chosen, refusal
 from hpcdem.post.view.model import Layer, ModelView
-from hpcdem.post.view.moment import DISCS, LINES, SOLIDS, Moment, Objects, lengths, unit_of
+from hpcdem.post.view.moment import DISCS, LINES, RODS, SOLIDS, Moment, Objects, lengths, unit_of
 
 STEPS = 256
 """Colours of a field."""
@@ -25,6 +25,10 @@ INK = {"contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": 
 """Of lines without a field."""
 WIDTH = {"walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2}
 """Of lines [points], at size 1."""
+POINT = 1.0 / 480.0
+"""Of rods: a point, over the width of the picture."""
+THROUGH = 0.35
+"""Opacity of elements around rods."""
 MOST_ARROWS = 3000
 """Of a picture: with more objects some are left out, every k-th is shown."""
 ARROW = 0.05
@@ -96,11 +100,16 @@ class Scene:
 
 
 def default_view(moment: Moment) -> ModelView:
-    """Everything that the frame has, as it is usually shown; contacts and bonds are there, and hidden."""
+    """Everything that the frame has, as it is usually shown; contacts and bonds are there, and hidden. Rods shine
+    through the elements around them."""
     hidden = ("contacts", "bonds")
+    inside = any(objects.kind == RODS for objects in moment.objects.values())
     return ModelView(
-        layers=tuple(Layer(object=name, visible=name not in hidden) for name in OBJECTS if name in moment.objects)
-    )
+        layers=tuple(
+            Layer(object=name, visible=name not in hidden, opacity=THROUGH if inside and name == "elements" else 1.0)
+            for name in OBJECTS if name in moment.objects
+        )
+    )  # fmt: skip
 
 
 def view_in_space(moment: Moment, title: str | None = None) -> ModelView:
@@ -289,6 +298,10 @@ def painted(
         result.shape = whole[0][rows], layer.size * whole[1][rows]
     elif objects.kind == LINES:
         result.shape = (whole[0][rows],)
+    elif objects.kind == RODS:
+        from hpcdem.post.view import space
+
+        result.shape = space.rods(whole[0][rows], 0.5 * result.width * POINT * max(seen.width, seen.height), plane)
     else:
         points = whole[0] if shifted is None else whole[0] + shifted
         if objects.dim == 3:

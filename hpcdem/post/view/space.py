@@ -8,6 +8,9 @@ import numpy as np
 
 from hpcdem.core.looks import Section
 
+SIDES = 6
+"""Of a bar."""
+
 
 class Skin(NamedTuple):
     """What is seen of some elements: points (k, 3) [m]; cells (m, 4) rows of points, -1 in the fourth column of
@@ -78,6 +81,23 @@ def _bare(points: np.ndarray, cells: np.ndarray, of: np.ndarray, cut: np.ndarray
     used, corner = np.unique(np.where(cells < 0, cells[:, :1], cells), return_inverse=True)
     corner = corner.reshape(cells.shape)
     return Skin(points[used], np.where(cells < 0, -1, corner), of, cut)
+
+
+def rods(ends: np.ndarray, radius: float, plane: tuple[np.ndarray, np.ndarray] | None = None) -> Skin:
+    """Bars (n, 2, 3) [m] as prisms of `SIDES` sides, without ends, less what the plane takes away."""
+    way = ends[:, 1] - ends[:, 0]
+    along = way / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+    least = np.eye(3)[np.argmin(np.abs(along), axis=1)]
+    across = np.cross(along, least)
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    turn = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    around = np.cos(turn)[:, None] * across[:, None] + np.sin(turn)[:, None] * np.cross(along, across)[:, None]
+    points = (ends[:, :, None] + radius * around[:, None]).reshape(-1, 3)
+    first = 2 * SIDES * np.arange(len(ends))[:, None]
+    a, b = first + np.arange(SIDES), first + (np.arange(SIDES) + 1) % SIDES
+    three = np.stack([np.stack([a, b, b + SIDES], axis=2), np.stack([a, b + SIDES, a + SIDES], axis=2)], axis=2)
+    found = cut_faces(points, three.reshape(-1, 3), plane)
+    return found._replace(of=found.of // (2 * SIDES))
 
 
 def middles(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

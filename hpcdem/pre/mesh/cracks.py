@@ -1,4 +1,5 @@
-"""Cracks and layers on a mesh that was made without them: which of its edges follow a line."""
+"""Cracks and layers on a mesh that was made without them: which of its edges, in space faces, follow a line or
+surface."""
 
 from __future__ import annotations
 
@@ -6,15 +7,17 @@ import heapq
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.physics.fdem.connectivity import Edges, find_edges
+from hpcdem.physics.fdem.connectivity import Edges
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.pre.mesh.fractures import Fractures
 from hpcdem.pre.mesh.geometry import Curve, arc_of, distance_to_segment
+from hpcdem.pre.mesh.solids import Disc, on_surface
 
 TOLERANCE = 1e-6
 """An edge lies on a line if it keeps to it within this part of its own length."""
@@ -61,29 +64,60 @@ def _box(p: np.ndarray, q: np.ndarray, bulge: float) -> tuple[np.ndarray, np.nda
 
 def with_layer(mesh: Mesh, name: str, pairs: np.ndarray) -> Mesh:
     """The mesh with these edges added to one of its layers."""
-    old = mesh.layers.get(name, np.empty((0, 2), np.int64))
+    old = mesh.layers.get(name, np.empty((0, mesh.dim), np.int64))
     layers = dict(mesh.layers) | {name: np.unique(np.concatenate([old, np.sort(pairs, axis=1)]), axis=0)}
     return replace(mesh, layers=layers)
 
 
 def with_cracks(mesh: Mesh, pairs: np.ndarray, number: int) -> Mesh:
-    """The mesh with cracks on these edges (k, 2), in the fracture set `number`; edges at a surface are passed over.
+    """The mesh with cracks on these edges (k, 2), in space faces (k, 3), in the fracture set `number`; those at a
+    surface are passed over.
 
     An edge that has a crack already keeps its set.
     """
     edges = mesh.edges()
-    rows = find_edges(edges, pairs, len(mesh.points))
+    rows = mesh.find_edges(edges, pairs)
     if (rows < 0).any():
-        p, q = pairs[np.flatnonzero(rows < 0)[0]]
-        raise HpcdemError(f"no element has an edge between points {p} and {q}")
+        lost = " and ".join(map(str, pairs[np.flatnonzero(rows < 0)[0]]))
+        raise HpcdemError(f"no element has an edge between points {lost}")
     new = edges.points[rows[edges.inner[rows]]]
     made = Mesh.of(
-        np.empty((0, 2)),
+        np.empty((0, mesh.dim)),
         np.empty((0, 4)),
         cracks=np.concatenate([mesh.cracks, new]),
         crack_sets=np.concatenate([mesh.crack_sets, np.full(len(new), number, np.int64)]),
     )
     return replace(mesh, cracks=made.cracks, crack_sets=made.crack_sets)
+
+
+def faces_on(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
+    """(k, 3) i8 points of the faces that lie on surfaces or those of bodies, in space."""
+    edges = mesh.edges()
+    slack = TOLERANCE * float(np.ptp(mesh.points, axis=0).max())
+    at = mesh.points[edges.points]
+    on = np.any([on_surface(one, at, slack) for one in surfaces], axis=0)
+    return np.sort(edges.points[on], axis=1)
+
+
+def between_sides(mesh: Mesh, surfaces: Sequence[Any]) -> np.ndarray:
+    """(k, 3) i8 points of the inner faces whose elements have their middles on different sides of a surface, and their
+    own middle over it: a rough face about it, without holes and in one piece, of about 1.75 times its area."""
+    edges = mesh.edges()
+    inner = np.flatnonzero(edges.inner)
+    sides = edges.faces[inner] // 4
+    middle = mesh.centroids()
+    at = mesh.points[edges.points[inner]].mean(axis=1)
+    tree = cKDTree(at)
+    found = []
+    for one in surfaces:
+        if not one.surface:
+            raise CommandError("follow is for polygons, discs and planes, which have two sides")
+        (place, normal), rows = one.plane(), np.arange(len(inner))
+        if isinstance(one, Disc):  # what lies farther than an element from it cannot be about it
+            rows = np.array(sorted(tree.query_ball_point(place, one.radius + mesh.mean_edge() * 3.0)), np.int64)
+        over = (middle[sides[rows]] - place) @ normal >= 0.0
+        found.append(rows[(over[:, 0] != over[:, 1]) & (one.beyond(at[rows]) <= 0.0)])
+    return np.sort(edges.points[inner[np.unique(np.concatenate(found))]], axis=1)
 
 
 def follow(mesh: Mesh, fractures: Fractures) -> Mesh:

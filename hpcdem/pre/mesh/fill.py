@@ -8,7 +8,6 @@ the middle and in units of the edge length, on one thread: the same input makes 
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -18,31 +17,55 @@ from typing import Any
 
 import numpy as np
 
-from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.pre.mesh import optional
+from hpcdem.core.errors import CommandError
+from hpcdem.pre.mesh import apart, optional, snap
+from hpcdem.pre.mesh import occ as shapes
 from hpcdem.pre.mesh.sizes import GROWTH, not_too_many
-from hpcdem.pre.mesh.solids import Box, Solid, Sphere, restored, state
+from hpcdem.pre.mesh.solids import restored, state
 
-HXT = 10
-"""Number of the algorithm."""
+HXT, DELAUNAY = 10, 1
+"""Numbers of algorithms: the first is five times as fast, and makes better elements about cracks."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """outline, holes: solids; size: of edges [m]; regions: (group, solids) of parts with a group of their own; refine:
-    (solids, size there [m], distance over which it grows to that of the rest [m] or None)."""
+    """outline, holes: bodies; size: of edges [m]; regions: (group, bodies) of parts with a group of their own; refine:
+    (bodies and surfaces, size there [m], distance over which it grows to that of the rest [m] or None); surfaces:
+    (layer, surfaces) that become faces of the mesh."""
 
-    outline: Sequence[Solid]
+    outline: Sequence[Any]
     size: float
-    holes: Sequence[Solid] = ()
-    regions: Sequence[tuple[str, Sequence[Solid]]] = ()
-    refine: Sequence[tuple[Sequence[Solid], float, float | None]] = field(default_factory=tuple)
+    holes: Sequence[Any] = ()
+    regions: Sequence[tuple[str, Sequence[Any]]] = ()
+    refine: Sequence[tuple[Sequence[Any], float, float | None]] = field(default_factory=tuple)
+    surfaces: Sequence[tuple[str, Sequence[Any]]] = ()
 
 
-def filled(wishes: Wishes, group: str) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Points (np, 3) [m], tetrahedra (ne, 4) and element numbers by group; `group`: of what is in no region.
-    HpcdemError where Gmsh fails, or the size makes too many elements."""
+@dataclass
+class Filled:
+    """points (np, 3) [m], tetrahedra (ne, 4), element numbers by group, faces (k, 3) by layer of surfaces, and notes
+    about what was moved to make it."""
+
+    points: np.ndarray
+    cells: np.ndarray
+    groups: dict[str, np.ndarray]
+    faces: dict[str, np.ndarray] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def filled(wishes: Wishes, group: str) -> Filled:
+    """The mesh; `group`: of what is in no region. HpcdemError where Gmsh fails, or the size makes too many elements."""
     optional.gmsh()
+    for what, of in (("the outline", wishes.outline), ("a hole", wishes.holes), *(
+        (f"region '{name}'", one) for name, one in wishes.regions
+    )):  # fmt: skip
+        flat = [one for one in of if one.surface]
+        if flat:
+            raise CommandError(f"{what} is a body, but the layer has a {type(flat[0]).__name__.lower()}, a surface")
+    for name, of in wishes.surfaces:
+        if not of or not all(one.surface for one in of):
+            raise CommandError(f"layer '{name}' has bodies; meshes are cut along polygons, discs and planes")
+    cut, notes = snap.snapped(wishes.surfaces, wishes.outline, wishes.size)
     bounds = np.array([one.bounds() for one in wishes.outline])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     not_too_many(float(np.prod((high - low) / wishes.size)) * 6.0 * np.sqrt(2.0), f"size {wishes.size:g}")
@@ -56,19 +79,14 @@ def filled(wishes: Wishes, group: str) -> tuple[np.ndarray, np.ndarray, dict[str
             [state(list(of)), size, distance or (wishes.size - size) / GROWTH or wishes.size]
             for of, size, distance in wishes.refine
         ],
+        "surfaces": [state(list(of)) for _, of in cut], "reach": float(np.linalg.norm(high - low)),
     }  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="hpcdem-") as folder:
         into = Path(folder) / "mesh.npz"
-        done = subprocess.run(
-            [sys.executable, "-m", "hpcdem.pre.mesh.fill", str(into)], input=json.dumps(said), text=True,
-            capture_output=True, check=False,
-        )  # fmt: skip
-        if done.returncode or not into.is_file():
-            told = [line for line in done.stderr.splitlines() if line.strip()]
-            why = told[-1] if told else f"it ended with {done.returncode}"
-            raise HpcdemError(f"Gmsh could not make the mesh: {why}")
+        apart.run("hpcdem.pre.mesh.fill", str(into), said=json.dumps(said), failed="Gmsh could not make the mesh")
         with np.load(into, allow_pickle=False) as found:
-            points, cells, region = found["points"], found["cells"], found["region"]
+            points, cells, region, of_layer = (found[name] for name in ("points", "cells", "region", "of_layer"))
+            faces = found["faces"]
     names = [group, *(name for name, _ in wishes.regions)]
     groups: dict[str, list[np.ndarray]] = {}
     for k, name in enumerate(names):
@@ -76,17 +94,12 @@ def filled(wishes: Wishes, group: str) -> tuple[np.ndarray, np.ndarray, dict[str
             groups.setdefault(name, []).append(np.flatnonzero(region == k))
         elif k:
             raise CommandError(f"region '{name}' holds no element: it lies outside of the body, or is too small")
-    return points, cells, {name: np.concatenate(rows) for name, rows in groups.items()}
-
-
-def _solid(occ: Any, one: Solid, middle: np.ndarray, unit: float) -> tuple[int, int]:
-    if isinstance(one, Box):
-        low, high = (one.bounds() - middle) / unit
-        return 3, occ.addBox(*low, *(high - low))
-    if isinstance(one, Sphere):
-        return 3, occ.addSphere(*((np.array(one.centre) - middle) / unit), one.radius / unit)
-    a, b = ((np.array(end) - middle) / unit for end in (one.first, one.second))
-    return 3, occ.addCylinder(*a, *(b - a), one.radius / unit)
+    on: dict[str, np.ndarray] = {}
+    for k, (name, _) in enumerate(cut):
+        on[name] = faces[of_layer == k]
+        if not len(on[name]):
+            raise CommandError(f"layer '{name}' does not cut the body")
+    return Filled(points, cells, {name: np.concatenate(rows) for name, rows in groups.items()}, on, notes)
 
 
 def _refined(gmsh: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -> None:
@@ -105,49 +118,92 @@ def _refined(gmsh: Any, said: dict[str, Any], middle: np.ndarray, unit: float) -
 
 def _main(into: str) -> None:
     said = json.load(sys.stdin)
-    gmsh = optional.gmsh()
-    gmsh.initialize(["hpcdem"], readConfigFiles=False, interruptible=False)
+    gmsh = shapes.begun()
     middle, unit = np.array(said["middle"]), float(said["size"])
     for name, value in (
-        ("General.Terminal", 0), ("General.NumThreads", 1), ("Mesh.MaxNumThreads3D", 1), ("Mesh.Algorithm3D", HXT),
-        ("Mesh.MeshSizeMax", 1.0), ("Mesh.MeshSizeFromPoints", 0), ("Mesh.MeshSizeExtendFromBoundary", 0),
+        ("Mesh.Algorithm3D", HXT), ("Mesh.MeshSizeMax", 1.0), ("Mesh.MeshSizeFromPoints", 0),
+        ("Mesh.MeshSizeExtendFromBoundary", 0),
     ):  # fmt: skip
         gmsh.option.setNumber(name, value)
     occ = gmsh.model.occ
-    body = [_solid(occ, one, middle, unit) for one in restored(said["outline"])]
+
+    def bodies(given: list[Any]) -> shapes.Tags:
+        return [tag for one in restored(given) for tag in shapes.body(occ, one, middle, unit)]
+
+    body = bodies(said["outline"])
     if len(body) > 1:
         body, _ = occ.fuse(body[:1], body[1:])
-    holes = [_solid(occ, one, middle, unit) for one in restored(said["holes"])]
+    holes = bodies(said["holes"])
     if holes:
         body, _ = occ.cut(body, holes)
     number = {tag: 0 for _, tag in body}
-    for k, solids in enumerate(said["regions"]):
-        tools = [_solid(occ, one, middle, unit) for one in restored(solids)]
+    for k, given in enumerate(said["regions"]):
+        tools = bodies(given)
         pieces = [(3, tag) for tag in number]
         _, parents = occ.fragment(pieces, tools)
         inside = {tag for of in parents[len(pieces) :] for _, tag in of}
         was = {tag: number[old] for (_, old), of in zip(pieces, parents) for _, tag in of}
         occ.remove([(3, tag) for tag in inside - was.keys()], recursive=True)
         number = {tag: k + 1 if tag in inside else old for tag, old in was.items()}
-    occ.synchronize()
     if not number:
         raise SystemExit("nothing is left of the body")
+    number, cuts = _cut(occ, said, number, middle, unit)
+    occ.synchronize()
     _refined(gmsh, said, middle, unit)
-    gmsh.model.mesh.generate(3)
+    try:
+        gmsh.model.mesh.generate(3)
+    except Exception:  # HXT gives up at tips that are sharper than it likes
+        gmsh.model.mesh.clear()
+        gmsh.option.setNumber("Mesh.Algorithm3D", DELAUNAY)
+        gmsh.model.mesh.generate(3)
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.zeros(int(tags.max()) + 1, np.int64)
     place[tags.astype(np.int64)] = np.arange(len(tags))
-    parts = []
-    for tag, region in sorted(number.items()):
-        kinds, _, nodes = gmsh.model.mesh.getElements(3, tag)
-        for kind, of in zip(kinds, nodes):
-            if kind == 4:
-                cells = place[of.astype(np.int64)].reshape(-1, 4)
-                parts.append((cells, np.full(len(cells), region)))
-    cells = np.concatenate([cells for cells, _ in parts])
-    used, cells = np.unique(cells, return_inverse=True)
+
+    def elements(of: list[tuple[int, int, int]], kind: int, corners: int) -> tuple[np.ndarray, np.ndarray]:
+        parts = [(np.empty((0, corners), np.int64), np.empty(0, np.int64))]
+        for dim, tag, mark in of:
+            for found, nodes in zip(*(gmsh.model.mesh.getElements(dim, tag)[i] for i in (0, 2)), strict=True):
+                if found == kind:
+                    rows = place[nodes.astype(np.int64)].reshape(-1, corners)
+                    parts.append((rows, np.full(len(rows), mark)))
+        return np.concatenate([rows for rows, _ in parts]), np.concatenate([marks for _, marks in parts])
+
+    cells, region = elements([(3, tag, mark) for tag, mark in sorted(number.items())], 4, 4)
+    faces, of_layer = elements([(2, tag, mark) for tag, mark in sorted(cuts.items())], 2, 3)
+    if not len(cells):
+        raise SystemExit("no elements came out; smaller ones may do")
+    used, numbers = np.unique(cells, return_inverse=True)
+    lost = ~np.isin(faces, used).all(axis=1)
+    faces, of_layer = np.searchsorted(used, faces[~lost]), of_layer[~lost]
     points = xyz.reshape(-1, 3)[used] * unit + middle
-    np.savez(into, points=points, cells=cells.reshape(-1, 4), region=np.concatenate([region for _, region in parts]))
+    np.savez(into, points=points, cells=numbers.reshape(-1, 4), region=region, faces=faces, of_layer=of_layer)
+
+
+def _cut(
+    occ: Any, said: dict[str, Any], number: dict[int, int], middle: np.ndarray, unit: float
+) -> tuple[dict[int, int], dict[int, int]]:
+    """The volumes (tag: region) cut along surfaces, and the faces (tag: layer) that these have become."""
+    tools: shapes.Tags = []
+    layer: list[int] = []
+    for k, given in enumerate(said["surfaces"]):
+        for one in restored(given):
+            made = shapes.surface(occ, one, middle, unit, said["reach"])
+            pieces, _ = occ.intersect(made, [(3, tag) for tag in number], removeTool=False)
+            flat = [tag for tag in pieces if tag[0] == 2]
+            tools += flat
+            layer += [k] * len(flat)
+    if not tools:
+        return number, {}
+    bodies = [(3, tag) for tag in number]
+    _, parents = occ.fragment(bodies, tools)
+    became = {tag: number[old] for (_, old), of in zip(bodies, parents) for dim, tag in of if dim == 3}
+    cuts: dict[int, int] = {}
+    for k, of in zip(layer, parents[len(bodies) :], strict=True):
+        for dim, tag in of:
+            if dim == 2:
+                cuts.setdefault(tag, k)
+    return became, cuts
 
 
 if __name__ == "__main__":

@@ -95,11 +95,11 @@ class Length:
         low, high = self._below(self.least), self._below(self.greatest)
         return np.clip(self._inverse(low + u * (high - low)), self.least, self.greatest)
 
-    def mean(self) -> float:
-        """E[l] after the cut-off [m]: midpoint rule over the inverse distribution, refined towards both ends."""
+    def mean(self, power: int = 1) -> float:
+        """E[l ** power] after the cut-off [m]: midpoint rule over the inverse distribution, refined at both ends."""
         # u = t2 (3 - 2 t) crowds points at both ends, where the inverse of an unbounded distribution is steep.
         t = (np.arange(100_000) + 0.5) / 100_000
-        return float((self.lengths(t * t * (3.0 - 2.0 * t)) * 6.0 * t * (1.0 - t)).mean())
+        return float((self.lengths(t * t * (3.0 - 2.0 * t)) ** power * 6.0 * t * (1.0 - t)).mean())
 
     def longest(self) -> float:
         """The greatest length that need be reckoned with [m]: all but one in 1e9 traces are shorter."""

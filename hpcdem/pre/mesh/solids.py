@@ -1,8 +1,14 @@
-"""Simple solids in space: what geometry layers hold in three dimensions. Ranges ask how far a point is from their
-surface, Gmsh is told them as they are (fill.py)."""
+"""Bodies and surfaces in space: what geometry layers hold in three dimensions. Ranges ask how far a point is from
+them, Gmsh is told them as they are (occ.py).
+
+Bodies have an inside (distances are negative there); surfaces, `Polygon`, `Disc` and `Plane`, have none: meshes are cut
+along them, and faces lie on them. All are frozen, and go into checkpoints as JSON (`state`, `restored`).
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,55 +18,113 @@ from hpcdem.core.errors import CommandError
 
 Point = tuple[float, float, float]
 
+IN_PLANE = 1e-6
+"""Corners of a polygon lie in a plane within this part of its size."""
+FULL = 360.0
+
+
+class Body:
+    """Something with an inside."""
+
+    surface = False
+
+    def check(self) -> None:
+        """CommandError if it has no volume."""
+        raise NotImplementedError
+
+    def bounds(self) -> np.ndarray:
+        """(2, 3) least and greatest coordinates [m]."""
+        raise NotImplementedError
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """(n,) distance of points (n, 3) from the surface [m], negative inside."""
+        raise NotImplementedError
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        """Distance (n,) of points (n, 3) from each smooth part of the surface [m]; a part may go on beyond the body."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
-class Box:
+class Box(Body):
     """Along the axes, between two corners [m]."""
 
     first: Point
     second: Point
 
     def check(self) -> None:
-        """CommandError if it has no volume."""
         if any(a == b for a, b in zip(self.first, self.second)):
             raise CommandError(f"a box needs two corners that differ in x, y and z, got {self.first} and {self.second}")
 
     def bounds(self) -> np.ndarray:
-        """(2, 3) least and greatest coordinates [m]."""
         return np.sort(np.array([self.first, self.second], np.float64), axis=0)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """(n,) distance of points (n, 3) from the surface [m], negative inside."""
         low, high = self.bounds()
         over = np.abs(points - 0.5 * (low + high)) - 0.5 * (high - low)
         outside = np.maximum(over, 0.0)
         return np.sqrt((outside * outside).sum(axis=1)) + np.minimum(over.max(axis=1), 0.0)
 
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        return [points[:, axis] - bound for one in self.bounds() for axis, bound in enumerate(one)]
+
 
 @dataclass(frozen=True)
-class Sphere:
+class Sphere(Body):
     """About a centre [m]."""
 
     centre: Point
     radius: float
 
     def check(self) -> None:
-        """CommandError if it has no volume."""
         if not self.radius > 0.0:
             raise CommandError(f"a sphere needs a radius above 0, got {self.radius:g}")
 
     def bounds(self) -> np.ndarray:
-        """(2, 3) least and greatest coordinates [m]."""
         return np.array(self.centre) + self.radius * np.array([[-1.0], [1.0]])
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """(n,) distance of points (n, 3) from the surface [m], negative inside."""
         way = points - np.array(self.centre)
         return np.sqrt((way * way).sum(axis=1)) - self.radius
 
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        return [self.distance(points)]
+
+
+class _Round(Body):
+    """A body of revolution about the way from `first` to `second`, by its outline in the half plane (along, from the
+    axis)."""
+
+    first: Point
+    second: Point
+
+    def outline(self) -> np.ndarray:
+        """(k, 2) corners: along the axis from `first`, distance from it [m]."""
+        raise NotImplementedError
+
+    def bounds(self) -> np.ndarray:
+        a, axis, _ = _axis(self.first, self.second)
+        ends = [a + along * axis + sign * r * np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
+                for along, r in self.outline() for sign in (-1.0, 1.0)]  # fmt: skip
+        return np.array([np.min(ends, axis=0), np.max(ends, axis=0)])
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        return outline_distance(self.outline(), self.half_plane(points), on_axis=True)
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        at, corners = self.half_plane(points), self.outline()
+        return [_from_line(a, b, at) for a, b in _sides(corners) if not (a[1] == b[1] == 0.0)]
+
+    def half_plane(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2): where points are along the axis and away from it [m]."""
+        a, axis, _ = _axis(self.first, self.second)
+        along = (points - a) @ axis
+        across = np.sqrt(np.maximum(((points - a - along[:, None] * axis) ** 2).sum(axis=1), 0.0))
+        return np.column_stack([along, across])
+
 
 @dataclass(frozen=True)
-class Cylinder:
+class Cylinder(_Round):
     """A round one, between the middles of its ends [m]."""
 
     first: Point
@@ -68,70 +132,454 @@ class Cylinder:
     radius: float
 
     def check(self) -> None:
-        """CommandError if it has no volume."""
         if not self.radius > 0.0 or self.first == self.second:
             raise CommandError("a cylinder needs two ends that are apart, and a radius above 0")
 
+    def outline(self) -> np.ndarray:
+        length = _axis(self.first, self.second)[2]
+        return np.array([[0.0, 0.0], [0.0, self.radius], [length, self.radius], [length, 0.0]])
+
+
+@dataclass(frozen=True)
+class Cone(_Round):
+    """A round one with a radius at each end [m], one of which may be 0."""
+
+    first: Point
+    second: Point
+    radius: float
+    other: float
+
+    def check(self) -> None:
+        if self.first == self.second or min(self.radius, self.other) < 0.0 or self.radius == self.other:
+            raise CommandError(
+                "a cone needs two ends that are apart, and two radii that differ, none of them below 0; with equal "
+                "radii it is a cylinder"
+            )
+
+    def outline(self) -> np.ndarray:
+        length = _axis(self.first, self.second)[2]
+        ends = [[0.0, 0.0], [0.0, self.radius], [length, self.other], [length, 0.0]]
+        return np.array([p for i, p in enumerate(ends) if p != ends[i - 1]])
+
+
+@dataclass(frozen=True)
+class Extruded(Body):
+    """A polygon (its corners) that is drawn along a way [m]."""
+
+    corners: tuple[Point, ...]
+    way: Point
+
+    def check(self) -> None:
+        Polygon(self.corners).check()
+        _, normal = _plane(self.corners)
+        if abs(normal @ np.array(self.way)) <= IN_PLANE * float(np.linalg.norm(self.way)):
+            raise CommandError("a polygon is extruded out of its plane: the way lies in it")
+
     def bounds(self) -> np.ndarray:
-        """(2, 3) least and greatest coordinates [m]."""
-        ends = np.array([self.first, self.second], np.float64)
-        axis = ends[1] - ends[0]
-        across = self.radius * np.sqrt(np.maximum(1.0 - axis * axis / (axis @ axis), 0.0))
-        return np.array([ends.min(axis=0) - across, ends.max(axis=0) + across])
+        ends = np.concatenate([np.array(self.corners), np.array(self.corners) + self.way])
+        return np.array([ends.min(axis=0), ends.max(axis=0)])
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """(n,) distance of points (n, 3) from the surface [m], negative inside."""
-        a, b = np.array(self.first), np.array(self.second)
-        length = float(np.linalg.norm(b - a))
-        way, axis = points - a, (b - a) / length
-        along = way @ axis
-        across = np.sqrt(np.maximum(((way - along[:, None] * axis) ** 2).sum(axis=1), 0.0)) - self.radius
-        beyond = np.maximum(-along, along - length)
-        outside = np.sqrt(np.maximum(across, 0.0) ** 2 + np.maximum(beyond, 0.0) ** 2)
-        return outside + np.minimum(np.maximum(across, beyond), 0.0)
+        """Outside of an oblique one, and beyond its edges, a lower bound."""
+        beside, ends = self._beside(points), self._ends(points)
+        beyond = np.maximum(ends[0], ends[1])
+        outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(beyond, 0.0) ** 2)
+        _, normal = _plane(self.corners)
+        if abs(normal @ _unit(self.way)) < 1.0 - 1e-9:
+            outside = np.maximum(np.maximum(beside, beyond), 0.0)
+        return outside + np.minimum(np.maximum(beside, beyond), 0.0)
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        frame = _frame(_unit(self.way))
+        at, corners = points @ frame.T, np.array(self.corners) @ frame.T
+        return [*self._ends(points), *(_from_line(a, b, at) for a, b in _sides(corners))]
+
+    def _beside(self, points: np.ndarray) -> np.ndarray:
+        """Distance from the mantle, which goes on without end, negative inside."""
+        frame = _frame(_unit(self.way))
+        return outline_distance(np.array(self.corners) @ frame.T, points @ frame.T)
+
+    def _ends(self, points: np.ndarray) -> list[np.ndarray]:
+        """Distance beyond the planes of the ends."""
+        at, normal = _plane(self.corners)
+        normal = normal * math.copysign(1.0, normal @ np.array(self.way))
+        return [-(points - at) @ normal, (points - at - self.way) @ normal]
 
 
-Solid = Box | Sphere | Cylinder
-KINDS: dict[str, Any] = {"box": Box, "sphere": Sphere, "cylinder": Cylinder}
+@dataclass(frozen=True)
+class Revolved(Body):
+    """A polygon (its corners) that is turned about an axis in its plane, by an angle [degrees], right-handed."""
+
+    corners: tuple[Point, ...]
+    about: Point
+    axis: Point
+    angle: float
+
+    def check(self) -> None:
+        Polygon(self.corners).check()
+        if not any(self.axis) or not 0.0 < self.angle <= FULL:
+            raise CommandError("a polygon is revolved about an axis of some length, by an angle from 0 to 360 degrees")
+        flat, at = self._flat(), np.array(self.corners)
+        size = float(np.ptp(at, axis=0).max())
+        _, normal = _plane(self.corners)
+        off = abs(normal @ _unit(self.axis)), abs(normal @ (np.array(self.about) - at[0])) / size
+        if max(off) > IN_PLANE:
+            raise CommandError("the axis about which a polygon is revolved lies in its plane")
+        if flat[:, 1].min() < -IN_PLANE * size:
+            raise CommandError("the axis about which a polygon is revolved does not cross it")
+
+    def _flat(self) -> np.ndarray:
+        """(k, 2) corners: along the axis, distance from it towards the polygon [m]; tiny ones are 0."""
+        axis, out = _unit(self.axis), self._outwards()
+        way = np.array(self.corners) - self.about
+        flat = np.column_stack([way @ axis, way @ out])
+        flat[np.abs(flat[:, 1]) < IN_PLANE * np.ptp(flat, axis=0).max(), 1] = 0.0
+        return flat
+
+    def _outwards(self) -> np.ndarray:
+        """Unit vector from the axis towards the corner that is farthest from it."""
+        axis = _unit(self.axis)
+        way = np.array(self.corners) - self.about
+        way = way - (way @ axis)[:, None] * axis
+        return _unit(way[np.argmax((way * way).sum(axis=1))])
+
+    def _turned(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points in the half plane (n, 2), and their angle from the polygon (n,) [rad], from -pi to pi."""
+        axis, out = _unit(self.axis), self._outwards()
+        way = points - np.array(self.about)
+        x, y = way @ out, way @ np.cross(axis, out)
+        return np.column_stack([way @ axis, np.hypot(x, y)]), np.arctan2(y, x)
+
+    def bounds(self) -> np.ndarray:
+        axis = _unit(self.axis)
+        across = np.sqrt(np.maximum(1.0 - axis * axis, 0.0))
+        ends = [np.array(self.about) + along * axis + sign * r * across
+                for along, r in self._flat() for sign in (-1.0, 1.0)]  # fmt: skip
+        return np.array([np.min(ends, axis=0), np.max(ends, axis=0)])
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Beyond the ends of a part of a turn a lower bound."""
+        at, _ = self._turned(points)
+        found = outline_distance(self._flat(), at, on_axis=True)
+        if self.angle < FULL:
+            before, after = self._planes(points)
+            wedge = np.maximum(before, after) if self.angle <= 180.0 else np.minimum(before, after)
+            found = np.maximum(found, wedge)
+        return found
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        at, _ = self._turned(points)
+        sides = [_from_line(a, b, at) for a, b in _sides(self._flat()) if not (a[1] == b[1] == 0.0)]
+        return [*sides, *(self._planes(points) if self.angle < FULL else ())]
+
+    def _planes(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance before the first and behind the last half plane."""
+        axis, out = _unit(self.axis), self._outwards()
+        way, turn = points - np.array(self.about), math.radians(self.angle)
+        across = np.cross(axis, out)
+        last = math.cos(turn) * across - math.sin(turn) * out
+        return -(way @ across), way @ last
 
 
-def made(kind: str, *values: Any) -> Solid:
-    """A checked solid of this kind. CommandError if it has no volume."""
-    solid: Solid = KINDS[kind](*(tuple(map(float, v)) if isinstance(v, (tuple, list)) else float(v) for v in values))
+@dataclass(frozen=True)
+class Shell(Body):
+    """What a closed shell of triangles (corners of all, three by three) encloses, of a file."""
+
+    corners: tuple[Point, ...]
+
+    def check(self) -> None:
+        """CommandError if it is not closed: each side belongs to two triangles, which run along it opposite ways."""
+        if not self.corners or len(self.corners) % 3:
+            raise CommandError("a shell needs triangles")
+        _, number = np.unique(np.array(self.corners, np.float64), axis=0, return_inverse=True)
+        of = number.reshape(-1, 3)
+        if ((of == np.roll(of, 1, axis=1)).any(axis=1)).any():
+            where = int(np.flatnonzero((of == np.roll(of, 1, axis=1)).any(axis=1))[0])
+            raise CommandError(f"triangle {where + 1} of the shell has the same corner twice")
+        ways = np.concatenate([of, np.roll(of, -1, axis=1)]).reshape(2, -1).T
+        found, times = np.unique(ways, axis=0, return_counts=True)
+        back = {(int(b), int(a)) for a, b in found}
+        lost = [(a, b) for a, b in found.tolist() if (a, b) not in back]
+        if lost or (times > 1).any():
+            a = lost[0][0] if lost else int(found[times > 1][0][0])
+            at = np.array(self.corners)[np.flatnonzero(number.reshape(-1) == a)[0]]
+            raise CommandError(
+                f"the shell is not closed, or its triangles do not all face outwards: near ({at[0]:g}, {at[1]:g}, "
+                f"{at[2]:g}) a side has no triangle across it that runs the other way"
+            )
+
+    def triangles(self) -> np.ndarray:
+        """(k, 3, 3) corners [m]."""
+        return np.array(self.corners, np.float64).reshape(-1, 3, 3)
+
+    def bounds(self) -> np.ndarray:
+        at = np.array(self.corners)
+        return np.array([at.min(axis=0), at.max(axis=0)])
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """The nearest triangle says how far; the sum of the solid angles of all is 4 pi inside (van Oosterom & Strackee
+        1983)."""
+        far, angle = np.full(len(points), np.inf), np.zeros(len(points))
+        for triangle in self.triangles():
+            far = np.minimum(far, _from_triangle(triangle, points))
+            a, b, c = (corner - points for corner in triangle)
+            la, lb, lc = (np.sqrt((v * v).sum(axis=1)) for v in (a, b, c))
+            dot = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+            angle += 2.0 * np.arctan2((a * np.cross(b, c)).sum(axis=1), dot)
+        inside = np.round(np.abs(angle) / (4.0 * math.pi)).astype(np.int64) % 2 == 1  # a cavity lies within two shells
+        return np.where(inside, -far, far)
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        """Its planes: triangles in one plane are one part."""
+        planes: dict[tuple[float, ...], tuple[np.ndarray, np.ndarray]] = {}
+        size = float(np.ptp(np.array(self.corners), axis=0).max())
+        for a, b, c in self.triangles():
+            n = np.cross(b - a, c - a)
+            n /= math.sqrt(n @ n)
+            planes.setdefault((*np.round(n, 6).tolist(), round(float(n @ a) / size, 6)), (a, n))
+        return [(points - a) @ n for a, n in planes.values()]
+
+
+@dataclass(frozen=True)
+class Brep(Body):
+    """A solid of a CAD file: its text as OpenCASCADE writes it (BREP), in metres, and the triangles of a picture of it,
+    by which ranges know it."""
+
+    text: str
+    corners: tuple[Point, ...]
+    faces: tuple[float, ...]
+    """Number of the face of each triangle."""
+    name: str = ""
+    """As the file calls it."""
+
+    def check(self) -> None:
+        if not self.text or not self.corners:
+            raise CommandError("a solid of a CAD file needs its text and triangles")
+
+    def shell(self) -> Shell:
+        """Its triangles."""
+        return Shell(self.corners)
+
+    def bounds(self) -> np.ndarray:
+        return self.shell().bounds()
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """Of the triangles: as near as these come to curved faces."""
+        return self.shell().distance(points)
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        """Its faces."""
+        triangles, of = self.shell().triangles(), np.array(self.faces)
+        return [
+            np.min([_from_triangle(one, points) for one in triangles[of == face]], axis=0) for face in np.unique(of)
+        ]
+
+
+class Surface:
+    """Something without an inside."""
+
+    surface = True
+
+    def check(self) -> None:
+        """CommandError if it has no area."""
+        raise NotImplementedError
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """(n,) distance of points (n, 3) from it [m]."""
+        at, normal = self.plane()
+        off = np.abs((points - at) @ normal)
+        return np.hypot(off, np.maximum(self.beyond(points), 0.0))
+
+    def parts(self, points: np.ndarray) -> list[np.ndarray]:
+        """As of a body."""
+        return [self.distance(points)]
+
+    def plane(self) -> tuple[np.ndarray, np.ndarray]:
+        """A point of it and its unit normal."""
+        raise NotImplementedError
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        """(n,) how far the feet of points on its plane lie outside of its rim [m], negative inside."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Polygon(Surface):
+    """A flat one, by its corners in order [m]."""
+
+    corners: tuple[Point, ...]
+
+    def check(self) -> None:
+        if len(self.corners) < 3:
+            raise CommandError(f"a polygon needs three corners, got {len(self.corners)}")
+        at = np.array(self.corners, np.float64)
+        size = float(np.ptp(at, axis=0).max())
+        middle, normal = _plane(self.corners)
+        if not np.isfinite(normal).all():
+            raise CommandError("the corners of a polygon lie on one line")
+        if float(np.abs((at - middle) @ normal).max()) > IN_PLANE * size:
+            raise CommandError("the corners of a polygon do not lie in one plane")
+        if (at == np.roll(at, 1, axis=0)).all(axis=1).any():
+            raise CommandError("two corners of a polygon, one after the other, are the same")
+
+    def plane(self) -> tuple[np.ndarray, np.ndarray]:
+        return _plane(self.corners)
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        frame = _frame(self.plane()[1])
+        return outline_distance(np.array(self.corners) @ frame.T, points @ frame.T)
+
+
+@dataclass(frozen=True)
+class Disc(Surface):
+    """A flat round one: centre, normal of any length, radius [m]."""
+
+    centre: Point
+    normal: Point
+    radius: float
+
+    def check(self) -> None:
+        if not self.radius > 0.0 or not any(self.normal):
+            raise CommandError("a disc needs a normal of some length, and a radius above 0")
+
+    def plane(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.centre), _unit(self.normal)
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        at, normal = self.plane()
+        way = points - at
+        way = way - (way @ normal)[:, None] * normal
+        return np.sqrt((way * way).sum(axis=1)) - self.radius
+
+
+@dataclass(frozen=True)
+class Plane(Surface):
+    """One without end: a point [m] and a normal of any length."""
+
+    point: Point
+    normal: Point
+
+    def check(self) -> None:
+        if not any(self.normal):
+            raise CommandError("a plane needs a normal of some length")
+
+    def plane(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.point), _unit(self.normal)
+
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        return np.full(len(points), -np.inf)
+
+
+Solid = Body | Surface
+KINDS: dict[str, Any] = {
+    "box": Box, "sphere": Sphere, "cylinder": Cylinder, "cone": Cone, "extrude": Extruded, "revolve": Revolved,
+    "shell": Shell, "brep": Brep, "polygon": Polygon, "disc": Disc, "plane": Plane,
+}  # fmt: skip
+
+
+def made(kind: str, *values: Any) -> Any:
+    """A checked body or surface of this kind. CommandError if it has no volume or area."""
+    solid = KINDS[kind](*map(_plain, values))
     solid.check()
     return solid
 
 
-def on_surface(solid: Solid, points: np.ndarray, slack: float) -> np.ndarray:
+def _plain(value: Any) -> Any:
+    """Vectors and rows of them as tuples, numbers as floats, texts as they are."""
+    if isinstance(value, (tuple, list)):
+        return tuple(_plain(one) for one in value)
+    return value if isinstance(value, str) else float(value)
+
+
+def on_surface(solid: Any, points: np.ndarray, slack: float) -> np.ndarray:
     """(n,) bool: all of the points (n, k, 3) of each object lie on the surface, within `slack` [m]; of a face on one
     smooth part of it: a flat side, an end or the mantle."""
-    near = (np.abs(solid.distance(points.reshape(-1, 3))) <= slack).reshape(points.shape[:2])
-    on = near.all(axis=1)
-    if points.shape[1] == 1 or isinstance(solid, Sphere):
+    flat = points.reshape(-1, 3)
+    on = (np.abs(solid.distance(flat)) <= slack).reshape(points.shape[:2]).all(axis=1)
+    if points.shape[1] == 1 or not on.any():
         return on
-    parts = np.zeros_like(on)
-    for part in _parts(solid, points.reshape(-1, 3)):
-        parts |= (np.abs(part).reshape(points.shape[:2]) <= slack).all(axis=1)
-    return on & parts
+    rows = np.flatnonzero(on)
+    parts = solid.parts(points[rows].reshape(-1, 3))
+    together = [(np.abs(part).reshape(len(rows), -1) <= slack).all(axis=1) for part in parts]
+    on[rows] = np.any(together, axis=0)
+    return on
 
 
-def _parts(solid: Box | Cylinder, points: np.ndarray) -> list[np.ndarray]:
-    """Distance (n,) of points (n, 3) from each smooth part of the surface, thought of without end [m]."""
-    if isinstance(solid, Box):
-        return [points[:, axis] - bound for one in solid.bounds() for axis, bound in enumerate(one)]
-    a, b = np.array(solid.first), np.array(solid.second)
-    axis = (b - a) / np.linalg.norm(b - a)
-    along = (points - a) @ axis
-    across = np.sqrt(np.maximum((((points - a) - along[:, None] * axis) ** 2).sum(axis=1), 0.0))
-    return [along, (points - b) @ axis, across - solid.radius]
-
-
-def state(solids: list[Solid]) -> list[list[Any]]:
+def state(solids: Sequence[Any]) -> list[list[Any]]:
     """As JSON values."""
     names = {of: name for name, of in KINDS.items()}
     return [[names[type(one)], list(asdict(one).values())] for one in solids]
 
 
-def restored(given: list[list[Any]]) -> list[Solid]:
+def restored(given: list[list[Any]]) -> list[Any]:
     """Inverse of `state`."""
     return [made(kind, *values) for kind, values in given]
+
+
+# --- plane and space --------------------------------------------------------------------------------------------------
+
+
+def outline_distance(corners: np.ndarray, at: np.ndarray, on_axis: bool = False) -> np.ndarray:
+    """(n,) distance of points (n, 2) from the sides of a polygon (k, 2), negative inside; on_axis: sides on the axis
+    (second coordinate 0) are none."""
+    far, inside = np.full(len(at), np.inf), np.zeros(len(at), bool)
+    x, y = at[:, 0], at[:, 1]
+    if on_axis:  # on the axis itself no side decides whether a point is inside: one a hair away from it does
+        y = np.maximum(y, 1e-9 * float(np.ptp(corners, axis=0).max()))
+    for a, b in _sides(corners):
+        way = b - a
+        if not (on_axis and a[1] == b[1] == 0.0):
+            t = np.clip((at - a) @ way / (way @ way), 0.0, 1.0)
+            rest = at - a - t[:, None] * way
+            far = np.minimum(far, np.sqrt((rest * rest).sum(axis=1)))
+        if way[1] != 0.0:
+            crosses = (a[1] > y) != (b[1] > y)
+            inside ^= crosses & (x < a[0] + (y - a[1]) * way[0] / way[1])
+    return np.where(inside, -far, far)
+
+
+def _sides(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    return list(zip(corners, np.roll(corners, -1, axis=0), strict=True))
+
+
+def _from_line(a: np.ndarray, b: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points (n, 2) from the line through two others."""
+    way = (b - a) / math.sqrt((b - a) @ (b - a))
+    return (at[:, 0] - a[0]) * way[1] - (at[:, 1] - a[1]) * way[0]
+
+
+def _from_triangle(triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance (n,) of points (n, 3) from a triangle (3, 3)."""
+    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    frame = _frame(normal / math.sqrt(normal @ normal))
+    beyond = outline_distance(triangle @ frame.T, points @ frame.T)
+    off = (points - triangle[0]) @ normal / math.sqrt(normal @ normal)
+    return np.hypot(off, np.maximum(beyond, 0.0))
+
+
+def _axis(first: Point, second: Point) -> tuple[np.ndarray, np.ndarray, float]:
+    """First end, unit vector to the second, length [m]."""
+    a = np.array(first)
+    length = float(np.linalg.norm(np.array(second) - a))
+    return a, (np.array(second) - a) / length, length
+
+
+def _unit(v: Any) -> np.ndarray:
+    v = np.asarray(v, np.float64)
+    return v / np.sqrt(v @ v)
+
+
+def _frame(normal: np.ndarray) -> np.ndarray:
+    """(2, 3) two unit vectors that make a right-handed frame with a unit normal."""
+    least = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    u = _unit(np.cross(normal, least))
+    return np.array([u, np.cross(normal, u)])
+
+
+def _plane(corners: Sequence[Point]) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and unit normal (Newell's) of a polygon; NaN if its corners lie on a line."""
+    at = np.array(corners, np.float64)
+    normal = np.cross(at - at[0], np.roll(at, -1, axis=0) - at[0]).sum(axis=0)
+    length = math.sqrt(normal @ normal)
+    size = float(np.ptp(at, axis=0).max())
+    return at.mean(axis=0), normal / length if length > 1e-12 * size * size else np.full(3, np.nan)

@@ -23,14 +23,16 @@ def place(
 ) -> None:  # fmt: skip
     """Give the lists their wall slots, with histories; arguments as in neighbours.build. fast_rows (m,): storage rows
     of the fast particles, ascending, and their reach [m] (fast.py)."""
-    memory = _who_remembers(where, hist.ptr, hist.partner)
+    # columns of what is remembered; of few rows they are contiguous, of many they are not: one type for the kernels
+    partner, remembered, extra = (np.ascontiguousarray(one) for one in (hist.partner, hist.fs, hist.extra))
+    memory = _who_remembers(where, hist.ptr, partner)
     n = room = lists.n_own // 16 + 64
     while n >= room:
         room = n + 64
         rows, which, fs, at_side = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), np.empty(room)
         n = _find(
             hot, cell, lists.n_left, lists.n_own, walls, side, largest, skin, memory, where,
-            hist.ptr, hist.partner, hist.fs, hist.extra, fast_rows, reach, rows, which, fs, at_side,
+            hist.ptr, partner, remembered, extra, fast_rows, reach, rows, which, fs, at_side,
         )  # fmt: skip
     lists.slot_row, lists.slot_wall, lists.slot_fs, lists.slot_side = (
         column[:n].copy() for column in (rows, which, fs, at_side)

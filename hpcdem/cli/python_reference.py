@@ -1,0 +1,88 @@
+"""The page of the Python interface, made from its docstrings: ``python -m hpcdem.cli.python_reference >
+docs/python_reference.md``."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from typing import Any
+
+from hpcdem.api import Call, Coupling, Frame, Frames, Simulation, blocks, couple, frames
+from hpcdem.sweep import Sweep
+
+_TOP = """\
+# Python reference
+
+This page is made from the docstrings; do not edit it (`python -m hpcdem.cli.python_reference >
+docs/python_reference.md`). How the methods work together, with examples: [Python](python.md). Every method is
+collective: under mpiexec call it on all ranks. Units are SI. What a command does in detail stands with the
+command of the same name ([ZDEM](zdem_reference.md),
+[PCDC](pcdc_reference.md)).
+"""
+
+OF_BLOCKS = {
+    "geometry": blocks.Geometry, "mesh": blocks.Mesh, "elements": blocks.Elements, "faces": blocks.Faces,
+    "joints": blocks.Joints, "nodes": blocks.Nodes, "flow_nodes": blocks.FlowNodes, "channels": blocks.Channels,
+    "wells": blocks.Wells, "bolts": blocks.Bolts, "bolt_nodes": blocks.BoltNodes, "liners": blocks.Liners,
+    "liner_nodes": blocks.LinerNodes, "tables": blocks.Tables, "fields": blocks.Fields, "histories": blocks.Histories,
+    "charts": blocks.Charts, "output": blocks.Output,
+}  # fmt: skip
+"""Attributes of a simulation that hold the commands of blocks."""
+
+
+def page() -> str:
+    """The whole page, in Markdown."""
+    parts = [_TOP, _class("hpcdem.Simulation", Simulation, "sim")]
+    parts += [_class(f"sim.{name}", of, f"sim.{name}") for name, of in OF_BLOCKS.items()]
+    parts += [f"## hpcdem.couple\n\n{_function('hpcdem.couple', couple, method=False)}"]
+    parts += [f"## hpcdem.frames\n\n{_function('hpcdem.frames', frames, method=False)}"]
+    parts += [_class("Frames", Frames, "frames"), _class("Frame", Frame, "frame")]
+    parts += [_class("Coupling", Coupling, "both"), _class("Call", Call, "call")]
+    parts += [_class("hpcdem.Sweep", Sweep, "sweep")]
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def _class(title: str, of: type, name: str) -> str:
+    lines = [f"## {title}", "", _text(of), ""]
+    rows = []
+    for member, value in inspect.getmembers(of):
+        if member.startswith("_") and member not in ("__getitem__", "__setitem__"):
+            continue
+        if isinstance(value, property):
+            rows.append(f"- `{name}.{member}`: {_text(value.fget)}")
+        elif inspect.isfunction(value):
+            lines += [_function(f"{name}.{member}", value)]
+    if rows:
+        lines += ["Values:", "", *rows, ""]
+    return "\n".join(lines)
+
+
+def _function(name: str, of: Any, method: bool = True) -> str:
+    signature = inspect.signature(of)
+    parameters = [*signature.parameters.values()][1 if method else 0 :]
+    shown = ", ".join(_shown(p) for p in parameters)
+    if "__getitem__" in name:
+        name, shown = name.removesuffix(".__getitem__"), f"[{shown}]"
+    elif "__setitem__" in name:
+        first, _, second = shown.partition(", ")
+        name, shown = name.removesuffix(".__setitem__"), f"[{first}] = {second}"
+    else:
+        shown = f"({shown})"
+    return f"```\n{name}{shown}\n```\n\n{_text(of)}\n"
+
+
+def _shown(parameter: inspect.Parameter) -> str:
+    text = {"VAR_POSITIONAL": "*", "VAR_KEYWORD": "**"}.get(parameter.kind.name, "") + parameter.name
+    return text if parameter.default is parameter.empty else f"{text}={parameter.default!r}"
+
+
+def _text(of: Any) -> str:
+    """A docstring as Markdown: literal blocks are fenced."""
+    text = inspect.getdoc(of) or ""
+    text = re.sub(r"::\n\n((?:(?:    .*)?\n?)+)", lambda m: ":\n\n```\n" + inspect.cleandoc(m[1]) + "\n```\n", text)
+    return text.replace("``", "`")
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())

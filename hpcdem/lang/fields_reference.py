@@ -1,0 +1,55 @@
+"""The page of fields of particles and quantities of blocks, made from their tables: ``python -m
+hpcdem.lang.fields_reference > docs/fields.md``."""
+
+from __future__ import annotations
+
+import sys
+
+from hpcdem.core.fields import FIELDS
+from hpcdem.lang.pages import escaped
+from hpcdem.physics.bolts.model import QUANTITIES as OF_BOLTS
+from hpcdem.physics.fdem.diagnostics import QUANTITIES
+from hpcdem.physics.flow.model import QUANTITIES as OF_FLOW
+from hpcdem.physics.liners.model import QUANTITIES as OF_LINERS
+
+_TOP = """\
+# Fields
+
+This page is made from the tables of the program; do not edit it (`python -m hpcdem.lang.fields_reference >
+docs/fields.md`). How files are laid out: [Files](files.md). `hpcdem draw FRAME --list` says which of them a frame has.
+
+Scripts of PCDC write hyphens (`stress-xx`), frames and Python underscores; Python takes both. Units are those of
+the plane, in which forces, energies and rates are of a metre of thickness; in space N/m becomes N, J/m J, m2/s m3/s.
+
+## Particles
+
+| field | unit | |
+|---|---|---|
+"""
+
+
+def page() -> str:
+    """The whole page, in Markdown."""
+    lines = [_TOP.rstrip("\n")]
+    lines += [f"| `{name}` | {field.unit} | {escaped(field.doc)} |" for name, field in FIELDS.items()]
+    for kind in dict.fromkeys(q.on for q in QUANTITIES.values()):
+        lines += [
+            "",
+            f"## Blocks: {kind}",
+            "",
+            "| quantity | unit | | plane, space | frames |",
+            "|---|---|---|---|---|",
+        ]
+        for name, q in QUANTITIES.items():
+            if q.on == kind:
+                where = ", ".join(f"{d}-D" for d in q.dims)
+                lines.append(f"| `{name}` | {q.unit} | {escaped(q.doc)} | {where} | {'yes' if q.framed else ''} |")
+    for group in (OF_FLOW, OF_BOLTS, OF_LINERS):
+        for kind, of in group.items():
+            lines += ["", f"## Blocks: {kind}", "", "| quantity | unit | |", "|---|---|---|"]
+            lines += [f"| `{name}` | {unit} | {escaped(doc)} |" for name, (unit, doc) in of.items()]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())

@@ -1,0 +1,143 @@
+"""The Chinese reference pages of both languages: ``python -m hpcdem.lang.reference_zh zdem|pcdc``.
+
+Words, values, units and defaults are those of the tables, as on the English pages; what a command does comes from
+`chinese`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from hpcdem.lang import chinese
+from hpcdem.lang.pages import escaped
+from hpcdem.lang.pcdc import reference as pcdc
+from hpcdem.lang.pcdc.table import PCDC
+from hpcdem.lang.zdem import reference as zdem
+from hpcdem.lang.zdem.table import COLORS, ZDEM
+
+_HEAD = """\
+# {name} 命令
+
+本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/lang/chinese.py` 生成,请勿直接修改
+(`python -m hpcdem.lang.reference_zh {package} > docs/{package}_reference.zh.md`)。
+命令的说明是中文,关键字的含义目前只有英文;
+完整的英文说明见 [{name} commands]({package}_reference.md)。
+"""
+
+_ZDEM = """
+## 脚本的读法
+
+- 每行一个命令;除文件名外不分大小写。`( ) = ,` 和空格只作分隔。
+- `# ! ;` 之后是注释,注释可用任何编码,其余为 UTF-8。
+- 命令可缩写到三个字母,关键字可缩写到两个字母(不与本命令其他关键字混淆时)。
+- 第一条命令是 START、RESTORE 或 LOAD;STOP 之后不读。
+- 单独一行 `friction = 0.3` 定义参数,以后在需要数的地方写 `{friction}`([参数扫描](sweep.zh.md))。
+- 先读完整个脚本再运行;第一处错误报出行号,什么也不做。单位为 SI。
+"""
+
+_PCDC = """
+## 脚本的读法
+
+- 脚本是 Python,首词为 `pcdc` 的行是命令,循环和函数中也可以;命令续行用反斜杠,`#` 之后是注释。
+- 先读完全部命令和 Python 再运行;第一处错误报出文件、行号和内容。`hpcdem --check script.sc` 到此为止。
+- 花括号内的部分可以省略:`a{s}-l{ayer}` 可写成 `as-layer`、`a-l`;不分大小写。有歧义的缩写会列出候选并拒绝。
+- 值是数、引号内的文本、`on` 和 `off`、向量 `(x,y)`;方括号内是 Python 表达式:`[m_R/12]`、`'layer [i]'`。
+- `<f>` 数,`<i>` 整数,`<s>` 文本,`<v>` 向量;可写 `table <s>` 处,值是时间的函数。
+- 拉为正;对象编号从 0 开始;单位可用任何一致的单位制,表中为 SI。
+"""
+
+
+def zdem_page() -> str:
+    """All of docs/zdem_reference.zh.md."""
+    parts = [
+        _HEAD.format(name="ZDEM", package="zdem"),
+        _ZDEM,
+        _overview({c.name: _said(chinese.ZDEM, c.name, c.doc) for c in ZDEM.commands}),
+    ]
+    for command in ZDEM.commands:
+        lines = [
+            f"## {command.name}",
+            "",
+            f"`{zdem._shortened(command)}`",
+            "",
+            _said(chinese.ZDEM, command.name, command.doc),
+            "",
+            "```",
+        ]
+        lines += [*zdem._syntax(command), "```", ""]
+        if not command.same_as:
+            if command.options:
+                lines += [_chinese(zdem._options(command.options, [])), ""]
+            lines += ["例:", "", "```", *command.example, "```", ""]
+        parts.append("\n".join(lines))
+    parts += ["## RANGE\n\n写在行末,只对部分颗粒起作用;不写时对全部。各项用 `and`、`or` 连接,从左到右。\n"]
+    parts += [_chinese(zdem._options(ZDEM.range_terms)), "\n## 颜色\n", "| 编号 | 名称 |", "|---|---|"]
+    parts += [f"| {number} | {name} |" for name, number in COLORS.items()]
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def pcdc_page() -> str:
+    """All of docs/pcdc_reference.zh.md."""
+    parts = [
+        _HEAD.format(name="PCDC", package="pcdc"),
+        _PCDC,
+        _overview({c.name: _said(chinese.PCDC, c.name, c.doc) for c in PCDC.commands}),
+    ]
+    for command in PCDC.commands:
+        lines = [
+            f"## {command.name}",
+            "",
+            f"`pcdc {command.notation}`",
+            "",
+            _said(chinese.PCDC, command.name, command.doc),
+            "",
+            "```",
+        ]
+        lines += [*pcdc._syntax(command), "```", ""]
+        if command.leading or command.options:
+            lines += [_chinese(pcdc._options(command.options, command.leading)), ""]
+        if command.models:
+            lines += ["模型:" + "、".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models) + "。", ""]
+        lines += ["例:", "", "```", *command.example, "```", ""]
+        parts.append("\n".join(lines))
+    parts += ["## range\n\n写在行末,只对部分对象起作用;不写时对全部。各项必须同时满足;什么也没选中是错误。\n"]
+    parts += [_chinese(pcdc._options(PCDC.range_terms)), "\n## 模型和条件\n"]
+    for command in PCDC.commands:
+        for model in command.models:
+            lines = [f"### {model.keyword.name}", "", f"`{model.notation}`(`pcdc {command.name}`)", ""]
+            lines += [_said(chinese.MODELS, model.keyword.name, model.doc), ""]
+            parts.append("\n".join([*lines, *([_chinese(pcdc._options(model.options)), ""] if model.options else [])]))
+    return "\n".join(parts).rstrip("\n") + "\n"
+
+
+def _said(of: dict[str, str], name: str, doc: str) -> str:
+    """In Chinese; the first sentence in English where nobody has written it yet."""
+    return of.get(name) or doc.split(". ")[0].rstrip(".") + "."
+
+
+def _overview(texts: dict[str, str]) -> str:
+    lines = ["", "## 全部命令", "", "| 命令 | 作用 |", "|---|---|"]
+    lines += [f"| [{name}](#{name.lower().replace(' ', '-')}) | {escaped(text)} |" for name, text in texts.items()]
+    return "\n".join([*lines, ""])
+
+
+def _chinese(table: str) -> str:
+    """A table of keywords with its head in Chinese."""
+    head, *rows = table.split("\n")
+    names = {
+        "keyword": "关键字",
+        "value": "值",
+        "unit": "单位",
+        "default": "默认",
+        "meaning": "含义(英文)",
+        "from": "来源",
+    }
+    cells = [names[cell.strip()] for cell in head.strip("|").split("|")]
+    return "\n".join(["| " + " | ".join(cells) + " |", *(row.replace("| required |", "| 必需 |") for row in rows)])
+
+
+PAGES: dict[str, Callable[[], str]] = {"zdem": zdem_page, "pcdc": pcdc_page}
+
+if __name__ == "__main__":
+    sys.stdout.write(PAGES[sys.argv[1]]())

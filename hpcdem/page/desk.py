@@ -1,0 +1,296 @@
+"""What `hpcdem view --run` lets the page do besides: edit the scripts of one folder, have them checked, and carry out
+commands in a process of its own.
+
+Whoever may open the page may run programs with it, as at a terminal. That is why it has to be asked for at the command
+line, and why the page's key, loopback and the check of the origin (server.py) stand before all of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from hpcdem.core.errors import HpcdemError, ScriptError
+from hpcdem.lang import detect
+from hpcdem.page.pipe import DONE, MARK, READY
+from hpcdem.page.server import Answer, Call, as_json
+
+FOLDER = "now"
+"""Below the results: what the console shows of its model (commands/present.py)."""
+LANGUAGES = ("pcdc", "zdem")
+LINES = 5000
+"""Lines of output that are kept."""
+LONGEST_LINE = 2000
+SCRIPT = re.compile(r"[^\W.][\w .+-]{0,99}\.(sc|py)")
+"""Names of scripts: in the folder itself, not hidden."""
+LARGEST_SCRIPT = 512 * 1024
+"""Bytes of a script that the page shows."""
+
+
+class Console:
+    """A process that carries out what it is given, and what it has printed.
+
+    outdir: of its results; threads: of the process.
+    """
+
+    def __init__(self, folder: Path, outdir: Path, threads: int = 1) -> None:
+        self.folder, self.outdir, self.threads = folder, outdir, threads
+        self.language = LANGUAGES[0]
+        self.process: subprocess.Popen[str] | None = None
+        self.lines: deque[tuple[int, str, str]] = deque(maxlen=LINES)
+        self.count = 0
+        self.ready = False
+        self.waiting = 0
+        """Texts that were handed over and are not at their end."""
+        self.lock = threading.RLock()
+
+    @property
+    def busy(self) -> bool:
+        """It starts, or carries something out."""
+        return self._alive() and (not self.ready or self.waiting > 0)
+
+    def said_since(self, number: Any) -> dict[str, Any]:
+        """Lines after this one, and the state."""
+        with self.lock:
+            since = number if isinstance(number, int) and 0 <= number <= self.count else 0
+            return {
+                "lines": [[text, kind] for n, text, kind in self.lines if n > since], "last": self.count,
+                "busy": self.busy, "language": self.language, "alive": self._alive(),
+            }  # fmt: skip
+
+    def carry_out(self, text: str, language: str, name: str = "") -> None:
+        """Hand over a text; name: of a script, which gets a process of its own. HpcdemError while it is at work."""
+        with self.lock:
+            if self.busy:
+                raise HpcdemError("the console is at work; interrupt it first")
+            if name or not self._alive() or language != self.language:
+                self.start(language)
+            assert self.process is not None and self.process.stdin is not None
+            for line in [f"run {name}"] if name else text.split("\n"):
+                self._note(line, "asked")
+            try:
+                self.process.stdin.write(json.dumps({"text": text, "name": name}) + "\n")
+                self.process.stdin.flush()
+                self.waiting += 1
+            except OSError:
+                raise HpcdemError("the console has ended; start it again") from None
+
+    def start(self, language: str) -> None:
+        """Begin with an empty model."""
+        if language not in LANGUAGES:
+            raise HpcdemError(f"language: expected one of {', '.join(LANGUAGES)}")
+        with self.lock:
+            self.end()
+            for frame in (self.outdir / FOLDER).glob("*.vtkhdf"):  # of a model that is no more
+                frame.unlink(missing_ok=True)
+            self.language = language
+            root = str(Path(__file__).resolve().parents[2])
+            path = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+            words = [sys.executable, "-P", "-m", "hpcdem", "console", "--pipe", "--outdir", str(self.outdir)]
+            words += ["-j", str(self.threads), *(["--zdem"] if language == "zdem" else [])]
+            # A session of its own: Ctrl-C in the terminal is for the server, which then ends this one.
+            self.process = subprocess.Popen(
+                words, cwd=self.folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                env=os.environ | {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:replace"},
+                encoding="utf-8", errors="replace", start_new_session=True,
+            )  # fmt: skip
+            threading.Thread(target=self._listen, args=[self.process], daemon=True).start()
+
+    def interrupt(self) -> None:
+        """As Ctrl-C does: a run is saved and stops; a second one stops at once."""
+        with self.lock:
+            if not self.busy or self.process is None:
+                raise HpcdemError("nothing is being carried out")
+            with contextlib.suppress(OSError):
+                os.kill(self.process.pid, signal.SIGINT)
+
+    def end(self) -> None:
+        """End the process."""
+        with self.lock:
+            process, self.process, self.ready, self.waiting = self.process, None, False, 0
+        if process is not None and process.poll() is None:
+            with contextlib.suppress(OSError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+    def _alive(self) -> bool:
+        return self.process is not None and self.process.poll() is None
+
+    def _listen(self, process: subprocess.Popen[str]) -> None:
+        """Take down what a process prints, until it ends."""
+        assert process.stdout is not None
+        for line in process.stdout:
+            with self.lock:
+                if process is not self.process:
+                    return
+                if not line.startswith(MARK):
+                    if line := line.rstrip("\n"):
+                        self._note(line[:LONGEST_LINE], "said")
+                    continue
+                with contextlib.suppress(ValueError):
+                    what = json.loads(line[1:]).get("what")
+                    self.ready = self.ready or what == READY
+                    self.waiting -= what == DONE
+        code = process.wait()
+        with self.lock:
+            if process is self.process:
+                self._note(f"(the console has ended, exit code {code})", "ended")
+
+    def _note(self, text: str, kind: str) -> None:
+        with self.lock:
+            self.count += 1
+            self.lines.append((self.count, text, kind))
+
+
+class Desk:
+    """folder: where the scripts lie; first: the one that the editor begins with."""
+
+    def __init__(self, folder: Path, outdir: Path, first: str = "", threads: int = 1) -> None:
+        self.folder, self.first = folder, first
+        self.console = Console(folder, outdir, threads)
+
+    def calls(self) -> dict[str, Call]:
+        """What POST answers."""
+        return {
+            "console": lambda wanted: as_json(self.console.said_since(wanted.get("since"))),
+            "say": self._say,
+            "interrupt": self._interrupt,
+            "restart": self._restart,
+            "complete": lambda wanted: as_json(complete(wanted.get("line"), wanted.get("language"))),
+            "check": lambda wanted: as_json(check(wanted.get("text"), str(wanted.get("name") or "script"))),
+            "scripts": lambda wanted: as_json({"names": self.names(), "first": self.first}),
+            "read": lambda wanted: as_json(self.read(wanted.get("name"))),
+            "write": lambda wanted: as_json(self.write(wanted.get("name"), wanted.get("text"), wanted.get("stamp"))),
+        }
+
+    def _interrupt(self, wanted: dict[str, Any]) -> Answer:
+        self.console.interrupt()
+        return as_json({})
+
+    def _restart(self, wanted: dict[str, Any]) -> Answer:
+        self.console.start(str(wanted.get("language")))
+        return as_json({})
+
+    def _say(self, wanted: dict[str, Any]) -> Answer:
+        text, name = wanted.get("text"), wanted.get("name") or ""
+        if not isinstance(text, str) or not isinstance(name, str) or not text.strip():
+            raise HpcdemError("text: expected commands")
+        language = wanted.get("language") or self.console.language
+        if name:
+            self._path(name)
+            language = detect.kind(text, name)
+            if language not in LANGUAGES:
+                raise HpcdemError(f"{name} is a program in Python: start it with `hpcdem {name}` or `python {name}`")
+        self.console.carry_out(text, str(language), name)
+        return as_json({"language": language})
+
+    # ---- scripts ---------------------------------------------------------------------------------------------------
+
+    def names(self) -> list[str]:
+        """Of the scripts of the folder."""
+        with os.scandir(self.folder) as found:
+            return sorted(entry.name for entry in found if entry.is_file() and SCRIPT.fullmatch(entry.name))
+
+    def _path(self, name: Any) -> Path:
+        """The file of a script. HpcdemError if it would not lie in the folder."""
+        if not isinstance(name, str) or SCRIPT.fullmatch(name) is None:
+            raise HpcdemError("a script has a name like push.py or ucs.sc, and lies in the folder of the page")
+        path = self.folder / name
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise HpcdemError(f"{name} is no plain file")
+        return path
+
+    def read(self, name: Any) -> dict[str, Any]:
+        """A script, with what tells whether its file was changed since."""
+        path = self._path(name)
+        try:
+            if path.stat().st_size > LARGEST_SCRIPT:
+                raise HpcdemError(f"{name} has more than {LARGEST_SCRIPT} bytes: edit it elsewhere")
+            return {"name": name, "text": path.read_bytes().decode("utf-8"), "stamp": _stamp(path)}
+        except OSError as problem:
+            raise HpcdemError(f"cannot read {name}: {problem.strerror}") from None
+        except UnicodeDecodeError:
+            raise HpcdemError(f"{name} is not UTF-8 text") from None
+
+    def write(self, name: Any, text: Any, stamp: Any) -> dict[str, Any]:
+        """Save a script. HpcdemError if its file is not the one that was read (stamp: None for a new one)."""
+        path = self._path(name)
+        if not isinstance(text, str) or len(text) > LARGEST_SCRIPT:
+            raise HpcdemError(f"text: expected at most {LARGEST_SCRIPT} characters")
+        if (_stamp(path) if path.exists() else None) != stamp:
+            raise HpcdemError(f"{name} was changed by others meanwhile; open it again, or save under another name")
+        try:
+            with tempfile.NamedTemporaryFile("wb", dir=self.folder, prefix=".", suffix=".tmp", delete=False) as file:
+                file.write(text.encode())
+                file.flush()
+                os.fsync(file.fileno())
+            mode = path.stat().st_mode if path.exists() else 0o666 & ~_umask()
+            os.chmod(file.name, mode & 0o7777)
+            os.replace(file.name, path)
+        except OSError as problem:
+            raise HpcdemError(f"cannot write {name}: {problem.strerror}") from None
+        return {"name": name, "stamp": _stamp(path)}
+
+
+def _stamp(path: Path) -> str:
+    status = path.stat()
+    return f"{status.st_mtime_ns} {status.st_size}"
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def complete(line: Any, language: Any) -> dict[str, Any]:
+    """The words that a begun line may go on with, and how many of its last characters they replace."""
+    if not isinstance(line, str) or len(line) > LONGEST_LINE:
+        raise HpcdemError("line: expected text")
+    from hpcdem.lang.pcdc.complete import candidates as of_pcdc
+    from hpcdem.lang.zdem.complete import candidates as of_zdem
+
+    last = "" if not line or line[-1].isspace() else line.split()[-1]
+    if language == "zdem":
+        words = of_zdem(line)
+    elif line.lstrip().startswith("pcdc "):
+        words = of_pcdc(line)
+    else:
+        words = ["pcdc"] if last and "pcdc".startswith(last) and line.strip() == last else []
+    return {"words": words[:40], "last": len(last)}
+
+
+def check(text: Any, name: str) -> dict[str, Any]:
+    """What `hpcdem --check` says of a script: its language, a summary, or the wrong line."""
+    if not isinstance(text, str):
+        raise HpcdemError("text: expected a script")
+    told: dict[str, Any] = {"language": None, "summary": "", "line": None, "problem": ""}
+    try:
+        told["language"] = detect.kind(text, name)
+        if told["language"] == "zdem":
+            from hpcdem.lang.zdem import check as of_zdem
+            from hpcdem.lang.zdem.execute import refuse_unexecuted
+            from hpcdem.lang.zdem.parser import parse_text
+
+            script = parse_text(text, name)
+            refuse_unexecuted(script.statements)
+            told["summary"] = of_zdem.summary(script, None)
+        elif told["language"] == "pcdc":
+            from hpcdem.lang.pcdc import check as of_pcdc
+
+            told["summary"] = of_pcdc.summary(text, name)
+    except ScriptError as error:
+        told["line"], told["problem"] = error.line, error.message
+    except HpcdemError as error:
+        told["problem"] = str(error)
+    return told

@@ -1,0 +1,136 @@
+"""Links, figures, blocks and generated pages of the documentation; nothing is run."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+
+from hpcdem.cli import python_reference, reference
+from hpcdem.lang import chinese, fields_reference, reference_zh
+from hpcdem.lang.pcdc.table import PCDC
+from hpcdem.lang.zdem.table import ZDEM
+from tests.docs.pages import DOCS, PAGES, ROOT, anchors, blocks, links, prose
+
+NAVIGATION = runpy.run_path(str(DOCS / "site" / "navigation.py"))["NAVIGATION"]
+IDS = [str(page.relative_to(ROOT)) for page in PAGES]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_links_lead_somewhere(page: Path) -> None:
+    for link in links(page):
+        name, _, anchor = link.partition("#")
+        target = page.parent / name if name else page
+        assert target.exists(), link
+        if anchor:
+            assert anchor in anchors(target.resolve()), f"{link}: {sorted(anchors(target.resolve()))}"
+
+
+def test_every_figure_is_on_a_page() -> None:
+    used = {Path(link).name for page in PAGES for link in links(page)}
+    assert not {path.name for path in (DOCS / "figures").iterdir()} - used
+
+
+def test_every_page_has_its_place() -> None:
+    placed = [page for pages in NAVIGATION.values() for page in pages]
+    assert len(placed) == len(set(placed))
+    there = {str(page.relative_to(ROOT)).removesuffix(".md") for page in DOCS.glob("**/*.md")} - {"docs/index"}
+    outside = {"ARCHITECTURE", "CONTRIBUTING", "CHANGELOG"}
+    assert set(placed) == there | outside
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_python_of_the_pages_is_python(page: Path) -> None:
+    """Lines of PCDC in it are left out here."""
+    for block in blocks(page):
+        if block.language != "python" or "python_reference" in page.name:
+            continue
+        text = re.sub(r"^( *)pcdc (?:.*\\\n)*.*$", r"\1pass", block.text, flags=re.MULTILINE)
+        if re.match(r'"\w+": ', text):  # a row of a table
+            text = f"{{{text}}}"
+        ast.parse(text.replace(", ...}", "}"))
+
+
+COMMANDS = reference.PROGRAMS
+_GAPS = re.compile(r"\.\.\.|…|[<>|]|[^\x00-\x7f]|\[OPTIONS\]")
+
+
+def command_lines(page: Path) -> list[str]:
+    """Lines of programs of ours in the blocks of a page that are complete."""
+    lines = []
+    for block in blocks(page):
+        if block.language in ("", "bash", "sh") and block.mark != "file":
+            lines += [line.strip() for line in block.text.splitlines()]
+    starts = re.compile(r"^(?:(?:mpiexec|srun)(?: -\w+ \S+)* )?(hpcdem|zdem2jpg|zdemss|zdem) ")
+    found = [re.sub(r"^(?:mpiexec|srun)(?: -\w+ \S+)* ", "", line) for line in lines if starts.match(line)]
+    return [line for line in (re.sub(r"\s#.*", "", line) for line in found) if not _GAPS.search(line)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_command_lines_of_the_pages_can_be_read(page: Path) -> None:
+    """By the parsers of the programs: every option is one that they have, and takes such a value."""
+    for line in command_lines(page):
+        program, *words = shlex.split(line)
+        if re.match(r"\d+\.\d+", words[0]) or words[0].endswith(":"):
+            continue  # the first line of a log
+        program = "hpcdem" if program == "zdem" else program
+        name = f"{program} {words[0]}"
+        if words[:2] == ["sweep", "report"]:
+            name, words = "hpcdem sweep report", words[2:]
+        elif "-s" in words and program == "hpcdem":
+            name = "hpcdem -s"
+        elif name in COMMANDS:
+            words = words[1:]
+        else:
+            name = program
+        if name == "hpcdem case" and words:
+            continue  # parameters of cases: tests/unit/test_cases.py
+        try:
+            COMMANDS[name].make_context(name, [*words])
+        except click.exceptions.Exit as done:
+            assert done.exit_code == 0, line
+        except click.ClickException as error:
+            pytest.fail(f"{line}: {error.format_message()}")
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("options.md", reference.page), ("python_reference.md", python_reference.page),
+        ("fields.md", fields_reference.page), ("zdem_reference.zh.md", reference_zh.zdem_page),
+        ("pcdc_reference.zh.md", reference_zh.pcdc_page),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)  # fmt: skip
+def test_generated_pages_are_current(name: str, made: Callable[[], str]) -> None:
+    assert (DOCS / name).read_text(encoding="utf-8") == made(), "renew it: docs/writing.md says how"
+
+
+def test_commands_have_their_line_in_chinese() -> None:
+    """Of commands that are there; a new one may wait for its line, and is told in English on the page."""
+    models = {model.keyword.name for command in PCDC.commands for model in command.models}
+    assert set(chinese.ZDEM) == {command.name for command in ZDEM.commands}
+    for texts, names in ((chinese.PCDC, {command.name for command in PCDC.commands}), (chinese.MODELS, models)):
+        assert set(texts) <= names and len(texts) > 0.9 * len(names)
+    for text in (*chinese.ZDEM.values(), *chinese.PCDC.values(), *chinese.MODELS.values()):
+        assert re.search("[\u4e00-\u9fff]", text)
+
+
+def test_pages_of_both_languages_say_the_same_code() -> None:
+    """Tutorials: the same blocks."""
+    english = sorted(p for p in (DOCS / "tutorials").glob("*.md") if not p.name.endswith(".zh.md"))
+    assert len(english) == 6
+    for page in english:
+        twin = page.with_suffix("").with_suffix(".zh.md")
+        ours, theirs = blocks(page), blocks(twin)
+        assert [b.mark for b in ours] == [b.mark for b in theirs]
+        for one, other in zip(ours, theirs):
+            if one.mark:
+                assert one == other
+        assert re.search("[\u4e00-\u9fff]", prose(twin))
