@@ -60,6 +60,20 @@ def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | No
     return Mesh.of(points, cells, groups, layers)
 
 
+def hexes(lines: Sequence[np.ndarray], group: tuple[str, str] | None = None) -> Mesh:
+    """Hexahedra between the grid lines in x, y and z, with the layers of `box`."""
+    made = box(lines, 6)
+    n = np.array([len(line) - 1 for line in lines])
+    number = np.arange(len(made.points)).reshape(*(n + 1)[::-1])
+    corner = {(i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)}
+    ring = ((0, 0), (1, 0), (1, 1), (0, 1))
+    points = np.column_stack([corner[i, j, k] for k in (0, 1) for i, j in ring])
+    found = Mesh.of_hexes(made.points, points)
+    layers = {name: _triangles_on(found.cells, _side(number, axis, end)) for name, axis, end in SIDES}
+    groups = {group[0]: {group[1]: np.arange(len(found.cells))}} if group else {}
+    return Mesh.of(found.points, found.cells, groups, layers, hexes=found.hexes)
+
+
 def _step(at: tuple[int, int, int], axis: int) -> tuple[int, ...]:
     return tuple(1 - c if k == axis else c for k, c in enumerate(at))
 
