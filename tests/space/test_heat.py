@@ -18,7 +18,7 @@ from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
 from tests.heat import exact
 from tests.heat.support import GRANITE, temperatures, until
-from tests.space.support import ROCK, body, box, faces_on, nodes_on
+from tests.space.support import ROCK, body, box, faces_on, hexes, nodes_on
 
 DENSITY = 2500.0
 DIFFUSIVITY = GRANITE["conductivity"] / (DENSITY * GRANITE["capacity"])
@@ -460,6 +460,12 @@ class Log:
 
     def info(self, text: str) -> None:
         logging.info(text)
+
+
+def test_hexahedra_have_no_heat() -> None:
+    sim = body(hexes((1, 1, 1), (1.0, 1.0, 1.0)))
+    with pytest.raises(CommandError, match="hexahedra have no heat"):
+        Heat.of(sim).assign(None, GRANITE)
 
 
 def test_obtuse_tetrahedra_are_told() -> None:

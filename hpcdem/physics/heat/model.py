@@ -131,6 +131,8 @@ class Heat(SurfaceLoad):
         """Elements (None: all) have this thermal model; at the temperature that they have now they are free of thermal
         stress."""
         at = self.blocks.numbers_of_elements(elements)
+        if len(self.blocks.the_mesh().hexes) and (self.blocks.the_mesh().hex_of()[at] >= 0).any():
+            raise CommandError("hexahedra have no heat in this version: thermal-iso-heat is for tetrahedra")
         self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, {}, given))
         self._take_unstressed(at)
 
