@@ -20,6 +20,7 @@ from typing import Any
 _NAMES = {
     "Simulation": "hpcdem.api",
     "couple": "hpcdem.api",
+    "frames": "hpcdem.api",
     "Sweep": "hpcdem.sweep",
     "element_law": "hpcdem.physics.fdem.user_laws",
     "Property": "hpcdem.physics.fdem.properties",

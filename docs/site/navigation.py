@@ -3,7 +3,7 @@
 TUTORIALS = ("thrust_belt", "cracked_specimen", "curve_to_test", "cluster_job", "water", "heat")
 
 NAVIGATION = {
-    "Begin": [f"docs/tutorials/{page}" for page in TUTORIALS] + ["docs/coming_from", "docs/glossary"],
+    "Begin": [f"docs/tutorials/{page}" for page in TUTORIALS] + ["docs/notebooks", "docs/coming_from", "docs/glossary"],
     "How to": [
         "docs/howto", "docs/packages", "docs/running", "docs/cases", "docs/specimens", "docs/specimens_page",
         "docs/meshes", "docs/python", "docs/sweep", "docs/view", "docs/pictures", "docs/measure",

@@ -13,6 +13,7 @@ import numpy as np
 
 from hpcdem import session
 from hpcdem.api.blocks import BlockCommands
+from hpcdem.api.frames import Frame, shown
 from hpcdem.api.program import carried_out
 from hpcdem.api.program import place as _place
 from hpcdem.commands import dem, fdem
@@ -29,6 +30,7 @@ from hpcdem.runtime.checkpoints import newest_first
 if TYPE_CHECKING:
     from hpcdem.commands.fdem import Project
     from hpcdem.physics.dem.simulation import Simulation as Engine
+    from hpcdem.post.view.moment import Moment
 
 SETTABLE = ("x", "y", "vx", "vy", "spin", "radius", "angle", "fix", "color", "group")
 """Fields that a program may write."""
@@ -894,6 +896,65 @@ class Simulation(BlockCommands):
     def _refuse_only_blocks(self) -> None:
         if self._only_blocks:
             raise CommandError("there are no particles; blocks are stepped by step and solve")
+
+    def frame(self, of: str | None = None) -> Frame:
+        """The model as it is now, on one rank: tables for pandas and xarray, pictures; in a notebook it shows itself.
+        of: "particles" or "blocks", left out what there is, particles if there are both."""
+        place, running = _place(), self._session.interpreter
+
+        def make() -> Frame:
+            if self.ranks > 1:
+                raise CommandError("for a run on one rank; on several write frames, and read them by hpcdem.frames()")
+            if running is not None and running.keeps_calls:
+                raise CommandError("a script of PCDC draws with pcdc output image")
+            kind = of or ("blocks" if self._only_blocks else "particles")
+            if kind not in ("particles", "blocks"):
+                raise CommandError(f"of: expected 'particles' or 'blocks', got {of!r}")
+            if kind == "blocks" and self._project is None:
+                raise CommandError("there are no blocks")
+            return Frame(self._blocks_now() if kind == "blocks" else self._particles_now(), kind)
+
+        return carried_out(place, "frame", make)
+
+    def _particles_now(self) -> Moment:
+        from hpcdem.physics.dem import diagnostics
+        from hpcdem.post.view.moment import of_particles
+
+        self._ready()
+        return of_particles(diagnostics.frame(self.engine))
+
+    def _blocks_now(self) -> Moment:
+        from hpcdem.commands.fdem import frames
+        from hpcdem.post.view.moment import of_blocks
+
+        assert self._project is not None
+        self._project.ready(use=False)
+        state = frames.whole(self._project)
+        assert state is not None  # on one rank
+        return of_blocks(state)
+
+    def __repr__(self) -> str:
+        if self._engine is None and self._project is None:
+            return "<Simulation: nothing yet>"
+        clock = self._clock
+        bodies = [] if self._engine is None else [f"{self._engine.count(len(self._engine.particles))} particles"]
+        if self._project is not None and self._project.mesh is not None:
+            bodies.append(f"{len(self._project.mesh.cells)} elements")
+        return f"<Simulation: step {clock.step}, {clock.time:.6g} s, {', '.join(bodies)}>"
+
+    def _repr_html_(self) -> str:
+        """Of a notebook: the line of `repr` and a picture of what there is."""
+        try:
+            picture = self.frame().picture()
+        except HpcdemError:  # nothing there yet, or several ranks
+            picture = None
+        return shown(repr(self)[1:-1], picture)
+
+    def _repr_png_(self) -> bytes | None:
+        try:
+            return self.frame().picture()
+        except HpcdemError:
+            return None
 
     def _before_steps(self) -> None:
         if self._engine is not None and self._engine.watchers and self._only_blocks:

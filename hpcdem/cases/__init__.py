@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 CASES = {
     "ucs": "UCS", "brazilian": "Brazilian", "tension": "DirectTension", "bend": "ThreePointBend", "slope": "Slope",
     "tunnel": "Tunnel", "stability": "SlopeStability", "wedge": "Wedge", "support": "Support", "pillar": "Pillar",
+    "triaxial": "Triaxial", "tunnel-face": "TunnelFace",
     "creep": "Creep", "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
     "fault-injection": "FaultInjection",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",

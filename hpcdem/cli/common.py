@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from hpcdem.core import chinese
 from hpcdem.core.errors import HpcdemError
 from hpcdem.runtime import launch, shutdown
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from hpcdem.runtime.progress import Log
 
 HELP = {"help_option_names": ["-h", "--help", "--hlep"], "max_content_width": 110}
+HELP_WORDS = {"-h", "--help", "--hlep"}
 """The misspelt form is the manual's."""
 PATH = click.Path(path_type=Path)
 Work = Callable[["SerialComm", "Log"], None]
@@ -25,12 +27,20 @@ Work = Callable[["SerialComm", "Log"], None]
 
 def read_command_line(command: click.Command, program: str, words: list[str]) -> dict[str, Any]:
     """Values of the options; prints and leaves for --help, --version and for what is not understood."""
+    in_chinese = chinese.wanted(encoding=getattr(sys.stdout, "encoding", None))
+    if in_chinese and (HELP_WORDS & {*words} or (command.no_args_is_help and not words)):
+        from hpcdem.cli.chinese import help_page
+
+        click.echo(help_page(command, program))
+        raise SystemExit(0 if words else 2)
     try:
         return command.make_context(program, words).params
     except click.exceptions.Exit as done:
         raise SystemExit(done.exit_code) from None
     except click.ClickException as error:
         error.show()
+        if chinese.wanted() and (text := chinese.meaning(error.format_message())):
+            click.echo(text, err=True)
         raise SystemExit(error.exit_code) from None
 
 

@@ -8,7 +8,7 @@ import re
 import sys
 from typing import Any
 
-from hpcdem.api import Call, Coupling, Simulation, blocks, couple
+from hpcdem.api import Call, Coupling, Frame, Frames, Simulation, blocks, couple, frames
 from hpcdem.sweep import Sweep
 
 _TOP = """\
@@ -36,6 +36,8 @@ def page() -> str:
     parts = [_TOP, _class("hpcdem.Simulation", Simulation, "sim")]
     parts += [_class(f"sim.{name}", of, f"sim.{name}") for name, of in OF_BLOCKS.items()]
     parts += [f"## hpcdem.couple\n\n{_function('hpcdem.couple', couple, method=False)}"]
+    parts += [f"## hpcdem.frames\n\n{_function('hpcdem.frames', frames, method=False)}"]
+    parts += [_class("Frames", Frames, "frames"), _class("Frame", Frame, "frame")]
     parts += [_class("Coupling", Coupling, "both"), _class("Call", Call, "call")]
     parts += [_class("hpcdem.Sweep", Sweep, "sweep")]
     return "\n".join(parts).rstrip("\n") + "\n"

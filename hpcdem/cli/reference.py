@@ -36,7 +36,8 @@ _TOP = """\
 # Programs and options
 
 This page is made from the programs themselves; do not edit it (`python -m hpcdem.cli.reference >
-docs/options.md`). `--help` says the same. `zdem` is another name of `hpcdem`. Defaults stand in brackets.
+docs/options.md`). `--help` says the same, in part in Chinese
+([languages](running.md#language-of-messages)). `zdem` is another name of `hpcdem`. Defaults stand in brackets.
 
 ## Exit codes
 

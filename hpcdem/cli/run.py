@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hpcdem.cli.chinese import translated
 from hpcdem.cli.common import HELP, PATH
+from hpcdem.core import chinese
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
 from hpcdem.runtime.run_folder import Job, claim
@@ -337,6 +339,8 @@ class RunCommand(click.Command):
         super().format_options(ctx, formatter)
         from hpcdem.cli.strain_stress import strain_stress
 
+        if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)):
+            translated(strain_stress)
         hidden = [parameter for parameter in self.get_params(ctx) if getattr(parameter, "hidden", False)]
         shown = {option for parameter in self.get_params(ctx) if parameter not in hidden for option in parameter.opts}
         rows = [

@@ -7,7 +7,7 @@ Words, values, units and defaults are those of the tables, as on the English pag
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from hpcdem.lang import chinese
 from hpcdem.lang.pages import escaped
@@ -53,10 +53,18 @@ def zdem_page() -> str:
     parts = [
         _HEAD.format(name="ZDEM", package="zdem"),
         _ZDEM,
-        _overview([c.name for c in ZDEM.commands], chinese.ZDEM),
+        _overview({c.name: _said(chinese.ZDEM, c.name, c.doc) for c in ZDEM.commands}),
     ]
     for command in ZDEM.commands:
-        lines = [f"## {command.name}", "", f"`{zdem._shortened(command)}`", "", chinese.ZDEM[command.name], "", "```"]
+        lines = [
+            f"## {command.name}",
+            "",
+            f"`{zdem._shortened(command)}`",
+            "",
+            _said(chinese.ZDEM, command.name, command.doc),
+            "",
+            "```",
+        ]
         lines += [*zdem._syntax(command), "```", ""]
         if not command.same_as:
             if command.options:
@@ -74,10 +82,18 @@ def pcdc_page() -> str:
     parts = [
         _HEAD.format(name="PCDC", package="pcdc"),
         _PCDC,
-        _overview([c.name for c in PCDC.commands], chinese.PCDC),
+        _overview({c.name: _said(chinese.PCDC, c.name, c.doc) for c in PCDC.commands}),
     ]
     for command in PCDC.commands:
-        lines = [f"## {command.name}", "", f"`pcdc {command.notation}`", "", chinese.PCDC[command.name], "", "```"]
+        lines = [
+            f"## {command.name}",
+            "",
+            f"`pcdc {command.notation}`",
+            "",
+            _said(chinese.PCDC, command.name, command.doc),
+            "",
+            "```",
+        ]
         lines += [*pcdc._syntax(command), "```", ""]
         if command.leading or command.options:
             lines += [_chinese(pcdc._options(command.options, command.leading)), ""]
@@ -90,14 +106,19 @@ def pcdc_page() -> str:
     for command in PCDC.commands:
         for model in command.models:
             lines = [f"### {model.keyword.name}", "", f"`{model.notation}`(`pcdc {command.name}`)", ""]
-            lines += [chinese.MODELS[model.keyword.name], ""]
+            lines += [_said(chinese.MODELS, model.keyword.name, model.doc), ""]
             parts.append("\n".join([*lines, *([_chinese(pcdc._options(model.options)), ""] if model.options else [])]))
     return "\n".join(parts).rstrip("\n") + "\n"
 
 
-def _overview(names: Sequence[str], of: dict[str, str]) -> str:
+def _said(of: dict[str, str], name: str, doc: str) -> str:
+    """In Chinese; the first sentence in English where nobody has written it yet."""
+    return of.get(name) or doc.split(". ")[0].rstrip(".") + "."
+
+
+def _overview(texts: dict[str, str]) -> str:
     lines = ["", "## 全部命令", "", "| 命令 | 作用 |", "|---|---|"]
-    lines += [f"| [{name}](#{name.lower().replace(' ', '-')}) | {escaped(of[name])} |" for name in names]
+    lines += [f"| [{name}](#{name.lower().replace(' ', '-')}) | {escaped(text)} |" for name, text in texts.items()]
     return "\n".join([*lines, ""])
 
 

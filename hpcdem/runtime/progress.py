@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, TextIO
 
 from hpcdem.core.timers import Summary, Timers
+from hpcdem.runtime.notebook import NotebookBar, in_notebook
 
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""
@@ -88,7 +89,8 @@ class Log:
         self._now = now
         # Open MPI gives its processes a terminal of their own, wherever their output goes in the end.
         self._terminal = self._speaks and self._stream.isatty() and "OMPI_COMM_WORLD_SIZE" not in os.environ
-        self._bar: Bar | None = None
+        self._notebook = self._speaks and stream is None and in_notebook()
+        self._bar: Bar | NotebookBar | None = None
         self._warned: set[str] = set()
         self._script_steps = 0
         self._script_done = self._script_first = 0
@@ -160,6 +162,8 @@ class Log:
         self._print(f"{where}{name}, {whole} step{'s' * (whole != 1)}{left}")
         if self._terminal:
             self._bar = Bar(self._stream, name, whole, self._script_steps, self._script_done)
+        elif self._notebook:
+            self._bar = NotebookBar(name, whole, self._script_steps, self._script_done)
 
     def wants(self, step: int) -> bool:
         """Move the bar to this step; True if a line is due, so that a StepStatus must be made (ask rank 0)."""

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
+from hpcdem.core.chinese import beside
 from hpcdem.core.errors import EXIT_ERROR, EXIT_OK, HpcdemError
 
 EXIT_INTERRUPTED, EXIT_TERMINATED = 130, 143
@@ -48,7 +49,7 @@ class ExitStatus:
 def describe(error: BaseException) -> Failure:
     """Message alone for what a user can act on, traceback for what only we can."""
     if isinstance(error, HpcdemError):
-        return Failure(error.exit_code, f"hpcdem: {error}")
+        return Failure(error.exit_code, beside(f"hpcdem: {error}"))
     if isinstance(error, SystemExit):
         code = error.code if isinstance(error.code, int) else EXIT_OK if error.code is None else EXIT_ERROR
         return Failure(code, error.code if isinstance(error.code, str) else "")

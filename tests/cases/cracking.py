@@ -52,4 +52,4 @@ def study(launch: Launcher, folder: Path, name: str, timeout: float = 600.0, **g
     assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout}{done.stderr}"
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("RESULT ")]
     last = list_mesh_frames(folder / "out", name)[-1]
-    return Study(json.loads(line.removeprefix("RESULT ")), read_mesh_frame(last.path), folder / "out")
+    return Study(json.loads(line.removeprefix("RESULT ")), read_mesh_frame(last.path, solid=True), folder / "out")

@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 from hpcdem.commands.dem import properties, settings
+from hpcdem.commands.fdem import coupling, meshes
+from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.physics.coupling.model import Coupled
 from hpcdem.physics.fdem import changes
 from hpcdem.physics.fdem import saved_state as blocks_state
+from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.support import rectangle
 from tests.coupled.support import body, discs, together
 
@@ -168,3 +171,13 @@ def test_what_a_function_must_not_do(resident, tmp_path, inside, said):
     done = resident(1, "script.sc", "--no-figure", cwd=tmp_path)
     assert done.returncode in (1, 2) and "script.sc" in done.stderr and "11" in done.stderr, done.stderr
     assert said in done.stderr
+
+
+def test_blocks_in_three_dimensions(tmp_path):
+    """Particles are discs of a plane: they are not stepped with tetrahedra."""
+    project = Project(Blocks(outdir=tmp_path / "data"), tmp_path, tmp_path / "data")
+    project.clear(3)
+    meshes.box(project, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1, 1, 1))
+    with pytest.raises(CommandError, match="discs move in a plane: they cannot be stepped with blocks in three"):
+        coupling.couple(project, discs([(0.5, 1.5, 0.1)], tmp_path / "sand", dt=5e-6))
+    assert project.coupled is None

@@ -11,11 +11,12 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem import changes, convergence, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels, reference
+from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import RATE
 from tests.flow import exact
 from tests.flow.space import on_plane, points_at, ring, standing
-from tests.flow.support import WATER, hold, inner, run, until
+from tests.flow.support import WATER, hold, inner, over, run, until
 from tests.space.support import body, box
 
 SHAKEN = box((3, 3, 2), (3.0, 2.0, 1.0), 5, shaken=0.25)
@@ -325,3 +326,136 @@ def test_an_unbroken_joint_has_a_virtual_aperture() -> None:
     aperture = flow.values("flow-channel", "aperture")
     assert (aperture > 1e-6).all() and np.ptp(aperture) > 0.0
     assert diagnostics.joint_counts(sim)[2] == 0
+
+
+# ---- implicit steps -------------------------------------------------------------------------------------------------
+
+
+def _disc(parts: int) -> tuple[Blocks, Flow, np.ndarray]:
+    """Between r = 1 and 5 m, K 2.2 GPa; radii of the flow nodes."""
+    mesh = ring(np.geomspace(1.0, 5.0, parts + 1), 4 * parts, np.array([-0.5, 0.0, 0.5]))
+    sim, flow = standing(mesh, on_plane(mesh, 2, 0.0))
+    nodes = flow.numbers("flow-node")
+    r = np.hypot(*mesh.points[nodes, :2].T)
+    hold(flow, nodes[r < 1.0 + 1e-9], 10e6)
+    hold(flow, nodes[r > 5.0 - 1e-9], 1e6)
+    return sim, flow, r
+
+
+def test_steady_flow_in_a_disc_at_once() -> None:
+    """Pressures at all nodes, and Q, of second order in the mesh; what comes in goes out."""
+    errors = []
+    for parts in (6, 12):
+        sim, flow, r = _disc(parts)
+        with Coupled(sim, 1.0) as solved:
+            solved.steady()
+        inflow, pressure = flow.values("flow-node", "inflow"), flow.values("flow-node", "pressure")
+        wanted = 2.0 * math.pi * 1e-15 / (12.0 * 1e-3) * 9e6 / math.log(5.0)
+        into, out = inflow[r < 1.0 + 1e-9].sum(), inflow[r > 5.0 - 1e-9].sum()
+        assert into == pytest.approx(-out, rel=1e-8) and flow.account()["relative"] < 1e-12
+        assert pressure == pytest.approx(exact.radial(r, (1.0, 10e6), (5.0, 1e6)), abs=2e4)
+        errors.append(abs(into / wanted - 1.0))
+    assert errors[1] < 0.005 and errors[1] == pytest.approx(errors[0] / 4.0, rel=0.1)
+
+
+def test_implicit_steps_are_those_of_small_explicit_ones() -> None:
+    """A column that fills from below, against gravity; dry nodes, an outlet that takes more than there is."""
+    found = []
+    for implicit in (False, True):
+        mesh = box((2, 2, 6), (0.4, 0.4, 1.2), 6, shaken=0.1)
+        sim, flow = standing(mesh, None, fluid_bulk=1e5, aperature_initial=1e-4)
+        sim.gravity(0.5, 0.0, -9.81)
+        nodes = flow.numbers("flow-node")
+        z = mesh.points[nodes, 2]
+        flow.fill(None, saturation=0.3)
+        hold(flow, nodes[z == 0.0], 6e3)
+        flow.prescribe(nodes[z == 1.2], kernels.RATE, -1e-9)
+        if implicit:
+            over(sim, 3.0, 60)
+        else:
+            until(sim, 3.0)
+        assert flow.account()["relative"] < 1e-12
+        found.append((flow.values("flow-node", "saturation"), flow.account()["given"], flow.time))
+    assert found[0][2] == pytest.approx(found[1][2], rel=0.01)
+    assert np.ptp(found[0][0]) > 0.3 and found[1][0] == pytest.approx(found[0][0], abs=0.03)
+    assert found[1][1] == pytest.approx(found[0][1], rel=0.02)
+
+
+def _pushed(split: int = 6, **changes: float) -> tuple[Blocks, Flow]:
+    """Two blocks with intact joints between them, held outside, at a pressure, in static equilibrium."""
+    mesh = box((3, 2, 2), (0.3, 0.2, 0.2), split)
+    sim = body(mesh, dynamic=False, young=1e9)
+    joints = on_plane(mesh, 2, 0.1)
+    law = {"friction": 30.0, "cohesion": 8e9, "tensile_strength": 2e9, "gf1": 1e6, "gf2": 4e6, "penalty_normal": 1e10}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    sim.velocity_condition(None, vx=0.0, vy=0.0)
+    for z in (0.0, 0.2):
+        sim.velocity_condition(points_at(mesh, z=z), vx=0.0, vy=0.0, vz=0.0)
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, **changes})
+    flow.fill(None, saturation=1.0)
+    return sim, flow
+
+
+def test_fluid_that_is_pumped_into_a_joint_opens_it() -> None:
+    """Uniaxial: the fluid that came in is the room that opened and what is pressed together; walls and joint carry the
+    pressure, each as stiff as it is."""
+    sim, flow = _pushed(aperature_initial=1e-4)
+    nodes = flow.numbers("flow-node")
+    area = np.zeros(len(flow.network.there))
+    mesh, channels = sim.mesh, flow.network.channels
+    np.add.at(area, flow.network.corners, (mesh.face_sizes(channels) / 3.0)[:, None])
+    table = flow.conditions
+    for node in nodes:
+        flow.prescribe(np.array([node]), kernels.RATE, 1e-5 * float(area[node]))
+    assert len(table) > 2
+    over(sim, 4.0, 4)
+    pressure = flow.values("flow-node", "pressure")
+    p = pressure.mean()
+    assert pressure == pytest.approx(p, rel=1e-6)
+    aperture = flow.values("flow-channel", "aperture")
+    assert aperture == pytest.approx(aperture.mean(), rel=1e-6)
+    o = aperture.mean() - 1e-4
+    # p = M o / (2 h) + stress of the joints at this opening, found from the stress in the blocks.
+    stress = -diagnostics.values(sim, "stress_zz").mean()
+    assert stress == pytest.approx(1.2e9 * 0.5 * o / 0.1, rel=1e-3) and stress < 0.9 * p
+    given = flow.account()["given"]
+    assert given == pytest.approx(0.06 * (1e-4 + 4e-5), rel=1e-9)
+    assert 0.06 * (1e-4 + o) * (1.0 + p / 2.2e9) == pytest.approx(given, rel=1e-6)
+    assert flow.account()["relative"] < 1e-12
+
+
+def test_the_matrix_is_the_derivative_of_what_is_lacking() -> None:
+    """Newton's method of the coupled problem needs few iterations in tangled states: slip, dilation, leak-off, height,
+    partly dry; each is the derivative of the residual by differences."""
+    sim, flow = _pushed(5, aperature_initial=1e-4, shear_dilation=15.0, fluid_bulk=1e6)
+    sim.gravity(0.3, 0.2, -9.81)
+    flow.fill(None, pressure=1e5)  # at u = 0 there is a kink
+    flow.fill(flow.numbers("flow-node")[::3], saturation=0.6)
+    hold(flow, flow.numbers("flow-node")[:2], 2e5)
+    with Coupled(sim, 1e-3) as run_:
+        fluid = run_.fluid
+        step, u = fluid.begin(1e-3, run_.x)
+        x = run_.x + np.random.default_rng(1).uniform(-1e-5, 1e-5, run_.x.shape)
+        now = fluid.balance(step, u, x)
+        first, n = len(x), fluid.n
+        matrix = np.zeros((n, 3 * first + n))
+        for one in fluid.pieces(step, now, u, x, first)[:2]:
+            for nodes, stiffness in zip(one.node, one.stiffness):
+                places = [3 * k + np.arange(3) if k < first else np.array([3 * first + k - first, -1, -1])
+                          for k in nodes]  # fmt: skip
+                columns = np.concatenate(places)
+                for i, row in enumerate(columns):
+                    if row >= 3 * first:
+                        keep = columns >= 0
+                        np.add.at(matrix[row - 3 * first], columns[keep], stiffness[i][keep])
+        check = np.random.default_rng(4)
+        for _ in range(6):
+            way = check.uniform(-1.0, 1.0, first * 3 + n)
+            way[: 3 * first] *= 1e-9
+            way[3 * first :] *= 1e-6
+            dx, du = way[: 3 * first].reshape(-1, 3), way[3 * first :]
+            plus, minus = (fluid.balance(step, u + s * du, x + s * dx).residual for s in (1.0, -1.0))
+            free = ~now.held
+            found, wanted = (matrix @ way)[free], (0.5 * (plus - minus))[free]
+            assert np.abs(found - wanted).max() < 1e-2 * np.abs(wanted).max()

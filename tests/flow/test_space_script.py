@@ -47,7 +47,6 @@ pcdc model step 150
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("model solve hydraulic steady", "two dimensions"),
         ("flow-node initial concentration 0.2", "two dimensions"),
         ("face-joint c-model hydr-p-p-m property fluid-density 1000", "two dimensions"),
     ],

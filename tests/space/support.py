@@ -13,6 +13,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.pre.mesh import structured_space
 
 ROCK = {"density": 2700.0, "young": 50e9, "poisson_ratio": 0.25}
+DENSITY = ROCK["density"]
 LAME = SHEAR = 20e9
 """Its moduli [Pa]."""
 

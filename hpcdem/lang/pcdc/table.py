@@ -681,18 +681,17 @@ _MODEL = (
                      Option("ela{stic}", (), "at once, without steps"),
                      Option("hyd{raulic}", (), "flow by implicit steps, backward Euler, for so much time or until it "
                             "is steady; in static runs blocks are in equilibrium at the end of each step, and joints "
-                            "may pass their peak and break; with mechanical off, flow alone", dims=PLANE),
+                            "may pass their peak and break; with mechanical off, flow alone"),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
                             "and joints may pass their peak and break; with mechanical off, heat alone", dims=PLANE),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
-                            "shorter where joints break or no balance is found", "s", "a hundredth of the time",
-                            dims=PLANE),
+                            "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
                             "where an estimate says that these cost less, or where implicit ones are refused; the log "
-                            "has both estimates", dims=PLANE),
+                            "has both estimates"),
                      Option("stea{dy}", (), "with hydraulic or thermal: until as much flows out as in; no time "
-                            "passes", dims=PLANE),
+                            "passes"),
                      Option("solver", (choice("auto", "direct", "petsc"),), "with elastic, hydraulic or thermal: "
                             "SciPy on one rank, the same bits on any number of ranks; PETSc on all; auto: PETSc, if "
                             "it is there, from 400 000 unknowns on, in space from 20 000", default="auto"),

@@ -1,7 +1,7 @@
 """Flow by implicit steps, with blocks in static equilibrium at the end of each: fluid and rock by one Newton method.
 
 Joints may pass their peak and break on the way; time steps are cut where none of them finds balance, or where more than
-one joint would pass its peak. No step without balance is ever kept.
+one joint would pass its peak, in space more than are along the rim of a fracture. No step without balance is ever kept.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
 from hpcdem.physics.fdem import equilibrium, user_laws
-from hpcdem.physics.fdem.connectivity import corner_counts
-from hpcdem.physics.fdem.linear import MANY, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
+from hpcdem.physics.fdem.linear import MANY, MANY_IN_SPACE, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.costs import Cost, implicit
 from hpcdem.physics.flow.implicit import Balance, Fluid, Step, reference_pressure
@@ -44,7 +43,7 @@ STEADY = 1e-9
 
 @dataclass
 class _Found:
-    """What Newton's method came to: positions (nn, 2), variables (nf,), the balance of the fluid, what is lacking,
+    """What Newton's method came to: positions (nn, dim), variables (nf,), the balance of the fluid, what is lacking,
     iterations, joints that pass their peak; error: why this is no balance, "" if it is; storing: fluid that is stored
     over what flows."""
 
@@ -89,6 +88,10 @@ class Coupled:
         self.sim, self.flow, self.longest, self.wanted = sim, flow, longest, solver
         self.moves = bool(sim.options.mechanical)
         self.count = Count()
+        self.front = 1
+        """Joints that may pass their peak in one step: in space about those along the rim of a fracture in so many."""
+        if sim.dim == 3:
+            self.front = max(1, round(math.sqrt(int(((sim.joint_row > 0) & sim.joint_exists()).sum()))))
         self._refuse()
 
     def _refuse(self) -> None:
@@ -187,9 +190,11 @@ class Coupled:
     def _of_blocks(self) -> Unknowns:
         sim, count = self.sim, len(self.x)
         if not self.moves:
+            dim = sim.dim
             return Unknowns(
-                np.full((count, 2), -1), np.tile(np.eye(2), (count, 1, 1)), np.zeros((count, 2)), np.zeros(count, bool)
-            )
+                np.full((count, dim), -1), np.tile(np.eye(dim), (count, 1, 1)), np.zeros((count, dim)),
+                np.zeros(count, bool),
+            )  # fmt: skip
         found = equilibrium.unknowns_of(sim, self.nodes, 1)
         if found.given.any():
             raise CommandError("implicit steps of flow hold nodes or leave them free: other velocities are for steps")
@@ -197,19 +202,20 @@ class Coupled:
 
     def _unknowns(self) -> Unknowns:
         """Those of the blocks, then the variable of each flow node."""
-        of, n, blocks = self.of_blocks, len(self.flow.network.nodes), len(self.x)
-        number = np.full((blocks + n, 2), -1, np.int64)
+        of, n, blocks, dim = self.of_blocks, len(self.flow.network.nodes), len(self.x), self.sim.dim
+        number = np.full((blocks + n, dim), -1, np.int64)
         number[:blocks] = of.number
         number[blocks:, 0] = of.count + np.arange(n)
-        way = np.concatenate([of.way, np.tile(np.eye(2), (n, 1, 1))])
-        found = Unknowns(number, way, np.zeros((blocks + n, 2)), np.concatenate([of.oblique, np.zeros(n, bool)]))
+        way = np.concatenate([of.way, np.tile(np.eye(dim), (n, 1, 1))])
+        found = Unknowns(number, way, np.zeros((blocks + n, dim)), np.concatenate([of.oblique, np.zeros(n, bool)]))
         self.count.unknowns = found.count
         return found
 
     def _solver(self) -> Direct | Petsc | Condensed:
         sim, unknowns = self.sim, self.unknowns
         made: Direct | Petsc | Condensed
-        if self.wanted == "petsc" or (self.wanted == "auto" and unknowns.count >= MANY):
+        many = MANY if sim.dim == 2 or not self.moves else MANY_IN_SPACE
+        if self.wanted == "petsc" or (self.wanted == "auto" and unknowns.count >= many and not self._condenses()):
             there = not sim.comm.any(not petsc_there())
             if self.wanted == "petsc" and not there:
                 raise CommandError("petsc4py is not installed, or PETSc cannot be loaded: use solver direct")
@@ -217,21 +223,24 @@ class Coupled:
             there = False
         if there:
             made = Petsc(sim.comm, unknowns, np.concatenate([self.nodes.owner, self.nodes.owner[self.fluid.lead]]))
-        elif self.moves and Condensed.suits(unknowns, kept := self._of_joints()):
-            made = Condensed(sim.comm, unknowns, kept)
+        elif self._condenses():
+            made = Condensed(sim.comm, unknowns, self._of_joints())
         else:
             made = Direct(sim.comm, unknowns, self.nodes.owner)
             made.flows = True
         self.count.solver = made.name
         return made
 
+    def _condenses(self) -> bool:
+        """What is unknown is mostly that of elements."""
+        return self.moves and Condensed.suits(self.unknowns, self._of_joints())
+
     def _of_joints(self) -> np.ndarray:
         """Nodes of joints and fluid."""
-        sim, cells, network = self.sim, self.sim.the_mesh().cells, self.flow.network
+        sim, mesh, network = self.sim, self.sim.the_mesh(), self.flow.network
         lower = np.union1d(np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0)), network.channels)
         faces = np.concatenate([lower, sim.partner[lower]])
-        e, k = faces // 4, faces % 4
-        ends = np.concatenate([sim.node[e, k], sim.node[e, (k + 1) % corner_counts(cells[e])]])
+        ends = sim.node.reshape(-1)[mesh.face_corners(faces).reshape(-1)]
         return np.concatenate([ends, len(self.nodes.lead) + np.arange(len(network.nodes))])
 
     # ---- time steps ----------------------------------------------------------------------------------------------
@@ -263,10 +272,11 @@ class Coupled:
         """The time step after one of dt [s]: joints pass their peak every few steps, and Newton's method is quick."""
         flow = self.flow
         flow.since_peak += 1
+        flow.passed += found.past
         since = flow.since_peak
         longer = dt * GROWTH ** min(since / PLENTY, MOST_GROWTH)
-        if found.past:
-            flow.since_peak = 0
+        if flow.passed >= self.front:
+            flow.since_peak = flow.passed = 0
             return dt / GROWTH if since < FEW else longer if since > PLENTY else dt
         if found.iterations > HARD:
             return dt / GROWTH
@@ -301,8 +311,8 @@ class Coupled:
         """This time step [s], taken if it finds balance. passes: conditions are those at its end, else those of now."""
         sim, (step, u) = self.sim, self.fluid.begin(dt, self.x, passes)
         found = self._newton(step, self.x, u)
-        if not found.error and found.past > 1 and dt > TOGETHER * self.longest:
-            found.error = "more than one joint would pass its peak"
+        if not found.error and found.past > self.front and dt > TOGETHER * self.longest:
+            found.error = f"more than {self.front} joints would pass their peak"
         if not found.error and self.moves:
             memory, past = equilibrium.Memory.of(sim), found.past
             while self._open_joints(found.x):
@@ -326,7 +336,7 @@ class Coupled:
         return found
 
     def _open_joints(self, x: np.ndarray) -> bool:
-        """Joints remember these positions (nn, 2) of the nodes; whether some broke. Until the run is over they stay
+        """Joints remember these positions (nn, dim) of the nodes; whether some broke. Until the run is over they stay
         joints that have no strength: pressed together, their penalty carries them. Leak-off begins."""
         sim, local = self.sim, self.sim.local
         equilibrium.place_corners(sim, x)
@@ -400,13 +410,13 @@ class Coupled:
         return [*equilibrium.of_elements(self.sim), joints, *of_fluid]
 
     def _lacking(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
-        """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, 2); the fluid."""
+        """What forces and fluid lack, over what contributes; the right-hand side (nn + nf, dim); the fluid."""
         with self.sim.timers.around("balance"):
             return self._evaluated(step, x, u)
 
     def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         now = self.fluid.balance(step, u, x)
-        right = np.zeros((len(x) + self.fluid.n, 2))
+        right = np.zeros((len(x) + self.fluid.n, self.sim.dim))
         right[len(x) :, 0] = -now.residual
         sizes = float((now.sizes + now.rounding).sum())
         lack = float(np.abs(now.residual).sum()) / sizes if sizes > 0.0 else 0.0

@@ -28,9 +28,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hpcdem.physics.fdem.connectivity import corner_counts, face_points
 from hpcdem.physics.fdem.linear import Pieces
-from hpcdem.physics.flow import kernels
+from hpcdem.physics.flow import kernels, kernels_space
+from hpcdem.physics.flow.network import LINKS
 from hpcdem.physics.flow.wells import Asked, Well
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class Balance:
     residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; rounding:
     what else counts as such, where pressure and height nearly balance; fluid, volume (n,) [m2]; state (n,
     kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; pumped: by
-    well the fluid that came in [m2], None: what its nodes lack; table (m, kernels.CHANNEL), q [m2/s], lost [m2] (m,):
-    of channels, see kernels.py.
+    well the fluid that came in [m2], None: what its nodes lack; table (l, kernels.CHANNEL), q [m2/s], lost [m2] (l,):
+    of the links of channels, see kernels.py. In space m3 for m2.
     """
 
     residual: np.ndarray
@@ -89,8 +89,9 @@ class Step:
 class Fluid:
     """The network of a model, as arrays. u (n,): variable of each flow node; first (n,): rows of the nodes whose
     variable counts for them, tied (n,) bool: another one's; wells: with the rows of their nodes; at (m, 4): nodes of
-    the blocks at the corners a, b of the lower face and p, q of the other (p faces b); face_at (k, 2), face_node (k,
-    2): nodes of the blocks and flow nodes at the ends of faces of this rank that fluid pushes on, face_key (k,): their
+    the blocks at the corners a, b of the lower face and p, q of the other (p faces b), in space (m, 6): a, b, c and p,
+    q, r (p faces a, r faces b); ends (l, 2): of links, `of` each channel; face_at (k, dim), face_node (k, dim): nodes
+    of the blocks and flow nodes at the corners of faces of this rank that fluid pushes on, face_key (k,): their
     numbers."""
 
     flow: Flow
@@ -100,7 +101,7 @@ class Fluid:
 
     def __post_init__(self) -> None:
         flow, blocks = self.flow, self.flow.blocks
-        network, cells = flow.network, blocks.the_mesh().cells
+        network, self.dim = flow.network, blocks.dim
         self.numbers, self.channels = network.nodes, network.channels
         self.n, self.m = len(network.nodes), len(network.channels)
         row_of = np.full(len(network.there), -1, np.int64)
@@ -108,18 +109,19 @@ class Fluid:
         self.ends = row_of[network.ends]
         lower, other = self.channels, blocks.partner[self.channels]
         self.at = np.column_stack([self._corners(faces) for faces in (lower, other)])
-        self.law = (flow.row[self.channels] - 1).astype(np.int64)
+        self.of = np.repeat(np.arange(self.m), LINKS[self.dim])
+        self.law = (flow.row[self.channels] - 1).astype(np.int64)[self.of]
         self.laws, self.bulk = flow.laws(), flow.fluid("fluid_bulk")
         faces = flow.wet() if flow.pushes else np.empty(0, np.int64)
         self.face_key = faces
-        self.face_at, self.face_node = self._corners(faces), row_of[face_points(cells, faces)]
+        self.face_at, self.face_node = self._corners(faces), row_of[blocks.the_mesh().face_points(faces)]
         self.condition = flow.condition[self.numbers]
         self.held_rows = row_of[flow.held]
         leads = blocks.local.leads[self.numbers]
         self.lead = blocks.node.reshape(-1)[leads]
-        self.side = np.concatenate([-np.ones(self.m), np.ones(self.m)])
+        self.side = np.repeat([-1.0, 1.0], len(self.ends))
         self.end = self.ends.T.reshape(-1)
-        self.both = np.tile(np.arange(self.m), 2)
+        self.both = np.tile(np.arange(len(self.ends)), 2)
         self.fluid = self._gathered(flow.nodes[:, kernels.W])
         p, s = self._gathered(flow.state[: flow.owned, kernels.P]), self._gathered(flow.state[: flow.owned, kernels.S])
         self.first = np.arange(self.n)
@@ -139,10 +141,9 @@ class Fluid:
         return u
 
     def _corners(self, faces: np.ndarray) -> np.ndarray:
-        """(k, 2) nodes of the blocks at both ends of faces."""
+        """(k, dim) nodes of the blocks at the corners of faces."""
         blocks = self.flow.blocks
-        e, k = faces // 4, faces % 4
-        return np.column_stack([blocks.node[e, k], blocks.node[e, (k + 1) % corner_counts(blocks.the_mesh().cells[e])]])
+        return blocks.node.reshape(-1)[blocks.the_mesh().face_corners(faces)]
 
     def _gathered(self, mine: np.ndarray) -> np.ndarray:
         """Values (n,) of all flow nodes from those of this rank."""
@@ -155,11 +156,14 @@ class Fluid:
     # ---- a state -------------------------------------------------------------------------------------------------
 
     def state_of(self, u: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, 2)."""
+        """Pressure, saturation and potential energy (n, kernels.STATE) at these variables and positions (nn, dim)."""
         options = self.flow.blocks.options
         state = np.empty((self.n, kernels.STATE))
         at = x[self.lead]
-        state[:, kernels.E] = -self.flow.fluid("fluid_density") * (options.gx * at[:, 0] + options.gy * at[:, 1])
+        along = options.gx * at[:, 0] + options.gy * at[:, 1]
+        if self.dim == 3:
+            along += options.gz * at[:, 2]
+        state[:, kernels.E] = -self.flow.fluid("fluid_density") * along
         own = self._own(u, state[:, kernels.E])
         state[:, kernels.P] = np.maximum(own, 0.0) * self.p0
         state[:, kernels.S] = np.minimum(1.0 + own, 1.0)
@@ -198,16 +202,14 @@ class Fluid:
         self.flow.state[:] = state[self.held_rows]
 
     def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
-        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, 2)."""
-        corners = np.ascontiguousarray(x[self.at].reshape(self.m, 8))
-        begin, table = 8 * np.arange(self.m), np.empty((self.m, kernels.CHANNEL))
-        kernels.geometry(1, begin, begin + 4, self.law, self.laws, corners, self.flow.viscosity, table)
+        """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
+        table = self._table_at(x)
         if self.thicken is not None:
             self.thicken(self.ends, table)
         does, value = step.conditions[self.condition].T
         state = self.state_of(u, x)
-        q, lost = np.empty(self.m), np.zeros(self.m)
-        since = self.flow.since[self.channels]
+        q, lost = np.empty(len(table)), np.zeros(len(table))
+        since = self.flow.since[self.channels][self.of]
         leaks = bool(np.isfinite(since).any())
         wet = state.copy()
         wet[:, kernels.S] = np.maximum(wet[:, kernels.S], 0.0)  # trial states may lack it
@@ -233,7 +235,7 @@ class Fluid:
             for (_, rows), asked in zip(self.wells, step.asked)
         ]
         head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
-        level = np.bincount(self.end, (table[:, kernels.CONDUCT] * head)[self.both], self.n) * dt
+        level = np.bincount(self.end, (np.abs(table[:, kernels.CONDUCT]) * head)[self.both], self.n) * dt
         return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost)
 
     def _well_lacks(
@@ -264,6 +266,45 @@ class Fluid:
         held[rows] = found is None
         return found
 
+    def _table_at(self, x: np.ndarray) -> np.ndarray:
+        """Apertures, conductances and halves of volumes of links (l, kernels.CHANNEL) at these positions (nn, dim)."""
+        dim, table = self.dim, np.empty((len(self.ends), kernels.CHANNEL))
+        width = self.at.shape[1] * dim
+        corners = np.ascontiguousarray(x[self.at].reshape(self.m, width))
+        begin, args = width * np.arange(self.m), (self.law, self.laws, corners, self.flow.viscosity, table)
+        if dim == 2:
+            kernels.geometry(1, begin, begin + 4, *args)
+        else:
+            near = begin[:, None] + 3 * np.arange(3)
+            kernels_space.geometry(1, near, near + 9, *args)
+        return table
+
+    def _opens(self, x: np.ndarray, delta: np.ndarray) -> np.ndarray:
+        """Derivatives of apertures delta (m,) of channels by the positions of their corners `at`, (m, dim corners)."""
+        law = self.laws[self.law[:: LINKS[self.dim]]]
+        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
+        dilate = law[:, kernels.DILATE, None]
+        at, k = x[self.at], self.dim
+        near, far = at[:, :k], at[:, k:]
+        if k == 2:
+            way = 0.5 * ((near[:, 1] + far[:, 0]) - (near[:, 0] + far[:, 1]))
+            h = np.hypot(way[:, 0], way[:, 1])
+            across, along = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None], way / h[:, None]
+            slip = 0.5 * ((((far[:, 1] - near[:, 0]) + (far[:, 0] - near[:, 1])) * along).sum(axis=1))
+            size, along = np.abs(slip), np.sign(slip)[:, None] * along
+        else:
+            middle = 0.5 * (near + far[:, [0, 2, 1]])
+            across = np.cross(middle[:, 1] - middle[:, 0], middle[:, 2] - middle[:, 0])
+            across /= np.linalg.norm(across, axis=1)[:, None]
+            away = (far.sum(axis=1) - near.sum(axis=1)) / 3.0
+            slip = away - (away * across).sum(axis=1)[:, None] * across
+            size = np.linalg.norm(slip, axis=1)
+            along = slip / np.maximum(size, 1e-300)[:, None]
+        gains = law[:, kernels.DILATE] * size < law[:, kernels.GAIN]
+        opens = across + np.where(gains[:, None], dilate, 0.0) * along
+        side = np.repeat([-1.0, 1.0], k)[:, None] / k
+        return (np.where(moves, 1.0, 0.0)[:, None, None] * side * opens[:, None, :]).reshape(self.m, -1)
+
     # ---- derivatives ---------------------------------------------------------------------------------------------
 
     def pieces(self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int) -> list[Pieces]:
@@ -291,7 +332,7 @@ class Fluid:
         tied = np.flatnonzero(self.tied)
         made = []
         for key, node, values in ((np.arange(self.n), self.first, diagonal), (tied, tied, room[tied])):
-            stiffness = np.zeros((len(key), 2, 2))
+            stiffness = np.zeros((len(key), self.dim, self.dim))
             stiffness[:, 0, 0] = values
             made.append(Pieces(key, first + node[:, None], stiffness))
         return made
@@ -308,7 +349,7 @@ class Fluid:
         p, s, e = (state[:, k][ends] for k in (kernels.P, kernels.S, kernels.E))
         s = np.maximum(s, 0.0)
         head = (p[:, 0] - p[:, 1]) + (e[:, 0] - e[:, 1]) * weight
-        mean, down = 0.5 * (s[:, 0] + s[:, 1]), head > 0.0
+        mean, down = 0.5 * (s[:, 0] + s[:, 1]), (head > 0.0) == (conduct > 0.0)
         up = np.where(down, s[:, 0], s[:, 1])
         wet = np.minimum(mean, up)
         part, slope = wet * wet * (3.0 - 2.0 * wet), 6.0 * wet * (1.0 - wet)
@@ -329,43 +370,37 @@ class Fluid:
                 (now.lost[mine][at] * power / over)[:, None] * p_u[ends[at]]
                 + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
             )
-        a, b, c, d = (x[self.at[mine, k]] for k in range(4))
-        way = 0.5 * ((b + c) - (a + d))
-        h = np.hypot(way[:, 0], way[:, 1])
-        across = np.column_stack([way[:, 1], -way[:, 0]]) / h[:, None]
-        law = self.laws[self.law[mine]]
-        moves = (delta > law[:, kernels.LEAST]) & (delta < law[:, kernels.MOST])
-        along = way / h[:, None]
-        slip = 0.5 * ((((d - a) + (c - b)) * along).sum(axis=1))
-        gains = law[:, kernels.DILATE] * np.abs(slip) < law[:, kernels.GAIN]
-        opens = across + np.where(gains, law[:, kernels.DILATE] * np.sign(slip), 0.0)[:, None] * along
-        by_x = np.where(moves, 0.5, 0.0)[:, None, None] * np.array([-1.0, -1.0, 1.0, 1.0])[:, None] * opens[:, None, :]
-        by_x = by_x.reshape(m, 8)  # of the aperture
-        first_row = 8 if self.flow.blocks.options.mechanical else 0  # blocks that stand still need no columns
+        by_x = self._opens(x, now.table[:: LINKS[self.dim], kernels.APERTURE])[self.of][mine]
+        # Blocks that stand still need no columns.
+        dim, first_row = self.dim, by_x.shape[1] if self.flow.blocks.options.mechanical else 0
         fill = state[:, kernels.S] + state[:, kernels.P] / self.bulk
-        out = np.zeros((m, first_row + 4, first_row + 4))
+        out = np.zeros((m, first_row + 2 * dim, first_row + 2 * dim))
         for end in range(2):
-            row = first_row + 2 * end
-            out[:, row, first_row::2] = sign[end] * dt * by_u + leak_u
+            row = first_row + dim * end
+            out[:, row, first_row::dim] = sign[end] * dt * by_u + leak_u
             if first_row:
                 stored = half / delta * fill[ends[:, end]]
-                out[:, row, :8] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
+                out[:, row, :first_row] = (stored + sign[end] * dt * 3.0 * now.q[mine] / delta)[:, None] * by_x
             out[now.held[ends[:, end]], row, :] = 0.0
         of_fluid = first + self.first[ends]
-        nodes = np.column_stack([self.at[mine], of_fluid]) if first_row else of_fluid
-        return Pieces(self.channels[mine], nodes, out)
+        nodes = np.column_stack([self.at[self.of][mine], of_fluid]) if first_row else of_fluid
+        return Pieces(self.channels[self.of][mine], nodes, out)
 
     def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, first: int) -> Pieces:
         """Of the forces on faces by the variables at their ends: kernels.loads. p_u (n,): derivatives of pressures."""
         k = len(self.face_key)
         p_u = p_u[self.face_node]
-        one, two = x[self.face_at[:, 0]], x[self.face_at[:, 1]]
-        normal = np.column_stack([two[:, 1] - one[:, 1], one[:, 0] - two[:, 0]])
-        out = np.zeros((k, 8, 8))
-        for end in range(2):
-            for by in range(2):
-                weight = (2.0 if end == by else 1.0) / 6.0 * p_u[:, by]
-                out[:, 2 * end : 2 * end + 2, 4 + 2 * by] = weight[:, None] * normal
+        at, dim = x[self.face_at], self.dim
+        way = at[:, 1:] - at[:, :1]
+        if dim == 2:
+            normal = np.column_stack([way[:, 0, 1], -way[:, 0, 0]]) / 6.0
+        else:
+            normal = np.cross(way[:, 0], way[:, 1]) / 24.0
+        out = np.zeros((k, 2 * dim * dim, 2 * dim * dim))
+        for end in range(dim):
+            for by in range(dim):
+                weight = (2.0 if end == by else 1.0) * p_u[:, by]
+                out[:, dim * end : dim * end + dim, dim * (dim + by)] = weight[:, None] * normal
         return Pieces(self.face_key, np.column_stack([self.face_at, first + self.first[self.face_node]]), out)
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
@@ -392,7 +427,9 @@ class Fluid:
         nodes[:, kernels.INFLOW] = given[mine] / step.dt
         self.show(now.state)
         if flow.carried is not None:
-            flow.carried = step.dt * now.q[np.searchsorted(self.channels, flow.channels_here)]
+            each = LINKS[self.dim]
+            of = each * np.searchsorted(self.channels, flow.channels_here)
+            flow.carried = step.dt * now.q[(of[:, None] + np.arange(each)).reshape(-1)]
         p, s = now.state[:, kernels.P], now.state[:, kernels.S]
         self.fluid, self.u = fluid, self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
         flow.time = step.after
@@ -413,8 +450,8 @@ def reference_pressure(flow: Flow, stress: float) -> float:
     own = flow.state[: flow.owned, kernels.P].max(initial=0.0)
     held = [flow.asked_of(well, flow.time, 0.0, False) for well in flow.wells]
     of_wells = max((one.pressure for one in held if one.pressure is not None), default=0.0)
-    o = flow.blocks.options
-    points = flow.blocks.the_mesh().points[flow.network.nodes]
-    energy = flow.fluid("fluid_density") * np.ptp(points @ np.array([o.gx, o.gy])) if len(points) else 0.0
+    o, mesh = flow.blocks.options, flow.blocks.the_mesh()
+    points, gravity = mesh.points[flow.network.nodes], np.array([o.gx, o.gy, o.gz][: mesh.dim])
+    energy = flow.fluid("fluid_density") * np.ptp(points @ gravity) if len(points) else 0.0
     largest = float(flow.blocks.comm.max_into(np.array([own]))[0])
     return max(largest, float(pressures.max(initial=0.0)), of_wells, float(energy), stress, LEAST_PRESSURE)

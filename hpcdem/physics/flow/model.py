@@ -134,7 +134,7 @@ class Flow(SurfaceLoad):
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
         self.dt = self.implicit_dt = 0.0
-        self.since_peak = 0
+        self.since_peak = self.passed = 0
         self._network: Network | None = None
         self._reshaped = False
         self._found_for: list[float] = []
@@ -940,7 +940,7 @@ class Flow(SurfaceLoad):
             "rows": [[v if math.isfinite(v) else None for v in row] for row in self.rows],
             "conditions": [asdict(one) for one in self.conditions], "removed": self.removed, "time": self.time,
             "cycles": self.cycles, "waited": self.waited, "sub_steps": self.sub_steps, "dt": self.dt,
-            "implicit_dt": self.implicit_dt, "since_peak": self.since_peak,
+            "implicit_dt": self.implicit_dt, "since_peak": self.since_peak, "passed": self.passed,
             "reshaped": self._reshaped, "found_for": self._found_for, "wells": [well.saved() for well in self.wells],
         }  # fmt: skip
 
@@ -973,7 +973,7 @@ class Flow(SurfaceLoad):
         made.removed, made.time = dict(state["removed"]), state["time"]
         made.cycles, made.waited = state["cycles"], state["waited"]
         made.sub_steps, made.dt, made.implicit_dt = state["sub_steps"], state["dt"], state.get("implicit_dt", 0.0)
-        made.since_peak = state.get("since_peak", 0)
+        made.since_peak, made.passed = state.get("since_peak", 0), state.get("passed", 0)
         made._reshaped, made._found_for = state["reshaped"], state["found_for"]
         channels, points, nodes = (tables[f"flow_{name}"] for name in ("channels", "conditions", "nodes"))
         made.row[channels["number"]], made.since[channels["number"]] = channels["row"], channels["since"]

@@ -52,3 +52,17 @@ def modulus(low: float, high: float, *body: object) -> float:
 def strongest(cohesion: float, friction: float) -> float:
     """Mohr-Coulomb: 2 c tan(45 + phi / 2) [Pa], with a plane at the most favourable angle."""
     return 2 * cohesion * float(np.tan(np.radians(45 + friction / 2)))
+
+
+def modulus_in_space(joints: np.ndarray, volume: float, young: float, shear: float, overlay: float) -> float:
+    """Young's modulus [Pa] along z of rock with joints (n, 3, 3) corners [m] that all carry the mean stress s.
+
+    Each, of area A, closes by sqrt(A) s cos2 / P_o and slides by sqrt(A) s sin cos / P_s, which adds A sqrt(A) (cos4 /
+    P_o + cos2 sin2 / P_s) / V to the compliance. shear, overlay: penalties [Pa]. Before the peak joints soften, so it
+    is a little less."""
+    normal = np.cross(joints[:, 1] - joints[:, 0], joints[:, 2] - joints[:, 0])
+    twice = np.linalg.norm(normal, axis=1)
+    cos2 = (normal[:, 2] / twice) ** 2
+    area = 0.5 * twice
+    softer = (area**1.5 * (cos2**2 / overlay + cos2 * (1.0 - cos2) / shear)).sum() / volume
+    return 1.0 / (1.0 / young + softer)

@@ -55,6 +55,33 @@ def test_coarse_specimen(launch, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("overlay", [10.0, 100.0])
+def test_a_cylinder(launch, tmp_path, overlay):
+    """In space, coarse: stiffness of rock and joints, strength within its bounds, cracks of both kinds."""
+    diameter, height = 0.05, 0.1
+    found = study(launch, tmp_path, "ucs", 3600, dim=3, width=diameter, height=height, size=0.01, transits=10,
+                  platens=False, penalty_overlay=overlay)  # fmt: skip
+    strongest = exact.strongest(COHESION, FRICTION)
+    assert 0.6 * strongest <= found.result["peak"] <= strongest
+    body = np.pi / 4 * diameter**2 * height
+    stiff = exact.modulus_in_space(found.state.points[found.state.joints], body, YOUNG, 10 * YOUNG, overlay * YOUNG)
+    assert found.result["modulus"] == pytest.approx(stiff, rel=0.05)
+    assert found.result["tension"] > 0 and found.result["shear"] > 0
+    assert np.isnan(found.result["energy_error"]) and found.curve[-1, 1] < 0.6 * found.result["peak"]
+
+
+def test_joints_across_and_askew_in_space():
+    """One that lies across the load closes only; one at 45 degrees slides as well."""
+    flat = np.array([[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]]])
+    volume, area = 1e-3, 5e-3
+    soft = 1.0 / exact.modulus_in_space(flat, volume, YOUNG, 3e11, 3e12) - 1.0 / YOUNG
+    assert soft == pytest.approx(area**1.5 / 3e12 / volume, rel=1e-9)
+    askew = flat[:, :, [0, 1, 2]] + np.array([0, 0, 1.0]) * flat[:, :, :1]
+    soft = 1.0 / exact.modulus_in_space(askew, volume, YOUNG, 3e11, 3e12) - 1.0 / YOUNG
+    assert soft == pytest.approx((area * 2**0.5) ** 1.5 / 4 * (1 / 3e12 + 1 / 3e11) / volume, rel=1e-9)
+
+
+@pytest.mark.slow
 def test_specimen_and_half_its_cohesion(launch, tmp_path):
     whole = study(launch, tmp_path / "whole", "ucs", 7200)
     check(whole)

@@ -1,0 +1,209 @@
+"""Frames in a Python program or a notebook: tables for pandas and xarray, pictures, what they show by themselves."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from hpcdem.core.errors import HpcdemError, UsageError
+
+if TYPE_CHECKING:
+    from hpcdem.io.frames import FrameFile
+    from hpcdem.post.view.moment import Moment
+
+MAIN = ("particles", "elements")
+"""Kinds of objects of which a frame is asked for if none is named."""
+
+
+class Frame:
+    """A model at one moment: that of a file, or of a simulation (`sim.frame()`). In a notebook it shows a picture.
+
+    step, time [s]; objects: how many there are of each kind; fields(object): their names.
+    """
+
+    def __init__(self, moment: Moment, name: str = "") -> None:
+        self._moment, self.name = moment, name
+        self.step, self.time = moment.step, moment.time
+
+    @property
+    def objects(self) -> dict[str, int]:
+        """How many objects there are of each kind: particles, contacts, bonds, walls, elements, joints, ..."""
+        return {kind: objects.count for kind, objects in self._moment.objects.items()}
+
+    def fields(self, object: str | None = None) -> list[str]:
+        """Names of fields and vectors that these objects have."""
+        return self._moment.of(object or self._main()).known()
+
+    def table(self, object: str | None = None) -> dict[str, np.ndarray]:
+        """Columns (n,) of all fields of a kind of object (default: particles, else elements), x and y of the middle
+        first; vectors as velocity_x, velocity_y. HpcdemError that names the kinds there are."""
+        objects = self._moment.of(object or self._main())
+        columns = {axis: part for axis, part in zip("xyz", objects.centres().T)}
+        for name in objects.known():
+            if name in objects.vectors:
+                columns |= {f"{name}_{axis}": part for axis, part in zip("xyz", objects.vectors[name].T)}
+            else:
+                columns[name] = np.asarray(objects.fields[name])
+        return columns
+
+    def pandas(self, object: str | None = None) -> Any:
+        """`table` as a pandas.DataFrame, whose index is the number of each object."""
+        objects = self._moment.of(object or self._main())
+        data = _needed("pandas").DataFrame(self.table(object))
+        return data.set_index(objects.number) if objects.number in data else data.rename_axis("number")
+
+    def xarray(self, object: str | None = None) -> Any:
+        """`table` as an xarray.Dataset along the numbers of the objects; units are attributes of the variables."""
+        return _with_units(self.pandas(object), self._moment.dim, {"step": self.step, "time": self.time})
+
+    def picture(self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Any) -> bytes:
+        """A PNG of so many pixels' width; field: what colours the objects that have it, or those of the kind `object`;
+        looks: as `limits=(low, high)`, `colours="blue-red"`, `log=True` of a layer of a view (docs/view.md)."""
+        import matplotlib
+
+        from hpcdem.io.axes import CM
+        from hpcdem.post.view import paper, scene
+
+        view = scene.default_view(self._moment)
+        if field is not None:
+            view = scene.with_field(view, self._moment, field, object, **looks)
+        page = paper.Paper(dpi=width / (paper.USUAL.page * CM))
+        content = io.BytesIO()
+        with matplotlib.rc_context(paper.SAVED):
+            paper.figure_of(scene.scene(self._moment, view), page).savefig(content, format="png", dpi=page.dpi)
+        return content.getvalue()
+
+    def show(self, field: str | None = None, object: str | None = None, width: int = 900, **looks: Any) -> Any:
+        """`picture` as an image of IPython, for a notebook."""
+        return _needed("IPython.display").Image(self.picture(field, object, width, **looks))
+
+    def _main(self) -> str:
+        for kind in (*MAIN, *self._moment.objects):
+            if self._moment.objects.get(kind) is not None:
+                return kind
+        raise HpcdemError("this frame holds nothing")
+
+    def __repr__(self) -> str:
+        there = ", ".join(f"{count} {kind}" for kind, count in self.objects.items() if count)
+        return f"<{self.name or 'frame'}: step {self.step}, {self.time:.6g} s, {there or 'nothing'}>"
+
+    def _repr_png_(self) -> bytes:
+        return self.picture()
+
+    def _repr_html_(self) -> str:
+        return shown(repr(self)[1:-1], self.picture() if any(self.objects.values()) else None)
+
+
+class Frames(Sequence[Frame]):
+    """The frames of a run in the order of their steps, read when they are asked for."""
+
+    def __init__(self, files: Sequence[FrameFile]) -> None:
+        self.files = list(files)
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    @overload
+    def __getitem__(self, place: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> Frames: ...
+
+    def __getitem__(self, place: int | slice) -> Frame | Frames:
+        from hpcdem.post.view.moment import read_moment
+
+        if isinstance(place, slice):
+            return Frames(self.files[place])
+        path = self.files[place].path
+        return Frame(read_moment(path), path.name)
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[place] for place in range(len(self)))
+
+    def pandas(self, object: str | None = None) -> Any:
+        """All frames under each other; the index is step and number, `time` [s] a column."""
+        pandas = _needed("pandas")
+        parts = {frame.step: frame.pandas(object).assign(time=frame.time) for frame in self._each()}
+        return pandas.concat(parts, names=["step"])
+
+    def xarray(self, object: str | None = None) -> Any:
+        """All frames beside each other: dimensions step and number, coordinate `time` [s]; NaN where an object was not
+        there yet, or no more."""
+        data = self.pandas(object)
+        times = data.pop("time").groupby("step").first()
+        found = _with_units(data, self[0]._moment.dim, {})
+        return found.assign_coords(time=("step", times.to_numpy()))
+
+    def _each(self) -> Iterator[Frame]:
+        """Each step once: of two frames of one step, before and after, the second."""
+        return iter({frame.step: frame for frame in self}.values())
+
+    def __repr__(self) -> str:
+        steps = f", steps {self.files[0].step} to {self.files[-1].step}" if self.files else ""
+        return f"<{len(self)} frames{steps}>"
+
+    def _repr_html_(self) -> str:
+        return shown(repr(self)[1:-1], self[-1].picture() if self.files else None)
+
+
+def frames(path: str | Path = "data", name: str | None = None) -> Frames:
+    """The frames of a folder, or the one of a file. name: of blocks, frames NAME_<step>.vtkhdf; needed where a folder
+    has several kinds. HpcdemError where there are none."""
+    from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
+    from hpcdem.post.view.moment import read_moment
+
+    path = Path(path)
+    if path.is_file():
+        return Frames([FrameFile(path, read_moment(path).step, False)])
+    if not path.is_dir():
+        raise HpcdemError(f"there is no folder or file {path}")
+    kinds = dict(mesh_frames_by_name(path))
+    if files := list_frames(path):
+        kinds["all"] = files
+    if name is None and len(kinds) == 1:
+        (name,) = kinds
+    if not kinds or name not in kinds:
+        there = f"there are frames of {', '.join(sorted(kinds))}: say which (name=)" if kinds else "there are no frames"
+        raise HpcdemError(f"{path}: {there}")
+    return Frames(kinds[name])
+
+
+def shown(title: str, picture: bytes | None) -> str:
+    """HTML of a line of text and a picture."""
+    image = base64.b64encode(picture).decode() if picture else ""
+    tag = f'<br><img src="data:image/png;base64,{image}" style="max-width:100%">' if image else ""
+    return f"<div>{html.escape(title)}{tag}</div>"
+
+
+def _with_units(data: Any, dim: int, about: dict[str, Any]) -> Any:
+    from hpcdem.post.view.moment import unit_of
+
+    _needed("xarray")
+    found = data.to_xarray()
+    for name in found.data_vars:
+        stem = name.removesuffix("_x").removesuffix("_y").removesuffix("_z")
+        unit = "m" if name in ("x", "y", "z") else unit_of(stem, dim)
+        if unit:
+            found[name].attrs["units"] = unit
+    return found.assign_attrs(about)
+
+
+def _needed(package: str) -> Any:
+    """A package of the extra [notebook]."""
+    try:
+        if package == "pandas":
+            import pandas as module
+        elif package == "xarray":
+            import xarray as module
+        else:
+            import IPython.display as module
+    except ImportError:
+        name = package.partition(".")[0]
+        raise UsageError(f"no package {name} here: pip install {name.lower()}, or the extra [notebook]") from None
+    return module

@@ -1,0 +1,97 @@
+"""Help and messages in Chinese: where the language asks for it, beside the English, and only what is there in English."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from hpcdem.cli import chinese as helps
+from hpcdem.cli.reference import PROGRAMS
+from hpcdem.core import chinese
+
+HAN = re.compile("[\u4e00-\u9fff]")
+
+
+@pytest.mark.parametrize(
+    ("environ", "expected"),
+    [
+        ({"LANG": "zh_CN.UTF-8"}, True), ({"LANG": "en_US.UTF-8"}, False), ({}, False),
+        ({"LANG": "zh_CN.UTF-8", "LC_ALL": "C.UTF-8"}, False), ({"LANG": "C", "HPCDEM_LANG": "zh"}, True),
+        ({"LANG": "zh_CN.UTF-8", "HPCDEM_LANG": "en"}, False), ({"LC_MESSAGES": "zh_TW.UTF-8", "LANG": "C"}, True),
+    ],
+)  # fmt: skip
+def test_the_language_is_that_of_the_user(environ: dict[str, str], expected: bool) -> None:
+    assert chinese.wanted(environ, "utf-8") is expected
+    assert not chinese.wanted(environ, "latin-1"), "a terminal that cannot show it"
+
+
+MEANT = {
+    "hpcdem: a.py:2: read 'PROPP' at column 1, expected a command; did you mean 'PROP'?": "'PROPP' 不是命令;是否想写 'PROP'?",
+    "hpcdem: a.py:2: read 'CYCLE2', expected a command": "'CYCLE2' 不是命令",
+    "hpcdem: a.py:2: PROP: read '-1' at column 11, expected a number not below 0 for fric":
+    "读到 '-1'(第 11 列),此处需要:a number not below 0",
+    "hpcdem: a.sc:1: pcdc model neww: read 'neww' after 'model', expected one of new, save; did you mean 'new'?":
+    "'neww' 不能识别;是否想写 'new'?",
+    "hpcdem: a.py:2: CYC: there is no time step yet; SET DT or SET frac gives one": "还没有时间步:请先用 SET DT 或 SET frac",
+    "hpcdem: 40 ranks are too many for this model: its width ... is 23, so at most 23 ranks fit": "进程数 40 太多:此模型最多用 23 个进程",
+    "No such option '--nope'. (Did you mean one of: '--xmove'?)": "没有选项 --nope",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", MEANT)
+def test_what_messages_mean(message: str) -> None:
+    assert chinese.meaning(message) == MEANT[message]
+
+
+def test_unknown_messages_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chinese, "wanted", lambda: True)
+    assert chinese.beside("hpcdem: something else") == "hpcdem: something else"
+    assert chinese.beside("hpcdem: x.py: no such script") == "hpcdem: x.py: no such script\n        没有脚本文件 x.py"
+
+
+def test_every_text_is_that_of_an_option_that_is_there() -> None:
+    """English that has changed would leave its Chinese behind."""
+    there = set()
+    for command in PROGRAMS.values():
+        there |= {p.help for p in command.params if isinstance(p, click.Option)}
+        there |= {command.epilog, __import__("inspect").cleandoc(command.help or "")}
+    assert not set(helps.TEXTS) - there - {"Show this message and exit."}
+    assert set(helps.LONG) <= {command.name for command in PROGRAMS.values()}
+    assert all(HAN.search(text) for text in (*helps.TEXTS.values(), *helps.LONG.values()))
+
+
+def program(*words: str, **environ: str) -> subprocess.CompletedProcess[str]:
+    env = {k: v for k, v in os.environ.items() if k not in ("LC_ALL", "LC_MESSAGES", "LANG", "HPCDEM_LANG")}
+    env |= {"PYTHONUTF8": "1", **environ}
+    return subprocess.run(
+        [sys.executable, "-m", "hpcdem", *words], env=env, capture_output=True, text=True, encoding="utf-8", check=False
+    )
+
+
+def test_help_and_errors_of_the_program(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("START\nPROPP fric 1\n")
+    script = str(tmp_path / "a.py")
+    shown = program("--help", LANG="zh_CN.UTF-8")
+    assert (
+        shown.returncode == 0
+        and shown.stdout.startswith("用法: hpcdem")
+        and "从此脚本最新的重启文件继续" in shown.stdout
+    )
+    assert helps.PARTLY not in shown.stdout and "Stress" not in shown.stdout
+    failed = program("--check", script, LANG="zh_CN.UTF-8")
+    assert failed.returncode == 2
+    english, meant = failed.stderr.strip().splitlines()
+    assert "read 'PROPP' at column 1, expected a command" in english and meant.strip().startswith("'PROPP' 不是命令")
+    usual = program("--check", script, LANG="zh_CN.UTF-8", HPCDEM_LANG="en")
+    assert usual.stderr.strip() == english and not HAN.search(usual.stderr)
+
+
+def test_help_that_is_translated_in_part_says_so() -> None:
+    page = helps.help_page(PROGRAMS["hpcdem measure"], "hpcdem measure")
+    assert helps.PARTLY in page and "用法:" in page
