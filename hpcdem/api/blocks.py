@@ -284,7 +284,8 @@ class Mesh(Words):
     ) -> None:
         """A regular mesh of the rectangle between two corners [m], cells along x and y. diagonal: "right", "left",
         "alternate" or "both"; ratio: along x and y each cell is so many times as large as the one before. In
-        three dimensions tetrahedra of a box, cells and ratio along x, y and z; split: 5, 6 or 12 of each cell."""
+        three dimensions the box between them, cells and ratio along x, y and z; type: "tet" (split: 5, 6 or 12 of each
+        cell) or "hex"."""
         given = {
             "first": first, "second": second, "cells": cells, "type": type, "diagonal": diagonal,
             "split": split, "ratio": ratio, "group": _group(group, set),
@@ -446,14 +447,15 @@ class Faces(_Modelled):
         quiet: bool | None = None,
         incoming_x: Number | None = None,
         incoming_y: Number | None = None,
+        incoming_z: Number | None = None,
         where: Where = None,
     ) -> None:
         """Traction on surfaces [Pa], tension positive; normal turns with the surface. Numbers or names of tables of
-        time. quiet: waves leave through them in dynamic runs; incoming_x, incoming_y: velocity [m/s] of a plane wave
+        time. quiet: waves leave through them in dynamic runs; incoming_x, _y, _z: velocity [m/s] of a plane wave
         that comes in through them. Without a range: the whole surface of the model."""
         given = {
             "stress_xx": xx, "stress_yy": yy, "stress_zz": zz, "stress_normal": normal, "quiet": quiet,
-            "incoming_x": incoming_x, "incoming_y": incoming_y,
+            "incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z,
         }  # fmt: skip
         self._carry_out("boundary", given, where, "mechanical-stress-boundary-condition")
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import hexahedra, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
-from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
@@ -74,8 +74,8 @@ class NodeCondition:
 
 @dataclass(frozen=True)
 class Traction:
-    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y: the
-    velocity of one that comes in through it [m/s]."""
+    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y, _z:
+    the velocity of one that comes in through it [m/s]."""
 
     xx: Number = 0.0
     yy: Number = 0.0
@@ -87,12 +87,14 @@ class Traction:
     zz: Number = 0.0
     xz: Number = 0.0
     yz: Number = 0.0
+    incoming_z: Number = 0.0
 
 
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
 """Of stress, in the order of all tables, by dimensions of space."""
 TRACTIONS = {
-    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"), 3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz"),
+    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"),
+    3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz", "incoming_x", "incoming_y", "incoming_z"),
 }  # fmt: skip
 """Columns of the table of tractions."""
 
@@ -228,7 +230,18 @@ class ModelDefinition:
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
-        return self.existing(elements, self.alive, "element")
+        at = self.existing(elements, self.alive, "element")
+        if len(self._mesh().hexes) and elements is not None:
+            of = self._mesh().hex_of()[at]
+            count = np.bincount(of[of >= 0], minlength=len(self._mesh().hexes))
+            part = np.flatnonzero((count > 0) & (count < hexahedra.PARTS))
+            if len(part):
+                first = self._mesh().hexes[part[0], 8]
+                raise CommandError(
+                    f"elements {first} to {first + hexahedra.PARTS - 1} are one hexahedron: they go together, only "
+                    f"{count[part[0]]} of them were given"
+                )
+        return at
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
@@ -254,6 +267,9 @@ class ModelDefinition:
         face = np.arange(len(self.partner))
         inner = (self.partner > face) & self.alive[face // 4]
         inner[inner] &= self.alive[self.partner[inner] // 4]
+        if len(self._mesh().hexes):
+            of_hexes = self._mesh().hex_of() >= 0  # there are no joints between these yet
+            inner[inner] &= ~(of_hexes[face[inner] // 4] | of_hexes[self.partner[inner] // 4])
         return inner
 
     def face_exists(self) -> np.ndarray:
@@ -341,6 +357,10 @@ class ModelDefinition:
         if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
             self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
+        if name != MECH_ISO_ELASTIC.name and len(self._mesh().hexes) and (self._mesh().hex_of()[at] >= 0).any():
+            raise CommandError(
+                f"hexahedra are elastic in this version: the model {name.replace('_', '-')} is for tetrahedra"
+            )
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
 
@@ -395,6 +415,8 @@ class ModelDefinition:
 
         Joints that are broken stay broken. None: all inner edges."""
         at = self.numbers_of_joints(joints)
+        if not len(at) and len(self._mesh().hexes):
+            raise CommandError("there are no joints between hexahedra in this version: tetrahedra have them")
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
@@ -751,6 +773,7 @@ class ModelDefinition:
         zz: Number | None = None,
         xz: Number | None = None,
         yz: Number | None = None,
+        incoming_z: Number | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
         pressure).
@@ -758,14 +781,12 @@ class ModelDefinition:
         quiet: besides, dashpots of the impedances rho c_p along n and rho c_s across take up what arrives (Lysmer and
         Kuhlemeyer 1969): plane waves along n leave without reflection, a stress that is given enters as a wave of half
         its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give.
-        incoming_x, incoming_y [m/s]: velocity of a plane wave along n that comes in through quiet faces: their dashpots
-        see the velocity less twice this."""
-        self._only_in_space("stress zz, xz and yz on faces", zz, xz, yz)
-        if self.dim == 3 and (quiet or incoming_x is not None or incoming_y is not None):
-            self.refuse_in_space("quiet faces")
+        incoming_x, incoming_y, incoming_z [m/s]: velocity of a plane wave along n that comes in through quiet faces:
+        their dashpots see the velocity less twice this."""
+        self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
-        waves = {"incoming_x": incoming_x, "incoming_y": incoming_y}
+        waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
         changes |= {name: self._value(name, value) for name, value in waves.items() if value is not None}
         if quiet is not None:
             changes["quiet"] = bool(quiet)
@@ -775,10 +796,9 @@ class ModelDefinition:
         self._refuse_functions(changes)
         for row in np.unique(self.load_row[at]).tolist():
             wanted = replace(self.loads[row], **changes)
-            if not wanted.quiet and (wanted.incoming_x != 0.0 or wanted.incoming_y != 0.0):
-                raise CommandError(
-                    "a wave comes in through quiet faces only: quiet on goes with incoming-x and incoming-y"
-                )
+            if not wanted.quiet and any(getattr(wanted, name) != 0.0 for name in waves):
+                axes = " and ".join(f"incoming-{axis}" for axis in "xyz"[: self.dim])
+                raise CommandError(f"a wave comes in through quiet faces only: quiet on goes with {axes}")
         for name, value in changes.items():
             user_functions.check(f"stress {name}", value, self._places(FACE, at), self.time_now())
         self.before_change()
