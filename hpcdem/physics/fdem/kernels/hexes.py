@@ -55,7 +55,9 @@ HX, HV, HF = lane(72), lane(104), lane(136)
 TRACE, RATE = lane(168), lane(173)
 T, D, SUM = (lane(178 + k) for k in range(3))
 HM, H11 = lane(181), lane(189)
-LANES = 197
+TRACE_NOW, RATE_NOW = lane(197), lane(198)
+"""Of the tetrahedron that is worked on: distances between lanes must be constants in loops of vectors."""
+LANES = 199
 VOL = lane(32 + VOLUME)
 _4, _8, _PER = U(4), U(8), lane(1)
 
@@ -74,6 +76,12 @@ def _gather(n, first, place, x, v, mass, s0, lanes):
         four_columns(lanes, HM + _4 * _PER + e, mass, (of[0] + _4, of[1] + _4, of[2] + _4, of[3] + _4))
         four_columns(lanes, H11 + e, s0, of)
         four_columns(lanes, H11 + _4 * _PER + e, s0, (of[0] + _4, of[1] + _4, of[2] + _4, of[3] + _4))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _copy(n, of, to, lanes):
+    for e in range(U(n)):
+        lanes[to + e] = lanes[of + e]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -107,20 +115,24 @@ def _trace(n, j, small, lanes):
         rate = tets.gradient(lanes, V + e, c11, c12, c13, c21, c22, c23, c31, c32, c33)
         d11, d22, _, d33, _, _ = tets.in_frame(r, rate)
         trace, flow, w = e11 + (e22 + e33) - 3.0, d11 + (d22 + d33), lanes[VOL + e]
-        lanes[TRACE + U(j) * _PER + e], lanes[RATE + U(j) * _PER + e] = trace, flow
+        lanes[TRACE_NOW + e], lanes[RATE_NOW + e] = trace, flow
         lanes[T + e] += w * trace
         lanes[D + e] += w * flow
         lanes[SUM + e] += w
+    _copy(n, TRACE_NOW, TRACE + U(j) * _PER, lanes)
+    _copy(n, RATE_NOW, RATE + U(j) * _PER, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _shift(n, j, beta, lanes):
     """Stress without strain of tetrahedron j, with what the mean of the traces brings."""
+    _copy(n, TRACE + U(j) * _PER, TRACE_NOW, lanes)
+    _copy(n, RATE + U(j) * _PER, RATE_NOW, lanes)
     for e in range(U(n)):
         m = lanes[MU2 + e]
         bulk, eta = lanes[LAM + e] + m / 3.0, lanes[VISC + e] + beta * m
-        more = bulk * (lanes[T + e] - lanes[TRACE + U(j) * _PER + e])
-        more += (beta * lanes[LAM + e] + eta / 3.0) * (lanes[D + e] - lanes[RATE + U(j) * _PER + e])
+        more = bulk * (lanes[T + e] - lanes[TRACE_NOW + e])
+        more += (beta * lanes[LAM + e] + eta / 3.0) * (lanes[D + e] - lanes[RATE_NOW + e])
         lanes[S11 + e], lanes[S22 + e] = lanes[H11 + e] + more, lanes[H11 + _PER + e] + more
         lanes[S12 + e], lanes[S33 + e] = lanes[H11 + U(2) * _PER + e], lanes[H11 + U(3) * _PER + e] + more
         lanes[S13 + e], lanes[S23 + e] = lanes[H11 + U(4) * _PER + e], lanes[H11 + U(5) * _PER + e]
