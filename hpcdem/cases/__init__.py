@@ -26,9 +26,10 @@ CASES = {
     "tunnel": "Tunnel", "stability": "SlopeStability", "wedge": "Wedge", "support": "Support", "pillar": "Pillar",
     "triaxial": "Triaxial", "tunnel-face": "TunnelFace",
     "creep": "Creep", "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
-    "fault-injection": "FaultInjection",
+    "fault-injection": "FaultInjection", "penny-fracture": "PennyFracture",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
     "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
+    "thermal-shock": "ThermalShock",
 }  # fmt: skip
 """Names on the command line, and the classes; a class stands in the module of its name, with _ for -."""
 __all__ = ["CASES", "find", *CASES.values()]

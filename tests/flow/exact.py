@@ -38,6 +38,15 @@ def lattice(aperture: float, edge: float) -> float:
     return math.sqrt(3.0) * aperture**3 / (12.0 * edge)
 
 
+def front(over: float, time: float, length: float, matrix: tuple[float, float, float], mu: float) -> float:
+    """Volume that both walls take up at a constant pressure over that at a sharp front [m2] (Green & Ampt 1911,
+    without gravity): the flux k over / (mu X) fills the empty pores n (1 - S) at the front X, so that X^2 = 2 k over
+    t / (mu n (1 - S)); matrix: permeability, porosity, saturation before."""
+    k, porosity, saturation = matrix
+    empty = porosity * (1.0 - saturation)
+    return 2.0 * length * empty * math.sqrt(2.0 * k * over * time / (mu * empty))
+
+
 def carter(
     over: float, time: float, length: float, matrix: tuple[float, float, float], bulk: float, mu: float
 ) -> float:

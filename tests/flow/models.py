@@ -45,6 +45,7 @@ def bursting(sim: Blocks) -> None:
         changes.set_velocity(sim, np.flatnonzero(np.round(x, 1) == one), vx=150.0 + 6.0 * one, vy=4.0 * one)
     flow = Flow.of(sim)
     flow.assign(joints[joints % 7 > 0], {**WIDE, **LEAKS})
+    flow.adjust(joints[joints % 7 > 3], {"matrix_saturation": 0.4, "matrix_porosity_compressibility": 0.0})
     flow.fill(np.flatnonzero(x < 0.5), pressure=3e4)
     flow.fill(np.flatnonzero(x > 1.1), saturation=0.6)
     sim.table("pump", [(0.0, 0.0), (2e-3, 2e6), (1.0, 2e6)])

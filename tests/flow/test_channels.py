@@ -188,6 +188,21 @@ def test_leak_off_after_carter() -> None:
     assert flow.account()["relative"] < 1e-12
 
 
+@pytest.mark.parametrize("suction", [0.0, 6e5])
+def test_leak_off_fills_empty_pores(suction: float) -> None:
+    """Rock that is not saturated takes up what a sharp front does, also by suction."""
+    sim, flow = line(4, 0.4, leak_off=1.0, matrix_permeability=1e-15, matrix_porosity=0.2, matrix_saturation=0.3,
+                     matrix_pore_pressure=-suction)  # fmt: skip
+    changes.crack(sim, flow.network.channels)
+    sim.flow_clock(dt=1e-7)
+    flow.fill(None, pressure=1e6)
+    hold(flow, flow.numbers("flow-node"), 1e6)
+    run(sim, 300)
+    wanted = exact.front(1e6 + suction, flow.time, 0.4, (1e-15, 0.2, 0.3), 1e-3)
+    account = flow.account()
+    assert account["leaked"] == pytest.approx(wanted, rel=1e-9) and account["relative"] < 1e-12
+
+
 # ---- conditions ---------------------------------------------------------------------------------------------------
 
 
@@ -285,6 +300,10 @@ def test_each_property_of_leak_off_changes_it(name: str, value: float) -> None:
         ({"fluid_bulk": 0.0}, "fluid_bulk must be > 0"), ({"fluid_bulk": math.inf}, "fluid_bulk must be finite"),
         ({"leak_off": 1.0}, "leak_off needs matrix_permeability"),
         ({"matrix_permeability": 1e-15}, "matrix_permeability goes with leak_off"),
+        ({"matrix_saturation": 0.5}, "matrix_saturation goes with leak_off"),
+        ({"leak_off": 1.0, "matrix_permeability": 1e-15, "matrix_porosity": 0.2, "matrix_saturation": 0.5,
+          "matrix_porosity_compressibility": 1e-9}, "does not act where leak-off fills empty pores"),
+        ({"leak_off": 1.0, "matrix_permeability": 1e-15, "matrix_porosity": 0.2}, "needs matrix_porosity_compress"),
         ({"viscosity": None}, "needs viscosity"), ({"colour": 1.0}, "has no property colour"),
     ],
 )  # fmt: skip

@@ -15,8 +15,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import hexahedra, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
-from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
@@ -230,7 +230,18 @@ class ModelDefinition:
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
-        return self.existing(elements, self.alive, "element")
+        at = self.existing(elements, self.alive, "element")
+        if len(self._mesh().hexes) and elements is not None:
+            of = self._mesh().hex_of()[at]
+            count = np.bincount(of[of >= 0], minlength=len(self._mesh().hexes))
+            part = np.flatnonzero((count > 0) & (count < hexahedra.PARTS))
+            if len(part):
+                first = self._mesh().hexes[part[0], 8]
+                raise CommandError(
+                    f"elements {first} to {first + hexahedra.PARTS - 1} are one hexahedron: they go together, only "
+                    f"{count[part[0]]} of them were given"
+                )
+        return at
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
@@ -256,6 +267,9 @@ class ModelDefinition:
         face = np.arange(len(self.partner))
         inner = (self.partner > face) & self.alive[face // 4]
         inner[inner] &= self.alive[self.partner[inner] // 4]
+        if len(self._mesh().hexes):
+            of_hexes = self._mesh().hex_of() >= 0  # there are no joints between these yet
+            inner[inner] &= ~(of_hexes[face[inner] // 4] | of_hexes[self.partner[inner] // 4])
         return inner
 
     def face_exists(self) -> np.ndarray:
@@ -343,6 +357,10 @@ class ModelDefinition:
         if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
             self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
+        if name != MECH_ISO_ELASTIC.name and len(self._mesh().hexes) and (self._mesh().hex_of()[at] >= 0).any():
+            raise CommandError(
+                f"hexahedra are elastic in this version: the model {name.replace('_', '-')} is for tetrahedra"
+            )
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
 
@@ -397,6 +415,8 @@ class ModelDefinition:
 
         Joints that are broken stay broken. None: all inner edges."""
         at = self.numbers_of_joints(joints)
+        if not len(at) and len(self._mesh().hexes):
+            raise CommandError("there are no joints between hexahedra in this version: tetrahedra have them")
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:
@@ -473,7 +493,7 @@ class ModelDefinition:
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
             if self.dim not in model.property(name).dims:
-                raise CommandError(f"in two dimensions there is no {name}")
+                raise CommandError(f"in {'two' if self.dim == 2 else 'three'} dimensions there is no {name}")
         wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
         if not each and not before:
             return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
@@ -508,7 +528,6 @@ class ModelDefinition:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
                 out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
             elif isinstance(value, Over) and value.axis == TEMPERATURE:
-                self.refuse_in_space("tables over temperature")
                 if not model.has(temperature_table(name)):
                     raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
                 number = self._kept(model, name, value.table)

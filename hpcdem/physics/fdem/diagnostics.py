@@ -17,6 +17,7 @@ from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
+from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
@@ -68,7 +69,9 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "kinetic_energy": Quantity("element", "J/m", "kinetic energy", dims=BOTH),
     "strain_energy": Quantity("element", "J/m", "elastic energy", dims=BOTH),
-    "mean_temperature": Quantity("element", "K", "mean temperature of its corners; NaN without a thermal model"),
+    "mean_temperature": Quantity(
+        "element", "K", "mean temperature of its corners; NaN without a thermal model", dims=BOTH
+    ),
     "area": Quantity("element", "m2", "area in the mesh"),
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
@@ -98,7 +101,7 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("velocity", "node", "m/s", "velocity"),
     **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
-    "temperature": Quantity("node", "K", "temperature; NaN without a thermal model"),
+    "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),
     "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken", dims=BOTH),
@@ -462,7 +465,7 @@ def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         radius = np.hypot(half, stress[:, 2])
         return mean + radius, mean - radius
     found, good = np.full((len(stress), 3), np.nan), np.isfinite(stress).all(axis=1)  # not all are in a last frame
-    found[good] = np.linalg.eigvalsh(stress[good][:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
+    found[good], _ = principal(stress[good][:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
     return found[:, 2].copy(), found[:, 0].copy()
 
 

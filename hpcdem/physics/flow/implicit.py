@@ -363,10 +363,11 @@ class Fluid:
         at = np.flatnonzero(now.lost[mine] > 0.0)
         if len(at):
             over = 0.5 * p[at].sum(axis=1) - self.laws[self.law[mine][at], kernels.PORE]
+            power = np.where(self.laws[self.law[mine][at], kernels.FRONT] > 0.0, 0.5, 1.0)
             held = mean[at]
             by_part = now.lost[mine][at] / np.maximum(held * held * (3.0 - 2.0 * held), 1e-300)
             leak_u[at] = 0.5 * (
-                (now.lost[mine][at] / over)[:, None] * p_u[ends[at]]
+                (now.lost[mine][at] * power / over)[:, None] * p_u[ends[at]]
                 + (by_part * 6.0 * held * (1.0 - held))[:, None] * s_u[ends[at]]
             )
         by_x = self._opens(x, now.table[:: LINKS[self.dim], kernels.APERTURE])[self.of][mine]

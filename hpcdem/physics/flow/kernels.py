@@ -18,9 +18,9 @@ from hpcdem.physics.fdem.kernels import joints
 
 P, S, E = range(3)
 STATE = 3
-# Columns of the table of channel laws (rows, 7).
-INITIAL, LEAST, MOST, LEAK, PORE, DILATE, GAIN = range(7)
-LAW = 7
+# Columns of the table of channel laws (rows, 8); FRONT: 1 where leak-off fills empty pores, else 0.
+INITIAL, LEAST, MOST, LEAK, PORE, DILATE, GAIN, FRONT = range(8)
+LAW = 8
 # What is prescribed at nodes.
 FREE, PRESSURE, SURFACE, RATE = range(4)
 # Columns of the table of channels (m, 4) of `geometry`; the last: weight of what flows over that of the fluid alone.
@@ -113,7 +113,8 @@ def _flows(t, threads, ends, law, laws, since, leaks, before, after, channels, s
             if over > 0.0 and row[LEAK] > 0.0 and since[c] <= before:
                 length = 2.0 * channels[c, HALF] / channels[c, APERTURE]  # in space an area
                 roots = math.sqrt(after - since[c]) - math.sqrt(before - since[c])
-                lost[c] = 2.0 * part(s) * row[LEAK] * over * length * roots  # half of both walls, to each end
+                drive = math.sqrt(over) if row[FRONT] > 0.0 else over
+                lost[c] = 2.0 * part(s) * row[LEAK] * drive * length * roots  # half of both walls, to each end
             else:
                 lost[c] = 0.0
 

@@ -524,11 +524,14 @@ class Flow(SurfaceLoad):
         """The table of channel laws (rows, kernels.LAW)."""
         of = {name: np.array([row[k] for row in self.rows]) for k, name in enumerate(_PROPERTIES)}
         inside = of["matrix_porosity"] * (1.0 / of["fluid_bulk"] + of["matrix_porosity_compressibility"])
-        viscous = math.pi * of["viscosity"] * of["fluid_density"]
-        leak = np.where(of["leak_off"] > 0.0, np.sqrt(of["matrix_permeability"] * inside / viscous), 0.0)
+        viscous, on = of["viscosity"] * of["fluid_density"], of["leak_off"] > 0.0
+        front = on & (of["matrix_saturation"] < 1.0)
+        empty = of["matrix_porosity"] * (1.0 - of["matrix_saturation"])
+        room = np.where(front, 0.5 * empty, inside / math.pi)
+        leak = np.where(on, np.sqrt(of["matrix_permeability"] * room / viscous), 0.0)
         apertures = [of[f"aperature_{name}"] for name in ("initial", "minumum", "maximum")]
         dilation = np.tan(np.radians(of["shear_dilation"])), of["shear_dilation_limit"]
-        return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"], *dilation]))
+        return np.ascontiguousarray(np.column_stack([*apertures, leak, of["matrix_pore_pressure"], *dilation, front]))
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
         """Largest distance from the first element around a flow node to the others there [m]; middle (n_own, dim):
@@ -960,7 +963,11 @@ class Flow(SurfaceLoad):
     def restored(blocks: Blocks, state: Mapping[str, Any], tables: Mapping[str, Mapping[str, np.ndarray]]) -> None:
         """Inverse of these: the blocks have this fluid; nodes go to their owners with the first storage."""
         made = Flow.of(blocks)
-        made.rows = [tuple(math.inf if v is None else v for v in row) for row in state["rows"]]
+        later = [one.default for one in POROUS.properties]  # properties that the file does not know yet
+        made.rows = [
+            (*(math.inf if v is None else v for v in row), *(v or 0.0 for v in later[len(row) :]))
+            for row in state["rows"]
+        ]
         made.wells = [Well.restored(one) for one in state["wells"]]
         made.conditions = [Condition(**one) for one in state["conditions"]]
         made.removed, made.time = dict(state["removed"]), state["time"]

@@ -14,6 +14,7 @@ FLUID = ("fluid_density", "fluid_bulk", "viscosity")
 """Properties of the fluid: the same in all channels."""
 MATRIX = ("matrix_permeability", "matrix_porosity_compressibility", "matrix_porosity")
 """What leak-off needs."""
+COMPRESSED = "matrix_porosity_compressibility"
 NEEDED = ("matrix_permeability", "matrix_porosity")
 """Of these, what must not be zero: nothing would leak."""
 
@@ -25,6 +26,13 @@ def _apertures(values: dict[str, Any]) -> None:
             f"aperature_minumum must not be above aperature_maximum ({np.max(most):g} m), got {np.max(least):g}"
         )
     on = np.asarray(values["leak_off"]) > 0.0
+    front = np.asarray(values["matrix_saturation"]) < 1.0
+    if np.any(front & ~on):
+        raise CommandError("matrix_saturation goes with leak_off, which is off")
+    if np.any(front & (np.asarray(values.get(COMPRESSED, 0.0)) != 0.0)):
+        raise CommandError(f"{COMPRESSED} does not act where leak-off fills empty pores: 0, or matrix_saturation 1")
+    if np.all(front):
+        values.setdefault(COMPRESSED, np.zeros_like(front, dtype=np.float64))
     for name in (*MATRIX, "matrix_pore_pressure"):
         there = np.asarray(values.get(name, 0.0)) != 0.0
         if np.any(there & ~on):
@@ -65,6 +73,8 @@ POROUS = Model(
                  "the joint", 0.0, high=80.0),
         Property("shear_dilation_limit", "m", "what slip adds to the aperture at most", math.inf, low_itself=False,
                  otherwise="no limit"),
+        Property("matrix_saturation", "1", "leak-off: part of the pores that was full before; below 1 a sharp front "
+                 "fills the rest", 1.0, high=1.0),
     ),
     _apertures,
 )  # fmt: skip
