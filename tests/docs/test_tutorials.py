@@ -91,7 +91,7 @@ WANTED = {
 }  # fmt: skip
 
 
-QUICK = ("thrust_belt", "cracked_specimen", "water", "heat")
+QUICK = ("thrust_belt", "water")
 
 
 @pytest.mark.parametrize(

@@ -369,6 +369,8 @@ IN_SPACE: list[tuple[str, str]] = [
      "sim.mesh.structured((0, 0, 0), (4, 2, 1), (4, 2, 1), split=12, ratio=(1.5, 1, 2), group='rock', set='d')"),
     ("pcdc mesh create from-layer 'o' size 0.5 hole 'h'", "sim.mesh.create('o', 0.5, hole=['h'])"),
     ("pcdc node boundary mech-vel-b-c velocity-z 1 acceleration-x 2", "sim.nodes.velocity(vz=1, ax=2)"),
+    ("pcdc element-face boundary m-s-b-c quiet on incoming-z table 'v'",
+     "sim.faces.stress(quiet=True, incoming_z='v')"),
     ("pcdc bolt create polyline (0,0,0) (1,2,3) segments 2", "sim.bolts.create([(0, 0, 0), (1, 2, 3)], segments=2)"),
     ("pcdc bolt-node boundary b-n-c velocity-z 1 velocity-x 2", "sim.bolt_nodes.velocity(vz=1, vx=2)"),
     ("pcdc bolt-node boundary b-n-c acceleration-z 1", "sim.bolt_nodes.velocity(az=1)"),

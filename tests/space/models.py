@@ -36,6 +36,7 @@ def swinging(sim: Blocks) -> None:
     sim.table("beat", [(0.0, 0.0), (0.01, 3e5), (0.02, 0.0), (0.04, 2e5)])
     sim.stress_condition(faces["right"], normal="beat")
     sim.stress_condition(faces["top"], normal=-2e4, xz=5e3)
+    sim.stress_condition(faces["right"], quiet=True, incoming_y=0.05, incoming_z=0.02)
     sim.force_condition(right[:2], fy=300.0)
     sim.move_constraint(np.unique(mesh.layers["front"])[6:9], space.ACROSS, (1.0, 1.0, 0.0))
     sim.rayleigh(0.02, 60.0)

@@ -197,8 +197,8 @@ def goodier(r: np.ndarray | float) -> np.ndarray | float:
 @pytest.mark.slow
 def test_a_penny_under_pressure(gmsh: object) -> None:
     """Radius 1 m, 1 MPa, E 30 GPa: w = 8 (1 - nu2) p a sqrt(1 - r2) / (pi E), 79.58 um in the middle (Sneddon 1946). A
-    quarter of it, cut in as a disc, in a box of 4 by 4 by 8 m. Elements keep its rim shut over half an edge, so edges are
-    short there."""
+    quarter of it, cut in as a disc, in a box of 4 by 4 by 8 m. Elements keep its rim shut over half an edge, so edges
+    are short there."""
     disc = solids.made("disc", (0, 0, 0), (0, 0, 1), 1.0)
     rock = solids.made("box", (0, 0, -4), (4, 4, 4))
     rim = [(1.0, 0.0, -0.02), (1.02, 0.0, -0.02), (1.02, 0.0, 0.02), (1.0, 0.0, 0.02)]

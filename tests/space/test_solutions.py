@@ -100,8 +100,8 @@ def octant(inner: float, outer: float, size: float, fine: float) -> Mesh:
     cube, hole = solids.made("box", (0, 0, 0), (outer, outer, outer)), solids.made("sphere", (0, 0, 0), inner)
     rim = solids.made("sphere", (0, 0, 0), outer)
     wishes = fill.Wishes([rim], size, [hole], [("eighth", [cube])], [([hole], fine, 2.0)])
-    points, cells, groups = fill.filled(wishes, "rest")
-    keep = cells[groups["eighth"]]
+    found = fill.filled(wishes, "rest")
+    points, keep = found.points, found.cells[found.groups["eighth"]]
     used, numbers = np.unique(keep, return_inverse=True)
     return Mesh.of(points[used], numbers.reshape(-1, 4))
 

@@ -34,7 +34,10 @@ def test_recipes_need_what_the_project_needs(name):
     assert {package: version for package, version in found.items() if package not in BESIDE} == NEEDS
 
 
-VERSIONED = ["conda-forge/recipe.yaml", "spack/package.py", "modules/0.1.0.lua", "../CITATION.cff"]
+VERSIONED = [
+    "conda-forge/recipe.yaml", "spack/package.py", "modules/0.1.0.lua", "easybuild/hpcdem-0.1.0-foss-2023b.eb",
+    "../CITATION.cff",
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", VERSIONED)

@@ -193,14 +193,16 @@ def stress(
     incoming_y: Number | None = None,
     where: Range | None = None,
     zz: Number | None = None,
+    incoming_z: Number | None = None,
 ) -> None:
-    """Traction of faces [Pa]; quiet: waves leave through them; incoming_x, _y: velocity [m/s] of one that comes in.
+    """Traction of faces [Pa]; quiet: waves leave through them; incoming_x, _y, _z: velocity [m/s] of one that comes in.
     Without a range: all faces on the surface of the model."""
-    _known(project, xx, yy, zz, normal, incoming_x, incoming_y)
+    _known(project, xx, yy, zz, normal, incoming_x, incoming_y, incoming_z)
     faces = chosen(project, FACE, (OnBoundary(),) if where is None else where)
     project.ready().stress_condition(
-        faces, xx=xx, yy=yy, zz=zz, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y
-    )
+        faces, xx=xx, yy=yy, zz=zz, normal=normal, quiet=quiet, incoming_x=incoming_x, incoming_y=incoming_y,
+        incoming_z=incoming_z,
+    )  # fmt: skip
 
 
 def free_field(project: Project, where: Range | None = None) -> None:

@@ -302,10 +302,10 @@ STRESS = Model(
      Option("s{tress}-n{ormal}", (TABLED,), "stress along the normal, which turns with the surface; negative is "
             "pressure", "Pa"),
      Option("q{uiet}", (BOOL,), "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress "
-            "given beside it enters as a wave of half its size", dims=PLANE),
-     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s",
-            dims=PLANE),
-     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s", dims=PLANE)),
+            "given beside it enters as a wave of half its size"),
+     Option("inc{oming}-x", (TABLED,), "velocity along x of a plane wave that comes in through quiet faces", "m/s"),
+     Option("inc{oming}-y", (TABLED,), "the same along y", "m/s"),
+     Option("inc{oming}-z", (TABLED,), "the same along z", "m/s", dims=SPACE)),
     any_of=True, dims=BOTH, also=("mech{anical}-s{tress}-b{oundary}-c{ondition}",),
 )  # fmt: skip
 FLOW_CONDITION = Model(

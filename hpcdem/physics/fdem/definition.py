@@ -74,8 +74,8 @@ class NodeCondition:
 
 @dataclass(frozen=True)
 class Traction:
-    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y: the
-    velocity of one that comes in through it [m/s]."""
+    """Stress on faces [Pa]: components, and along the normal. quiet: waves leave through the face; incoming_x, _y, _z:
+    the velocity of one that comes in through it [m/s]."""
 
     xx: Number = 0.0
     yy: Number = 0.0
@@ -87,12 +87,14 @@ class Traction:
     zz: Number = 0.0
     xz: Number = 0.0
     yz: Number = 0.0
+    incoming_z: Number = 0.0
 
 
 COMPONENTS = {2: ("xx", "yy", "xy", "zz"), 3: ("xx", "yy", "xy", "zz", "xz", "yz")}
 """Of stress, in the order of all tables, by dimensions of space."""
 TRACTIONS = {
-    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"), 3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz"),
+    2: ("xx", "yy", "xy", "normal", "incoming_x", "incoming_y"),
+    3: ("xx", "yy", "xy", "normal", "zz", "xz", "yz", "incoming_x", "incoming_y", "incoming_z"),
 }  # fmt: skip
 """Columns of the table of tractions."""
 
@@ -753,6 +755,7 @@ class ModelDefinition:
         zz: Number | None = None,
         xz: Number | None = None,
         yz: Number | None = None,
+        incoming_z: Number | None = None,
     ) -> None:
         """Traction t = sigma n [Pa] on the current face, n its current outward normal, plus `normal` n (negative:
         pressure).
@@ -760,14 +763,12 @@ class ModelDefinition:
         quiet: besides, dashpots of the impedances rho c_p along n and rho c_s across take up what arrives (Lysmer and
         Kuhlemeyer 1969): plane waves along n leave without reflection, a stress that is given enters as a wave of half
         its size. They act in dynamic runs; the static stage needs the stress that the ground beyond would give.
-        incoming_x, incoming_y [m/s]: velocity of a plane wave along n that comes in through quiet faces: their dashpots
-        see the velocity less twice this."""
-        self._only_in_space("stress zz, xz and yz on faces", zz, xz, yz)
-        if self.dim == 3 and (quiet or incoming_x is not None or incoming_y is not None):
-            self.refuse_in_space("quiet faces")
+        incoming_x, incoming_y, incoming_z [m/s]: velocity of a plane wave along n that comes in through quiet faces:
+        their dashpots see the velocity less twice this."""
+        self._only_in_space("stress zz, xz and yz, and incoming z, on faces", zz, xz, yz, incoming_z)
         given = {"xx": xx, "yy": yy, "xy": xy, "normal": normal, "zz": zz, "xz": xz, "yz": yz}
         changes = {name: self._value(f"stress {name}", value) for name, value in given.items() if value is not None}
-        waves = {"incoming_x": incoming_x, "incoming_y": incoming_y}
+        waves = {"incoming_x": incoming_x, "incoming_y": incoming_y, "incoming_z": incoming_z}
         changes |= {name: self._value(name, value) for name, value in waves.items() if value is not None}
         if quiet is not None:
             changes["quiet"] = bool(quiet)
@@ -777,10 +778,9 @@ class ModelDefinition:
         self._refuse_functions(changes)
         for row in np.unique(self.load_row[at]).tolist():
             wanted = replace(self.loads[row], **changes)
-            if not wanted.quiet and (wanted.incoming_x != 0.0 or wanted.incoming_y != 0.0):
-                raise CommandError(
-                    "a wave comes in through quiet faces only: quiet on goes with incoming-x and incoming-y"
-                )
+            if not wanted.quiet and any(getattr(wanted, name) != 0.0 for name in waves):
+                axes = " and ".join(f"incoming-{axis}" for axis in "xyz"[: self.dim])
+                raise CommandError(f"a wave comes in through quiet faces only: quiet on goes with {axes}")
         for name, value in changes.items():
             user_functions.check(f"stress {name}", value, self._places(FACE, at), self.time_now())
         self.before_change()

@@ -535,19 +535,24 @@ class Local:
 
     def _make_dashpots(self, quiet: np.ndarray, row: np.ndarray, k: np.ndarray, k2: np.ndarray) -> None:
         """Dashpots of the quiet ones among the loaded faces: row, corner k to k2."""
-        sim = self.sim
-        if not sim.options.dynamic:
-            if sim.log is not None and sim.quiet_faces().any():
-                sim.log.warn_once(
-                    "quiet",
-                    "quiet faces act in dynamic runs only: in this static stage they carry no more than their stress",
-                )
-            quiet = quiet[:0]
+        sim, quiet = self.sim, self._acting(quiet)
         row, ends = row[quiet], np.column_stack([k[quiet], k2[quiet]])
         self.quiet_edge, self.quiet_of = self.load_edge[quiet], self.load_of[quiet]
         self.quiet_corner = 8 * row[:, None] + 2 * ends
         self.quiet_place = row[:, None] * sim.v.shape[1] + 2 * ends
         self.quiet_p, self.quiet_s = self._impedances(sim.number[row])
+
+    def _acting(self, quiet: np.ndarray) -> np.ndarray:
+        """These faces, none in static runs, where that is said."""
+        sim = self.sim
+        if sim.options.dynamic:
+            return quiet
+        if sim.log is not None and sim.quiet_faces().any():
+            sim.log.warn_once(
+                "quiet",
+                "quiet faces act in dynamic runs only: in this static stage they carry no more than their stress",
+            )
+        return quiet[:0]
 
     def _impedances(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """rho c_p and rho c_s of elements (n,) [Pa s/m]."""

@@ -114,6 +114,9 @@ class LocalSpace(LawsSpace):
         places = mesh.points[mesh.face_points(faces[i, k])].mean(axis=1)
         self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
         self.load_of = self.load_functions.of
+        quiet = self._acting(np.flatnonzero(sim.quiet_faces()[faces[i, k]]))
+        self.quiet_corner, self.quiet_of = self.load_corner[quiet], self.load_of[quiet]
+        self.quiet_p, self.quiet_s = self._impedances(sim.number[own][i[quiet]])
         sim.surface_loads.corners(sim, self.special)
         self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0)
 
@@ -125,10 +128,16 @@ class LocalSpace(LawsSpace):
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
         k = P sqrt(A) / 3 with the largest P, and what the contact of its free faces can have, k = P A (1 / h + 1 /
-        h_other) / 3 per face, h_other: the smallest of all."""
+        h_other) / 3 per face, h_other: the smallest of all; rho c_p A / 3 of quiet faces."""
         sim, own = self.sim, self.sim.owned
         springs, dashpots = np.zeros((sim.n_own, 4)), np.zeros((sim.n_own, 4))
         faces = (4 * sim.number[own][:, None] + np.arange(4)).reshape(-1)
+        quiet = sim.quiet_faces()[faces].reshape(-1, 4)
+        if quiet.any():
+            impedance = self._impedances(sim.number[own])[0][:, None] / 3.0
+            each = np.where(quiet, impedance * self.shapes.area[own], 0.0)
+            for k in range(4):
+                dashpots[:, FACES[k]] += each[:, k, None]
         names = ("penalty_normal", "penalty_overlay", "penalty_shear")
         penalty = np.max([sim.joint_rows.column(name) for name in names], axis=0)[sim.joint_row[faces]]
         tied = sim.closed_faces()[faces] & (sim.joint_row[faces] > 0)
@@ -230,6 +239,10 @@ class LocalSpace(LawsSpace):
             self.applied[:] = 0.0
             loads = self.loads_now(self.load_functions, clock.time)
             space.tractions(self.load_corner, self.load_of, loads, sim.x, self.applied)
+            if len(self.quiet_corner):
+                space.dashpots(
+                    self.quiet_corner, self.quiet_p, self.quiet_s, self.quiet_of, loads, sim.x, sim.v, self.applied
+                )
             sim.surface_loads.add_to(self.applied)
         if self.shared:
             sim.halo.fill(self.force)
@@ -246,7 +259,7 @@ class LocalSpace(LawsSpace):
         )  # fmt: skip
 
     def loads_now(self, placed: Placed, time: float) -> np.ndarray:
-        """The table of tractions (rows, 7)."""
+        """The table of tractions (rows, 10)."""
         return placed.filled(self.sim.loads_at(time), lambda one, field: (TRACTIONS[3].index(field), time, 1.0))
 
     def conditions_now(self, placed: Placed, time: float, middle: float, dt: float) -> np.ndarray:

@@ -24,7 +24,7 @@ UNBOUND, FIXED, ALONG, ACROSS = 0, 1, 2, 3
 DOES, AT, FORCE, CONSTRAINT, WAY = 0, 3, 6, 9, 10
 CONDITION = 13
 # Columns of the table of tractions at the present moment (rows, 7) [Pa].
-XX, YY, XY, NORMAL, ZZ, XZ, YZ = range(7)
+XX, YY, XY, NORMAL, ZZ, XZ, YZ, INCOMING = range(8)  # and two more of the last
 TRACTION = 7
 
 # Columns of the table of element models, see build.py.
@@ -155,7 +155,7 @@ def keys(points, side):
 @njit(cache=True, nogil=True, error_model="numpy")
 def tractions(corner, row, table, x, applied):
     """Add a third of A sigma n of each loaded face to its corners: corner (m, 3), where they begin in x and `applied`
-    (both flat), counter-clockwise from outside; row (m,) of the table (rows, 7) [Pa]."""
+    (both flat), counter-clockwise from outside; row (m,) of the table (rows, 10) [Pa]."""
     x, applied = x.reshape(x.size), applied.reshape(applied.size)
     for m in range(len(corner)):
         a, b, d = corner[m, 0], corner[m, 1], corner[m, 2]
@@ -171,6 +171,30 @@ def tractions(corner, row, table, x, applied):
             applied[at] += fx
             applied[at + 1] += fy
             applied[at + 2] += fz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def dashpots(corner, along, across, row, table, x, v, applied):
+    """Take A / 3 (z_p w_n n + z_s w_s s) from each corner of faces through which waves leave, see `nodes.dashpots`;
+    corner (m, 3): where they begin in x, v and `applied` (all flat)."""
+    x, v, applied = x.reshape(x.size), v.reshape(v.size), applied.reshape(applied.size)
+    for m in range(len(corner)):
+        a, b, d = corner[m, 0], corner[m, 1], corner[m, 2]
+        ux, uy, uz = x[b] - x[a], x[b + 1] - x[a + 1], x[b + 2] - x[a + 2]
+        wx, wy, wz = x[d] - x[a], x[d + 1] - x[a + 1], x[d + 2] - x[a + 2]
+        nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        double = math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx / double, ny / double, nz / double
+        s = table[row[m]]
+        shear = double / 6.0 * across[m]
+        more = double / 6.0 * along[m] - shear
+        for k in range(3):
+            at = corner[m, k]
+            vx, vy, vz = v[at] - 2.0 * s[INCOMING], v[at + 1] - 2.0 * s[INCOMING + 1], v[at + 2] - 2.0 * s[INCOMING + 2]
+            normal = more * (vx * nx + vy * ny + vz * nz)
+            applied[at] -= normal * nx + shear * vx
+            applied[at + 1] -= normal * ny + shear * vy
+            applied[at + 2] -= normal * nz + shear * vz
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
