@@ -55,7 +55,9 @@ def join(sim: Blocks, nodes: Nodes) -> np.ndarray:
     rows.view(np.int64)[:, KEY] = -1 - mine % 4
     rows[:, STATE] = BROKEN
     rows[:, FIRST + DAMAGE : FIRST + DAMAGE + 3] = rows[:, [FIRST + MODE]] = 1.0
-    rows[:, FIRST + SLIPPED : FIRST + SLIPPED + 3] = [sim.slid.get(face, (0.0, 0.0, 0.0)) for face in mine.tolist()]
+    rows[:, FIRST + SLIPPED : FIRST + SLIPPED + 3] = np.reshape(
+        [sim.slid.get(face, (0.0, 0.0, 0.0)) for face in mine.tolist()], (-1, 3)
+    )
     known = sim.histories
     sim.histories = Histories.of(
         len(sim.number), np.concatenate([known.owners(), row_of[mine // 4]]), np.concatenate([known.rows, rows])
