@@ -329,6 +329,13 @@ def _tangent_space() -> WarmUp:
     return warm_up.tangent_in_space, (tet_stiffness,)
 
 
+def _hexes() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import hexes
+
+    return warm_up.hexahedra, (hexes,)
+
+
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
     from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
@@ -363,6 +370,7 @@ KINDS = {
     "yielding-space": Kernels(_yielding_space, after=("space",)),
     "creep-space": Kernels(_creep_space, after=("space",)),
     "tangent-space": Kernels(_tangent_space, after=("tangent", "plastic-tangent", "yielding-space")),
+    "hexes": Kernels(_hexes, after=("tangent-space",)),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
@@ -371,7 +379,7 @@ OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
     "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-    "yielding-space", "creep-space", "tangent-space", "pictures",
+    "yielding-space", "creep-space", "tangent-space", "hexes", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 

@@ -284,7 +284,8 @@ class Mesh(Words):
     ) -> None:
         """A regular mesh of the rectangle between two corners [m], cells along x and y. diagonal: "right", "left",
         "alternate" or "both"; ratio: along x and y each cell is so many times as large as the one before. In
-        three dimensions tetrahedra of a box, cells and ratio along x, y and z; split: 5, 6 or 12 of each cell."""
+        three dimensions the box between them, cells and ratio along x, y and z; type: "tet" (split: 5, 6 or 12 of each
+        cell) or "hex"."""
         given = {
             "first": first, "second": second, "cells": cells, "type": type, "diagonal": diagonal,
             "split": split, "ratio": ratio, "group": _group(group, set),

@@ -26,7 +26,7 @@ CASES = {
     "tunnel": "Tunnel", "stability": "SlopeStability", "wedge": "Wedge", "support": "Support", "pillar": "Pillar",
     "triaxial": "Triaxial", "tunnel-face": "TunnelFace",
     "creep": "Creep", "radial-flow": "RadialFlow", "dam-seepage": "DamSeepage", "dam-uplift": "DamUplift",
-    "fault-injection": "FaultInjection",
+    "fault-injection": "FaultInjection", "penny-fracture": "PennyFracture",
     "hydraulic-fracture": "HydraulicFracture", "thermal-ring": "ThermalRing", "cracking-ring": "CrackingRing",
     "lauwerier": "Lauwerier", "doublet": "Doublet", "proppant-slot": "ProppantSlot",
 }  # fmt: skip

@@ -37,8 +37,17 @@ def clay(limit: float = 1e6, **options) -> Blocks:
     return sim
 
 
-@pytest.mark.parametrize("kind", ["cross", "quad", "mixed"])
-@pytest.mark.parametrize("part", [1.0, 0.4], ids=["all", "some"])
+@pytest.mark.parametrize(
+    "kind, part",
+    [
+        pytest.param("cross", 1.0, id="all-cross"),
+        pytest.param("quad", 1.0, id="all-quad", marks=pytest.mark.slow),
+        pytest.param("mixed", 1.0, id="all-mixed"),
+        pytest.param("cross", 0.4, id="some-cross", marks=pytest.mark.slow),
+        pytest.param("quad", 0.4, id="some-quad", marks=pytest.mark.slow),
+        pytest.param("mixed", 0.4, id="some-mixed"),
+    ],
+)
 @pytest.mark.parametrize("dynamic", [True, False], ids=["motion", "relaxation"])
 def test_a_law_like_the_built_in_one_gives_its_bits(part, dynamic, kind):
     """In motion with joints that break and contact, and towards equilibrium; time step and masses too."""

@@ -46,6 +46,7 @@ def test_stiffness_slip_and_ultimate_load() -> None:
     assert (bolts.nodes["bond_state"] & kernels.SLIPS).all() and (bolts.nodes["slip"] < 0.0).all()
 
 
+@pytest.mark.slow  # quick: by force, above
 def test_ultimate_load_by_displacement() -> None:
     """Drawn out by 1.5 mm, where it slips everywhere after 0.96 mm: what holds it is the strength of all the grout."""
     sim, bolts = in_fixed_rock()

@@ -6,6 +6,8 @@ import ast
 import re
 import runpy
 import shlex
+import subprocess
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -134,3 +136,12 @@ def test_pages_of_both_languages_say_the_same_code() -> None:
             if one.mark:
                 assert one == other
         assert re.search("[\u4e00-\u9fff]", prose(twin))
+
+
+def test_needs_of_the_site_are_words_of_a_shell() -> None:
+    """scripts/docs hands them to pip one by one."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needs = project["optional-dependencies"]["docs"]
+    assert needs and not [need for need in needs if re.search(r"[\s;]", need)]
+    shown = subprocess.run([ROOT / "scripts" / "docs", "--help"], capture_output=True, text=True, check=True)
+    assert "build/docs" in shown.stdout

@@ -79,7 +79,7 @@ def test_a_bad_word_on_line_17(launch, script, n):
     assert not (script.parent / "data").exists()
 
 
-@pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.mpi)])
 def test_the_disk_is_full(launch, script, undisturbed, small_disk, n):
     disk = small_disk("1m")
     done = launch(n, script, "--no-figure", "--outdir", disk, cwd=script.parent, timeout=120)
@@ -193,7 +193,7 @@ def test_a_second_sigterm_ends_ranks_that_hang(launch, script, undisturbed, wait
     finish(launch, 2, script, undisturbed)
 
 
-@pytest.mark.parametrize("n", [1, pytest.param(2, marks=pytest.mark.mpi)])
+@pytest.mark.parametrize("n", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.mpi)])
 def test_a_chain_of_jobs_with_a_time_limit(launch, script, undisturbed, n):
     """As a queue would run it: always the same command line, until it says that it is done."""
     codes = []

@@ -7,6 +7,7 @@ import numpy as np
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.model import Flow
+from hpcdem.pre.mesh import structured_space
 from tests.flow.support import WATER, inner
 from tests.space.support import body
 
@@ -34,27 +35,6 @@ def points_at(mesh: Mesh, **at: float) -> np.ndarray:
     return np.flatnonzero(found)
 
 
-def thick(points: np.ndarray, triangles: np.ndarray, heights: np.ndarray) -> Mesh:
-    """Layers of tetrahedra between copies of triangles (m, 3) with these points (n, 2) at these heights, ascending:
-    each prism is cut by the numbers of its points, so that neighbours fit."""
-    n = len(points)
-    every = np.concatenate([np.column_stack([points, np.full(n, z)]) for z in heights])
-    low = np.sort(triangles, axis=1)
-    cells = []
-    for k in range(len(heights) - 1):
-        a, b = low + k * n, low + (k + 1) * n
-        cells += [
-            np.column_stack([a[:, 0], a[:, 1], a[:, 2], b[:, 2]]),
-            np.column_stack([a[:, 0], a[:, 1], b[:, 1], b[:, 2]]),
-            np.column_stack([a[:, 0], b[:, 0], b[:, 1], b[:, 2]]),
-        ]  # fmt: skip
-    made = np.concatenate(cells)
-    side = every[made[:, 1:]] - every[made[:, :1]]
-    wrong = np.linalg.det(side) < 0.0
-    made[wrong] = made[wrong][:, [0, 2, 1, 3]]
-    return Mesh.of(every, made)
-
-
 def ring(radii: np.ndarray, parts: int, heights: np.ndarray, turn: float = 2.0 * np.pi) -> Mesh:
     """Between circles of these radii, with so many parts around, or in a sector `turn`; diagonals both ways in turn."""
     whole = turn == 2.0 * np.pi
@@ -66,4 +46,4 @@ def ring(radii: np.ndarray, parts: int, heights: np.ndarray, turn: float = 2.0 *
     even = (i + j) % 2 == 0
     one = np.where(even[:, None], np.column_stack([a, b, c]), np.column_stack([a, b, d]))
     two = np.where(even[:, None], np.column_stack([a, c, d]), np.column_stack([b, c, d]))
-    return thick(points, np.concatenate([one, two]), heights)
+    return structured_space.layers(points, np.concatenate([one, two]), heights)

@@ -24,6 +24,7 @@ def project(tmp_path) -> fdem.Project:
     return fdem.Project(Blocks(SerialComm()), outdir=tmp_path / "out")
 
 
+@pytest.mark.slow  # quick: tests/cases/water
 def test_steady_flow_around_a_hole(tmp_path) -> None:
     """9.11: 10 MPa at r = 1 m, 1 MPa at r = 5 m; 1 % of 9 MPa in the mean over rings, what comes in goes out."""
     try:

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels, reference
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.flow.wells import RATE
+from hpcdem.pre.mesh import structured_space
 from tests.flow import exact
 from tests.flow.space import on_plane, points_at, ring, standing
 from tests.flow.support import WATER, hold, inner, over, run, until
@@ -459,3 +461,48 @@ def test_the_matrix_is_the_derivative_of_what_is_lacking() -> None:
             free = ~now.held
             found, wanted = (matrix @ way)[free], (0.5 * (plus - minus))[free]
             assert np.abs(found - wanted).max() < 1e-2 * np.abs(wanted).max()
+
+
+def _penny(parts: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """A crack of 1 m with so many circles of joints in a sector of 20 degrees, at 1 MPa of fluid, E 30 GPa, nu 0.25:
+    distances from the axis of its channels, openings, volume of the whole crack."""
+    turn, size = math.radians(20.0), 1.0 / parts
+    away = np.cumsum(size * 1.35 ** np.arange(round(math.log(1.0 + 9.0 * parts * 0.35) / math.log(1.35))))
+    radii = np.concatenate([np.arange(parts + 1) * size, 1.0 + away])
+    mesh = structured_space.sector(radii, 2, turn, np.concatenate([-away[::-1], [0.0], away]))
+    sim = body(mesh, dynamic=False, young=30e9)
+    sim.option(large_strain=False)
+    plane = on_plane(mesh, 2, 0.0)
+    crack = plane[np.linalg.norm(mesh.points[mesh.face_points(plane)], axis=2).max(axis=1) < 1.0 + 1e-9]
+    changes.crack(sim, crack)
+    x, y, z = mesh.points.T
+    r = np.hypot(x, y)
+    side = np.flatnonzero((np.abs(x * math.sin(turn) - y * math.cos(turn)) < 1e-9) & (r > 1e-9))
+    sim.velocity_condition(np.flatnonzero(np.abs(y) < 1e-9), vy=0.0)
+    sim.move_constraint(side, space.ACROSS, (-math.sin(turn), math.cos(turn), 0.0))
+    sim.velocity_condition(np.flatnonzero(r < 1e-9), vx=0.0, vy=0.0)
+    outside = np.flatnonzero((r > r.max() - 1e-6) | (np.abs(z) > z.max() - 1e-6))
+    sim.velocity_condition(outside, vx=0.0, vy=0.0, vz=0.0)
+    flow = Flow.of(sim)
+    flow.assign(crack, {**WATER, "aperature_initial": 1e-6})
+    flow.fill(None, pressure=1e6)
+    equilibrium.solve_elastic(sim)
+    opening = flow.values("flow-channel", "aperture") - 1e-6
+    away = np.linalg.norm(mesh.points[flow.network.corners].mean(axis=1), axis=1)
+    volume = float((opening * mesh.face_sizes(flow.network.channels)).sum()) * 2.0 * math.pi / turn
+    return away, opening, volume
+
+
+def test_pressure_in_a_penny_crack_opens_it_as_sneddon_says() -> None:
+    """fdem_3d.md D: w(r) = 8 p sqrt(a2 - r2) / (pi E'), 79.58 um in the middle, 68.92 at half of it; volume 16 p a3 /
+    (3 E') = 1.6667e-4 m3. The error is of first order in the size of the joints, as their strain is constant."""
+    middle = 8.0 * 1e6 / (math.pi * 32e9)
+    assert middle == pytest.approx(79.58e-6, rel=1e-4)
+    errors, volumes = [], []
+    for parts in (10, 20):
+        away, opening, volume = _penny(parts)
+        first = int(np.argmin(away))
+        errors.append(opening[first] / (middle * math.sqrt(1.0 - away[first] ** 2)) - 1.0)
+        volumes.append(volume / 1.6667e-4 - 1.0)
+    assert abs(errors[1]) < 0.05 and errors[1] > 0.75 * errors[0]
+    assert abs(2.0 * errors[1] - errors[0]) < 0.03 and abs(2.0 * volumes[1] - volumes[0]) < 0.04

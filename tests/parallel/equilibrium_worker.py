@@ -4,8 +4,8 @@ python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
 SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools,
-SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed: tetrahedra, with joints that break, that yield
-and are dug out; one after the other. Files are RUN.npz.
+SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed, SOLVER-burst: tetrahedra, with joints that break,
+that yield and are dug out, whose joints fluid opens; one after the other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -239,6 +239,39 @@ def solid(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def burst(sim: Blocks, solver: str, out: str) -> None:
+    """A plane of joints between tetrahedra that a well opens, then shuts in."""
+    mesh = box((12, 2, 4), (1.2, 0.2, 0.4), 6)
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    joints = sim.numbers_of_joints(None)
+    joints = joints[(np.abs(mesh.points[mesh.face_points(joints)][:, :, 2] - 0.2) < 1e-9).all(axis=1)]
+    law = {**JOINT, "friction": 30.0, "tensile_strength": 1e6, "gf1": 20.0, "penalty_normal": 100.0 * ROCK["young"]}
+    sim.joint_model(joints, "classic_intrinsic_cohesive_interface", law)
+    sim.option(dynamic=False, large_strain=False, collision=False)
+    sim.initial_stress(None, zz=-1e6)
+    x, y, z = mesh.points.T
+    sim.velocity_condition(np.flatnonzero(np.abs(np.abs(z - 0.2) - 0.2) < 1e-9), vx=0.0, vy=0.0, vz=0.0)
+    equilibrium.solve_elastic(sim, solver="direct")
+    flow = Flow.of(sim)
+    flow.assign(joints, {**WATER, "aperature_initial": 5e-6, "shear_dilation": 3.0})
+    flow.drill("pump", np.flatnonzero((x < 0.15) & (np.abs(z - 0.2) < 1e-9)))
+    flow.stage("pump", RATE, 1e-5, 0.43, math.inf)
+    flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
+    sim.gravity(5.0, 1.0, -2.0)
+    with Coupled(sim, 0.05, solver) as run:
+        while flow.time < 0.5:
+            run.advance(0.5)
+    found = {name: diagnostics.values(sim, name) for name in SPACE}
+    for name in ("pressure", "saturation", "fluid"):
+        found[name] = flow.values("flow-node", name)
+    found["joints"] = np.array(diagnostics.joint_counts(sim))
+    found["account"] = np.array(list(flow.account().values())[:4])
+    found["wells"] = np.array([flow.well_value("pump", name) for name in QUANTITIES])
+    if sim.comm.rank == 0:
+        np.savez(out, **found)
+
+
 def crushed(sim: Blocks, solver: str, out: str) -> None:
     """A bar of rock that yields under a stamp; a part is dug out."""
     mesh = box((12, 3, 3), (2.4, 0.6, 0.6), 5, shaken=0.2)
@@ -265,7 +298,7 @@ def crushed(sim: Blocks, solver: str, out: str) -> None:
 
 KINDS = {
     "": excavation, "yields": stamp, "pumped": pumped, "propped": propped, "cooled": cooled, "rinsed": rinsed,
-    "solid": solid, "crushed": crushed,
+    "solid": solid, "crushed": crushed, "burst": burst,
 }  # fmt: skip
 
 if __name__ == "__main__":

@@ -86,7 +86,7 @@ def test_the_same_on_any_ranks_and_threads(
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_the_same_across_a_restart(one: tuple[Path, str], resident: Resident, tmp_path: Path, ranks: int) -> None:
     """From the checkpoint in the middle of a CYC; the account is in it, whole."""
     folder, log = one

@@ -16,7 +16,7 @@ WORKER = Path(__file__).with_name("equilibrium_worker.py")
 
 pytestmark = pytest.mark.ranks
 SLOW = pytest.mark.slow
-KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed")
+KINDS = ("", "-yields", "-pumped", "-propped", "-cooled", "-rinsed", "-solid", "-crushed", "-burst")
 Found = dict[str, np.ndarray]
 
 
@@ -94,6 +94,13 @@ def test_tetrahedra_break_and_yield(runs):
     assert crushed["ratios"].max() < 1e-8 and np.nanmax(crushed["plastic_shear_strain"]) > 1e-3
 
 
+def test_fluid_opens_joints_of_tetrahedra(runs):
+    found = runs(1, "direct-burst")
+    assert found["joints"][1:].sum() > 5 and found["pressure"].max() > 1e6 and found["saturation"].min() < 0.5
+    pressure, rate, injected, stage = found["wells"]
+    assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(1e-5 * 0.43, rel=1e-12)
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", [f"direct{kind}" for kind in KINDS])
 @pytest.mark.parametrize("ranks", [pytest.param(2, marks=SLOW), 3, pytest.param(4, marks=SLOW)])
@@ -112,6 +119,7 @@ PLASTIC = ("stress_xx", "stress_yy", "displacement_x", "displacement_y", "plasti
 
 
 SOLID = ("stress_xx", "displacement_x", "displacement_z", "opening", "joints")
+BURST = ("stress_xx", "displacement_z", "opening", "pressure", "saturation", "fluid", "joints", "account")
 CRUSHED = ("stress_xx", "displacement_x", "displacement_z", "plastic_shear_strain", "plastic_work")
 
 
@@ -127,6 +135,7 @@ CRUSHED = ("stress_xx", "displacement_x", "displacement_z", "plastic_shear_strai
         ("-cooled", COOLED),
         ("-solid", SOLID),
         ("-crushed", CRUSHED),
+        ("-burst", BURST),
     ],
 )
 @pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=SLOW), pytest.param(4, marks=SLOW)])

@@ -59,6 +59,18 @@ CYC 20
 STOP
 """
 
+FOLLOWED = """\
+START
+BOX left 0.0 right 9.0 bottom 0.0 height 9.0
+GEN grid rad discrete 0.4 x (1.0 8.0) y (1.0 4.0)
+PROP density 2e3 kn 2e7 ks 1e7
+SET dt 5e-4 gravity 0.0 -9.8
+HIST id 1 interval 10 energy
+CYC 20
+STOP
+"""
+"""Energy without the account of it."""
+
 BOTH = """\
 import hpcdem
 {first}
@@ -123,7 +135,8 @@ def test_particles(late, tmp_path: Path, ranks: int) -> None:
     write_lattice(tmp_path / "bodies.clumps", 3.0, 10, 6)
     (tmp_path / "model.py").write_text(PARTICLES)
     (tmp_path / "again.py").write_text(AGAIN)
-    for script in ("model.py", "again.py"):
+    (tmp_path / "followed.py").write_text(FOLLOWED)
+    for script in ("model.py", "again.py", "followed.py"):
         assert late(ranks, script) == [NOTHING] * ranks
 
 

@@ -31,7 +31,7 @@ def test_script_to_figure(launch: Launcher, tmp_path: Path) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_ranks_do_not_change_the_result(launch: Launcher, tmp_path: Path, ranks: int) -> None:
     for n in (1, ranks):
         done = launch(n, write_push(tmp_path / str(n), steps=200), "--no-figure")

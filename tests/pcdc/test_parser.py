@@ -250,7 +250,7 @@ def test_every_example_of_the_table_is_read():
 REFUSED_IN_SPACE = [
     ("model gravity (0,-9.81)", "read '(0,-9.81)', expected a vector (x,y,z) for 'gravity'"),
     ("mesh structured (0,0,0) (1,1,1) cells 2 2", "the line ends where a whole number above 0 for 'cells' is expected"),
-    ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "'type' is for two dimensions in this version"),
+    ("mesh structured (0,0,0) (1,1,1) cells 2 2 2 type tri", "type tri: in three dimensions it is tet or hex"),
     ("geometry create circle (0,0) 1 as-layer 'c'", "'geometry create circle' is for two dimensions in this version"),
     ("face-joint c-model hydr-p-p-m property viscosity 1", "'hydraulic-porous-proppant-medium' is for two dimensions"),
     ("element c-model user 'a.py:a' property density 1", "'user' is for two dimensions"),
@@ -261,7 +261,6 @@ REFUSED_IN_SPACE = [
     ("element property young table 't' over temperature", "'over temperature' is for two dimensions"),
     ("element c-model mech-m-c property coh table 't' over temperature", "'over temperature' is for two dimensions"),
     ("element-face boundary m-s-b-c quiet on", "'quiet' is for two dimensions"),
-    ("model solve elastic", "'elastic' is for two dimensions"),
     ("model option energy on", "'energy' is for two dimensions"),
     ("node initial temperature 3", "'temperature' is for two dimensions"),
     ("bolt create polyline (0,0) (1,1)", "'bolt create polyline' is for two dimensions"),

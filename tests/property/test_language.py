@@ -19,7 +19,7 @@ from hpcdem.lang.zdem.parser import Script, parse_text
 from tests.property.grammar import MISTAKES, Model, good_models, models, same_but_noisy
 
 ALWAYS_THE_SAME = settings(
-    max_examples=150, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 
 

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from hpcdem.commands.fdem.project import joined
 from hpcdem.physics.fdem import changes, creep, diagnostics
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
 from tests.parallel.model import Found, Model
-from tests.space.support import ROCK, box
+from tests.space.support import ROCK, box, hexes
 
 
 def swinging(sim: Blocks) -> None:
@@ -109,6 +110,33 @@ def creep_more(sim: Blocks) -> None:
         sim.element_property(soft[20:60], {"kelvin_viscosity": 3e6})
     if step == 800:
         changes.element_model(sim, np.flatnonzero(sim.creeping())[:10], "mech_iso_elastic", ROCK)
+
+
+def blocks_of_hexes(sim: Blocks) -> None:
+    """A bar of hexahedra like that of `swinging` beside one of tetrahedra that is held at the same end, and a block of
+    hexahedra that flies onto both through all strips."""
+    bar, rod = hexes((12, 2, 2), (2.4, 0.3, 0.3), 0.2), box((10, 1, 1), (2.4, 0.2, 0.3), 6)
+    flier = hexes((2, 2, 1), (0.4, 0.5, 0.2), 0.1)
+    mesh = bar
+    for other, away in ((rod, (0.0, 0.35, 0.0)), (flier, (-0.3, 0.0, 0.32))):
+        mesh = joined(mesh, Mesh.of(other.points + np.array(away), other.cells, layers={}, hexes=other.hexes))
+    sim.take_mesh(mesh)
+    changes.element_model(sim, None, "mech_iso_elastic", {**ROCK, "young": 1e8, "damp_factor": 0.02})
+    sim.initial_stress(None, xx=1e4, yz=-3e3, gradient={"zz": (1e3, 0.0, -2e3)})
+    edges = mesh.edges()
+    faces = {side: edges.faces[mesh.find_edges(edges, bar.layers[side]), 0] for side in bar.layers}
+    sim.move_constraint(np.flatnonzero((mesh.points[:, 0] < 1e-9) & (mesh.points[:, 2] < 0.31)), 1)
+    sim.table("beat", [(0.0, 0.0), (0.01, 3e5), (0.02, 0.0), (0.04, 2e5)])
+    sim.stress_condition(faces["right"], normal="beat")
+    sim.rayleigh(0.02, 60.0)
+    sim.gravity(0.5, 0.0, -9.81)
+    changes.set_velocity(sim, np.arange(len(mesh.points) - len(flier.points), len(mesh.points)), 30.0, 1.0, -3.0)
+
+
+def dig_hexes(sim: Blocks) -> None:
+    """Whole hexahedra are taken out in the middle of the run."""
+    if sim.clock.step == 500:
+        changes.null(sim, np.flatnonzero((sim.mesh.centroids()[:, 0] > 2.1) & (sim.mesh.hex_of() >= 0)))
 
 
 def settling(sim: Blocks) -> None:
@@ -270,6 +298,13 @@ def it_crowds(found: Found) -> None:
     assert found["about"][0] > 10
 
 
+def it_hits(found: Found) -> None:
+    assert np.nanmax(found["displacement_x"]) > 1.0
+    assert found["velocity_z"][-18:].mean() > -2.0  # the flier came down with 3 m/s and faster
+    lost = int(np.isnan(found["stress_xx"]).sum())
+    assert lost > 0 and lost % 6 == 0  # dug out
+
+
 def it_settles(found: Found) -> None:
     assert found["time"][2] < 1e-2
     assert np.abs(found["stress_zz"]).max() > 2e4
@@ -281,5 +316,6 @@ MODELS = {
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
+    "hexahedra": Model(blocks_of_hexes, touching, it_hits, dig_hexes, steps=900, middle=401, come=10),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

@@ -29,6 +29,17 @@ def box(cells: tuple[int, int, int], size: tuple[float, float, float], split: in
     return Mesh.of(points, made.cells, made.groups, made.layers)
 
 
+def hexes(cells: tuple[int, int, int], size: tuple[float, float, float], shaken: float = 0.0) -> Mesh:
+    """The same of hexahedra."""
+    made = structured_space.hexes(tuple(np.linspace(0.0, s, n + 1) for s, n in zip(size, cells)))
+    if not shaken:
+        return made
+    points, step = made.points.copy(), np.array(size) / cells
+    inner = ((points > 0.0) & (points < np.array(size))).all(axis=1)
+    points[inner] += np.random.default_rng(7).uniform(-shaken, shaken, (int(inner.sum()), 3)) * step
+    return Mesh.of(points, made.cells, made.groups, made.layers, hexes=made.hexes)
+
+
 def body(mesh: Mesh, dynamic: bool = True, **properties: float) -> Blocks:
     """An elastic one on one rank."""
     sim = Blocks(SerialComm())

@@ -8,6 +8,8 @@ from graphlib import CycleError, TopologicalSorter
 import grimp
 import pytest
 
+from tests.conftest import ROOT
+
 
 def circle(package: str) -> list[str]:
     """Modules that import each other in turn, the first one last again; empty if there are none."""
@@ -42,3 +44,15 @@ def test_a_circle_is_found(way, tmp_path, monkeypatch):
         assert set(circle("tied")) == {"tied.a", "tied.b", "tied.c"}
     finally:
         sys.modules.pop("tied", None)
+
+
+def test_the_top_floor_has_few_rooms_and_a_short_plan():
+    """At most 20 of them, each on the plan of ARCHITECTURE.md, which a newcomer reads in one go."""
+    package = ROOT / "hpcdem"
+    rooms = {path.stem for path in package.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    rooms -= {"__init__", "__main__"}
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    plan = text.split("```")[1]
+    assert 10 < len(rooms) <= 20
+    assert [room for room in sorted(rooms) if room not in plan] == []
+    assert len(text.splitlines()) <= 200

@@ -371,7 +371,7 @@ def test_any_number_of_ranks_writes_the_same_bytes(launch: Any, frames: list[Fra
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("ranks", [2, 4])
+@pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_refusal_reaches_all_ranks(launch: Any, frames: list[Frame], tmp_path: Path, ranks: int) -> None:
     (tmp_path / "program.py").write_text(PROGRAM)
     folder = write(tmp_path / "data", frames[1:])

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen
+from hpcdem.commands.fdem.heat import assign
 from hpcdem.commands.fdem.heat import of_heat as heat_of
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
@@ -26,19 +27,9 @@ _DOES = {"pressure": kernels.PRESSURE, "flow_surface": kernels.SURFACE, "flow_ra
 
 def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Joints become channels with these properties (physics.flow.properties)."""
-    if project.coupled is not None:
-        raise CommandError("blocks that are coupled to particles have no fluid in their joints in this version")
     joints = chosen(project, JOINT, where)
-    blocks = project.ready()
-    known = Flow.there(blocks)
-    flow = Flow.of(blocks)
-    try:
-        flow.assign(joints, properties)
-    except CommandError:
-        if known is None:
-            blocks.surface_loads.remove(flow)
-        raise
-    proppant = Proppant.there(blocks)
+    assign(project, Flow, "fluid in their joints", joints, properties)
+    proppant = Proppant.there(project.blocks)
     if proppant is not None:
         proppant.leave(joints)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from hpcdem.commands.fdem import assignments
 from hpcdem.commands.fdem.choices import chosen
 from hpcdem.commands.fdem.project import Project
@@ -18,17 +20,24 @@ from hpcdem.physics.heat.properties import ISO_HEAT
 
 def model(project: Project, properties: Mapping[str, Value], where: Range | None = None) -> None:
     """Elements conduct heat, with these properties (physics.heat.properties)."""
+    assign(project, Heat, "heat", chosen(project, ELEMENT, where), properties)
+
+
+def assign(
+    project: Project, physics: type[Any], what: str, numbers: np.ndarray | None, properties: Mapping[str, Value]
+) -> None:
+    """Give a physics of blocks (Heat, Flow) properties; if they are refused and it is new with them, it goes again.
+    CommandError beside particles, where blocks do not have `what`."""
     if project.coupled is not None:
-        raise CommandError("blocks that are coupled to particles have no heat in this version")
-    elements = chosen(project, ELEMENT, where)
+        raise CommandError(f"blocks that are coupled to particles have no {what} in this version")
     blocks = project.ready()
-    known = Heat.there(blocks)
-    heat = Heat.of(blocks)
+    known = physics.there(blocks)
+    found = physics.of(blocks)
     try:
-        heat.assign(elements, properties)
+        found.assign(numbers, properties)
     except CommandError:
         if known is None:
-            blocks.surface_loads.remove(heat)
+            blocks.surface_loads.remove(found)
         raise
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from hpcdem.commands.fdem import values
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes
+from hpcdem.physics.fdem import changes, hexahedra
 from hpcdem.physics.fdem.groups import DEFAULT, ELEMENT
 from hpcdem.physics.fdem.mesh import Mesh, check, crack_rows
 from hpcdem.pre.mesh import cracks as cracks_of
@@ -120,10 +120,13 @@ def box(
     group: str = DEFAULT,
     set_name: str = DEFAULT,
     ratio: tuple[float, ...] = (1.0, 1.0, 1.0),
+    hexes: bool = False,
 ) -> None:
-    """Regular tetrahedra in the box between two corners [m]; cells along x, y and z, each split into 5, 6 or 12; ratio:
-    each is so many times as large as the one before. Its sides are the layers left, right, front, back, bottom, top."""
-    _add(project, structured_space.box(values.grid_lines(first, second, cells, ratio), split, (set_name, group)))
+    """Regular tetrahedra in the box between two corners [m]; cells along x, y and z, each split into 5, 6 or 12, or
+    hexahedra; ratio: each is so many times as large as the one before. Its sides are the layers left, right, front,
+    back, bottom, top."""
+    lines, name = values.grid_lines(first, second, cells, ratio), (set_name, group)
+    _add(project, structured_space.hexes(lines, name) if hexes else structured_space.box(lines, split, name))
 
 
 def rectangle(
@@ -284,7 +287,9 @@ def _add(project: Project, mesh: Mesh) -> None:
     check(mesh)
     project.add_mesh(mesh)
     if mesh.dim == 3:
-        _say(project, f"mesh: {len(mesh.cells)} tetrahedra, {len(mesh.points)} points")
+        of_hexes = hexahedra.PARTS * len(mesh.hexes)
+        hexes = f"{len(mesh.hexes)} hexahedra of {hexahedra.PARTS} elements each, " if of_hexes else ""
+        _say(project, f"mesh: {hexes}{len(mesh.cells) - of_hexes} tetrahedra, {len(mesh.points)} points")
         return
     triangles = int((mesh.cells[:, 3] < 0).sum())
     _say(project, f"mesh: {triangles} triangles, {len(mesh.cells) - triangles} quads, {len(mesh.points)} points")

@@ -266,4 +266,5 @@ def joined(one: Mesh, other: Mesh) -> Mesh:
         layers,
         np.concatenate([one.cracks, other.cracks + n_points]),
         np.concatenate([one.crack_sets, other.crack_sets + sets]),
+        np.concatenate([one.hexes, other.hexes + np.append(np.full(8, n_points), n_cells)]),
     )

@@ -156,6 +156,7 @@ def _mesh_structured(call: Call) -> None:
             call["second"],
             call["cells"],
             call.get("split", 6),
+            hexes=call.get("type") == "hex",
             **call.group(),
             **options,
         )

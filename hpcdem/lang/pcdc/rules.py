@@ -44,6 +44,17 @@ def _history(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | No
         )
 
 
+def _structured(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
+    kind, first = arguments.get("type"), arguments["first"]
+    if kind is None or isinstance(kind, Pending) or isinstance(first, Pending):
+        return
+    there = ("tri", "quad") if len(first) == 2 else ("tet", "hex")
+    if kind not in there:
+        raise ValueError(f"type {kind}: in {('two', 'three')[len(first) - 2]} dimensions it is {' or '.join(there)}")
+    if kind == "hex" and "split" in arguments:
+        raise ValueError("split is for tetrahedra: hexahedra are not split")
+
+
 def _bolt(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None) -> None:
     if "segments" in arguments and "length" in arguments:
         raise ValueError("segments and length exclude each other: both say where a bolt is divided")
@@ -162,6 +173,7 @@ def _field(arguments: Mapping[str, Any], terms: Sequence[tuple[str, Any]] | None
 
 _RULES = {
     "bolt create polyline": _bolt,
+    "mesh structured": _structured,
     "field create": _field,
     "flow-node initial": _fluid,
     "model time-step": _time_step,

@@ -865,12 +865,14 @@ _MESH = (
                 Option("smooth", (), "inner points lie in the middle of their neighbours, so that joints on all "
                        "edges share a uniform stress evenly; for triangles", dims=PLANE), _GROUP), dims=BOTH),
     Command("mesh str{uctured}", "A regular mesh of a rectangle.",
-            ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",),
+            ("pcdc mesh structured (0,0) (10,5) cells 40 20 type tri diagonal both group 'base'",
+             "pcdc mesh structured (0,0,0) (10,5,5) cells 20 10 10 type hex"),
             (_leading("first", VECTOR, "a corner", "m"), _leading("second", VECTOR, "the corner across", "m")),
             (Option("cells", (COUNT, COUNT, THIRD_COUNT), "along x and y, in three dimensions z", required=True),
              Option("split", (SPLIT,), "tetrahedra of each box: 5, mirrored from box to box, 6 about "
                     "a diagonal, or 12 about a point in the middle", default="6", dims=SPACE),
-             Option("type", (choice("tri", "quad"),), "triangles or quads", default="tri", dims=PLANE),
+             Option("type", (choice("tri", "quad", "tet", "hex"),), "triangles or quads, in three dimensions "
+                    "tetrahedra or hexahedra", default="tri, tet"),
              Option("diag{onal}", (choice("right", "left", "alternate", "both"),), "of the triangles; alternating, or "
                     "both of each rectangle", default="alternate", dims=PLANE),
              Option("ratio", (POSITIVE, POSITIVE, THIRD_POSITIVE), "along x and y (and z): each rectangle or box is so "

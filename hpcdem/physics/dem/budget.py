@@ -221,6 +221,7 @@ class Budget:
 
 def stored_energy(sim: Simulation) -> float:
     """Kinetic and elastic energy at the whole step [J], exactly summed. Needs no account. Collective."""
+    sim.prepare_kernels("energy")
     values = [as_integer(bins) for bins in _stored_bins(sim)]
     if sim.comm.any(None in values):
         return float("nan")

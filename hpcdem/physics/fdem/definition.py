@@ -15,8 +15,8 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.numerics.random_field import RandomField
+from hpcdem.physics.fdem import hexahedra, properties, user_functions
 from hpcdem.physics.fdem import mesh as meshes
-from hpcdem.physics.fdem import properties, user_functions
 from hpcdem.physics.fdem.kernels import nodes as moving
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
@@ -232,7 +232,18 @@ class ModelDefinition:
 
     def numbers_of_elements(self, elements: Any) -> np.ndarray:
         """Checked element numbers, ascending; None: all that are there. CommandError for others."""
-        return self.existing(elements, self.alive, "element")
+        at = self.existing(elements, self.alive, "element")
+        if len(self._mesh().hexes) and elements is not None:
+            of = self._mesh().hex_of()[at]
+            count = np.bincount(of[of >= 0], minlength=len(self._mesh().hexes))
+            part = np.flatnonzero((count > 0) & (count < hexahedra.PARTS))
+            if len(part):
+                first = self._mesh().hexes[part[0], 8]
+                raise CommandError(
+                    f"elements {first} to {first + hexahedra.PARTS - 1} are one hexahedron: they go together, only "
+                    f"{count[part[0]]} of them were given"
+                )
+        return at
 
     def numbers_of_nodes(self, nodes: Any) -> np.ndarray:
         """Checked node numbers (points of the mesh) with an element that is there; None: all of them."""
@@ -258,6 +269,9 @@ class ModelDefinition:
         face = np.arange(len(self.partner))
         inner = (self.partner > face) & self.alive[face // 4]
         inner[inner] &= self.alive[self.partner[inner] // 4]
+        if len(self._mesh().hexes):
+            of_hexes = self._mesh().hex_of() >= 0  # there are no joints between these yet
+            inner[inner] &= ~(of_hexes[face[inner] // 4] | of_hexes[self.partner[inner] // 4])
         return inner
 
     def face_exists(self) -> np.ndarray:
@@ -345,6 +359,10 @@ class ModelDefinition:
         if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
             self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
+        if name != MECH_ISO_ELASTIC.name and len(self._mesh().hexes) and (self._mesh().hex_of()[at] >= 0).any():
+            raise CommandError(
+                f"hexahedra are elastic in this version: the model {name.replace('_', '-')} is for tetrahedra"
+            )
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
 
@@ -399,6 +417,8 @@ class ModelDefinition:
 
         Joints that are broken stay broken. None: all inner edges."""
         at = self.numbers_of_joints(joints)
+        if not len(at) and len(self._mesh().hexes):
+            raise CommandError("there are no joints between hexahedra in this version: tetrahedra have them")
         self._assign(self.joint_rows, self._both_sides(at), at, JOINT, name, properties, True)
 
     def joint_property(self, joints: Numbers, properties: Mapping[str, Value]) -> None:

@@ -17,6 +17,7 @@ from hpcdem.physics.fdem.definition import COMPONENTS, Numbers
 from hpcdem.physics.fdem.kernels import plasticity, tets
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, INTACT, NONE, YIELDED
 from hpcdem.physics.fdem.local import Evaluation, Local
+from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.probes import ForceProbe, Probe
 from hpcdem.physics.fdem.properties import COHESIVE, MECH_BURGERS, MECH_ISO_ELASTIC, MECH_MOHR_COULOMB
 from hpcdem.physics.fdem.simulation import Blocks
@@ -462,7 +463,7 @@ def _principal(stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         radius = np.hypot(half, stress[:, 2])
         return mean + radius, mean - radius
     found, good = np.full((len(stress), 3), np.nan), np.isfinite(stress).all(axis=1)  # not all are in a last frame
-    found[good] = np.linalg.eigvalsh(stress[good][:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
+    found[good], _ = principal(stress[good][:, [0, 2, 4, 2, 1, 5, 4, 5, 3]].reshape(-1, 3, 3))
     return found[:, 2].copy(), found[:, 0].copy()
 
 

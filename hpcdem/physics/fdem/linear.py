@@ -364,6 +364,7 @@ class Petsc:
             pc.setType("gamg")
             self._matrix.setOption(self._petsc.Mat.Option.SYMMETRIC, True)
             self._matrix.setNearNullSpace(self._rigid())
+            ksp.setFromOptions()  # else multigrid has no defaults
         elif self._mumps:
             ksp.setType("preonly")
             pc.setType("lu")
@@ -374,6 +375,7 @@ class Petsc:
             ksp.setTolerances(rtol=1e-10, max_it=2000)
             pc.setType("gamg")
             self._matrix.setNearNullSpace(self._rigid())
+            ksp.setFromOptions()
         try:
             ksp.setUp()
             failed = False

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.hexes import Hexes, place_masses
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
 from hpcdem.physics.fdem.kernels import nodes as moving
@@ -64,6 +65,11 @@ class LocalSpace(LawsSpace):
             sim.number, mesh.points, mesh.cells, sim.element_row, models, sim.options.dynamic, self.rows[: self.count],
             self.true_mass, self.c,
         )  # fmt: skip
+        self.hexes: Hexes | None = None
+        if len(mesh.hexes):
+            sim.prepare_kernels("hexes")
+            place_masses(sim, self.true_mass)
+            self.hexes = Hexes(sim, self.true_mass)
         self.c[self.count :] = self.c[self.count - 1] if self.count else 1.0
         self.s0 = np.zeros((self.count + 3, tets.STRESSES))
         if sim.stress0 is not None:
@@ -113,12 +119,26 @@ class LocalSpace(LawsSpace):
         self.load_corner = tets.ROW * (i + own.start)[:, None] + tets.STRIDE * corner
         places = mesh.points[mesh.face_points(faces[i, k])].mean(axis=1)
         self.load_functions = Placed(sim.loads, sim.load_row[faces[i, k]].astype(np.int64), places)
-        self.load_of = self.load_functions.of
+        self.load_of, self.load_share = self.load_functions.of, np.ones(len(i))
         quiet = self._acting(np.flatnonzero(sim.quiet_faces()[faces[i, k]]))
         self.quiet_corner, self.quiet_of = self.load_corner[quiet], self.load_of[quiet]
         self.quiet_p, self.quiet_s = self._impedances(sim.number[own][i[quiet]])
+        if self.hexes is not None:
+            self._share_loads(i)
         sim.surface_loads.corners(sim, self.special)
         self.some_applied = bool(sim.surface_loads) or sim.comm.any(len(i) > 0)
+
+    def _share_loads(self, element: np.ndarray) -> None:
+        """A side of a hexahedron is two triangles, and a load on it that of both ways to cut it, half each. element
+        (m,): of the loaded faces, the how-manieth."""
+        assert self.hexes is not None
+        of, corners = self.hexes.other_cuts(self.load_corner, element)
+        self.load_share[of] = 0.5
+        i, k = np.divmod(corners - tets.ROW * self.sim.n_left, tets.ROW)
+        self.special[i, k // tets.STRIDE] = True
+        self.load_corner = np.concatenate([self.load_corner, corners])
+        self.load_of = np.concatenate([self.load_of, self.load_of[of]])
+        self.load_share = np.concatenate([self.load_share, np.full(len(of), 0.5)])
 
     def _mark_special(self) -> None:
         """All forces are stored."""
@@ -172,16 +192,32 @@ class LocalSpace(LawsSpace):
 
     def _stable_time_step(self, target: float, mass: np.ndarray) -> float:
         o = self.sim.options
-        rows = self.rows[: self.count]
-        return space.time_step(
-            self.c, rows, self.sim.n_left, *self.springs(), o.mass_damping, o.stiffness_damping, o.safety, target, mass
+        springs = self.springs()
+        rows, c = self._tetrahedra()
+        found = space.time_step(
+            c, rows, self.sim.n_left, *springs, o.mass_damping, o.stiffness_damping, o.safety, target, mass
         )
+        return found if self.hexes is None else min(found, self.hexes.time_step(*springs, target, mass))
+
+    def _tetrahedra(self) -> tuple[np.ndarray, np.ndarray]:
+        """Storage rows and constants of the elements that are no parts of hexahedra."""
+        rows = self.rows[: self.count]
+        if self.hexes is None:
+            return rows, self.c
+        alone = np.ones(self.count, bool)
+        alone[self.hexes.rows - self.sim.n_left] = False
+        return rows[alone], self.c[: self.count][alone]
 
     def _make_static_masses(self) -> None:
-        space.static_masses(self.c, self.rows[: self.count], self.sim.n_left, self.springs()[0], ALPHA, self.mass)
+        springs = self.springs()[0]
+        rows, c = self._tetrahedra()
+        space.static_masses(c, rows, self.sim.n_left, springs, ALPHA, self.mass)
+        if self.hexes is not None:
+            self.hexes.static_masses(springs, ALPHA, self.mass)
 
     def _set_kicks(self, dt: float) -> None:
-        self.kick = np.where(self.alone(), dt / self.mass[self.sim.owned], 0.0)
+        mass = self.mass[self.sim.owned]
+        self.kick = np.divide(dt, mass, out=np.zeros_like(mass), where=self.alone())
         self.some_alone = bool(self.alone().any())
 
     def _bind(self) -> None:
@@ -209,12 +245,16 @@ class LocalSpace(LawsSpace):
         sim, o = self.sim, self.sim.options
         self.obey()
         stressed = sim.stress0 is not None or self.plastic or self.creeps
+        hexes = self.hexes
+        some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
         self._forces(
-            sim.threads, self.count, self.rows, sim.x, sim.v, self.c, self.s0, stressed, not o.large_strain, force,
+            sim.threads, some, self.rows, sim.x, sim.v, self.c, self.s0, stressed, not o.large_strain, force,
             o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping, self.jointed, self.slot_size, self.slot_link,
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
+        if hexes is not None:
+            hexes.forces(force)
         self.pairs.add_to(force)
 
     def open_joints(self) -> None:
@@ -238,7 +278,7 @@ class LocalSpace(LawsSpace):
         if self.some_applied:
             self.applied[:] = 0.0
             loads = self.loads_now(self.load_functions, clock.time)
-            space.tractions(self.load_corner, self.load_of, loads, sim.x, self.applied)
+            space.tractions(self.load_corner, self.load_of, self.load_share, loads, sim.x, self.applied)
             if len(self.quiet_corner):
                 space.dashpots(
                     self.quiet_corner, self.quiet_p, self.quiet_s, self.quiet_of, loads, sim.x, sim.v, self.applied
@@ -321,6 +361,8 @@ class LocalSpace(LawsSpace):
         tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], s0[at], small, 0, stress, energy)
         if energies:
             energy += self.remembered_energy(plastic, crept)[at]
+        if self.hexes is not None:
+            self.hexes.spread(stress, energy, at)
         return stress, energy
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import HpcdemError
-from hpcdem.physics.fdem import connectivity, tetrahedra
+from hpcdem.physics.fdem import connectivity, hexahedra, tetrahedra
 from hpcdem.physics.fdem.connectivity import Edges, areas, centroids, edges_of, find_edges
 
 FLAT = 1e-9
@@ -24,6 +24,10 @@ SAME = 1e-9
 
 def _no_pairs() -> np.ndarray:
     return np.empty((0, 2), np.int64)
+
+
+def _no_hexes() -> np.ndarray:
+    return np.empty((0, 9), np.int64)
 
 
 @dataclass(frozen=True)
@@ -43,9 +47,21 @@ class Mesh:
     """(k, 2) i8 end points of the inner edges that carry a crack from the beginning."""
     crack_sets: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     """(k,) i8 number of the fracture set of each crack edge."""
+    hexes: np.ndarray = field(default_factory=_no_hexes)
+    """(nh, 9) i8 of hexahedra (hexahedra.py): their points, and the first of their six elements."""
 
     @staticmethod
-    def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None) -> Mesh:
+    def of_hexes(points, hexes, layers=None, more=None) -> Mesh:
+        """Hexahedra with these points (nh, 8), then tetrahedra `more` (n, 4)."""
+        hexes = np.array(hexes, np.int64).reshape(-1, 8)
+        cells = hexahedra.split(hexes).reshape(-1, 4)
+        if more is not None:
+            cells = np.concatenate([cells, np.array(more, np.int64).reshape(-1, 4)])
+        table = np.column_stack([hexes, hexahedra.PARTS * np.arange(len(hexes))])
+        return Mesh.of(points, cells, layers=layers, hexes=table)
+
+    @staticmethod
+    def of(points, cells, groups=None, layers=None, cracks=None, crack_sets=None, hexes=None) -> Mesh:
         """A mesh from anything array-like, in the form the fields are documented in.
 
         Points of three columns are in space. Cells of three columns are triangles. Pairs get their lower point first,
@@ -72,7 +88,14 @@ class Mesh:
             {name: _sorted_pairs(given, dim) for name, given in (layers or {}).items()},
             pairs,
             sets,
+            _no_hexes() if hexes is None else np.ascontiguousarray(hexes, np.int64).reshape(-1, 9),
         )
+
+    def hex_of(self) -> np.ndarray:
+        """(ne,) i8 hexahedron of which each element is a part, -1: none."""
+        out = np.full(len(self.cells), -1, np.int64)
+        out[self.hexes[:, 8, None] + np.arange(hexahedra.PARTS)] = np.arange(len(self.hexes))[:, None]
+        return out
 
     @property
     def dim(self) -> int:
@@ -122,8 +145,12 @@ class Mesh:
         return (tetrahedra.volumes if self.dim == 3 else areas)(self.points, self.cells)
 
     def centroids(self, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(n, 2) [m], in space (n, 3), of these elements."""
-        return centres(self.points, self.cells[elements])
+        """(n, 2) [m], in space (n, 3), of these elements; parts of a hexahedron have that of its corners."""
+        out = centres(self.points, self.cells[elements])
+        if len(self.hexes):
+            of = self.hex_of()[elements]
+            out[of >= 0] = self.points[self.hexes[of[of >= 0], :8]].mean(axis=1)
+        return out
 
     def mean_edge(self) -> float:
         """Mean length of an edge [m]."""
@@ -166,7 +193,7 @@ def check(mesh: Mesh, source: str = "mesh") -> None:
     """
     if not len(mesh.cells):
         raise HpcdemError(f"{source}: there are no elements")
-    for finding in (_bad_numbers, _bad_shapes, _bad_points, _bad_edges, _bad_names):
+    for finding in (_bad_numbers, _bad_hexes, _bad_shapes, _bad_points, _bad_edges, _bad_names):
         said = finding(mesh)
         if said:
             raise HpcdemError(f"{source}: {said}")
@@ -197,6 +224,26 @@ def _bad_numbers(mesh: Mesh) -> str | None:
     if len(bad):
         return f"element {bad[0]} names points {mesh.cells[bad[0]].tolist()}, but points are numbered 0 to {n - 1}"
     return None
+
+
+def _bad_hexes(mesh: Mesh) -> str | None:
+    """All tetrahedra of both overlays have a volume."""
+    if not len(mesh.hexes):
+        return None
+    points = mesh.hexes[:, :8]
+    if ((points < 0) | (points >= len(mesh.points))).any():
+        return f"a hexahedron names a point outside 0 to {len(mesh.points) - 1}"
+    least = hexahedra.volumes(mesh.points, mesh.hexes).min(axis=1)
+    corners = mesh.points[points]
+    size = np.ptp(corners, axis=1).max(axis=1)
+    bad = np.flatnonzero(~(least > FLAT * size**3))
+    if not len(bad):
+        return None
+    k = int(bad[0])
+    return (
+        f"hexahedron {k} at {_at(mesh, int(points[k, 0]))} with the points {', '.join(map(str, points[k].tolist()))} "
+        "is turned inside out, flat, or so warped that a tetrahedron of its corners is"
+    )
 
 
 def _bad_shapes(mesh: Mesh) -> str | None:
@@ -304,6 +351,11 @@ def _bad_names(mesh: Mesh) -> str | None:
         return f"there are {len(mesh.cracks)} crack edges, but {len(mesh.crack_sets)} numbers of fracture sets"
     rows = mesh.find_edges(edges, mesh.cracks)
     outside = np.flatnonzero((rows < 0) | ~edges.inner[rows])
+    if len(mesh.hexes) and len(rows):
+        of = mesh.hex_of() >= 0
+        bad = np.flatnonzero((rows >= 0) & of[edges.faces[rows] // 4].any(axis=1))
+        if len(bad):
+            return f"a crack through or beside hexahedra at {_at(mesh, int(mesh.cracks[bad[0], 0]))}: tetrahedra crack"
     if len(outside):
         points = mesh.cracks[outside[0]].tolist()
         return (

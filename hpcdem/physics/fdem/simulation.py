@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, overlaps, pressed, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, pressed, user_laws
 from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
@@ -50,6 +50,8 @@ SHORT_LIVED, LONG_LIVED = 60, 400
 """Lists that lasted fewer steps call for the wide buffer, more steps for the narrow one."""
 OLDEST = 2000
 """Storage is made again at this age even if nobody moved, so that borders can follow the load."""
+LOCKS = 0.45
+"""Poisson's ratio above which tetrahedra are said to lock."""
 AUTO = 100
 """Steps after which an automatic time step is estimated again."""
 
@@ -548,6 +550,7 @@ class Blocks(State):
                 self.renew_topology()
             if self.rebuild_state.dt == 0.0:
                 self._warn_of_snap_back()
+                self._warn_of_locking()
             middle, radius = self._middles()
             self._choose_reach(radius, 0.0 if frozen else self.surface_loads.reach(self, middle), frozen)
         middle = self._share_out(middle)
@@ -625,8 +628,27 @@ class Blocks(State):
         corner from it."""
         middle = np.empty((len(self.number), self.dim))
         if self.dim == 3:
-            return middle, space.middles(self.x, middle)
+            radius = space.middles(self.x, middle)
+            return middle, max(radius, self._gather_hexes(middle)) if len(self.the_mesh().hexes) else radius
         return middle, build.middles(self.x, self.the_mesh().cells, self.number, middle)
+
+    def _gather_hexes(self, middle: np.ndarray) -> float:
+        """Parts of a hexahedron get one middle (n, 3), the mean of theirs, so that they go together. Returns the
+        largest distance of their corners from it. Collective."""
+        mesh = self.the_mesh()
+        of = mesh.hex_of()[self.number]
+        mine = np.flatnonzero(of >= 0)
+        parts = [(self.number[mine], middle[mine])]
+        if self.comm.size > 1:
+            whole = np.bincount(of[mine], minlength=len(mesh.hexes))[of[mine]] == hexahedra.PARTS
+            if self.comm.any(not whole.all()):
+                parts = self.comm.allgather((self.number[mine], middle[mine]))
+        number, middles = (np.concatenate([part[k] for part in parts]) for k in range(2))
+        number, first = np.unique(number, return_index=True)
+        means = middles[first].reshape(-1, hexahedra.PARTS, 3).mean(axis=1)
+        middle[mine] = means[np.searchsorted(number[:: hexahedra.PARTS], mesh.hexes[of[mine], 8])]
+        way = self.x[mine].reshape(-1, 4, 4)[:, :, :3] - middle[mine][:, None]
+        return math.sqrt(float((way * way).sum(axis=2).max(initial=0.0)))
 
     def _keys(self, middle: np.ndarray) -> np.ndarray:
         """Cells of elements by their middles."""
@@ -702,6 +724,21 @@ class Blocks(State):
         if self.options.collision:
             halo.add_ghost_field(self.v)
         self.where[self.number] = np.arange(n)
+
+    def _warn_of_locking(self) -> None:
+        """A line in the log about tetrahedra that hardly change their volume."""
+        if self.log is None or self.dim == 2:
+            return
+        bulk, shear = (np.array(self.element_rows.column(name)) for name in ("bulk", "shear"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            nu = (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+        of = np.where(self.alive & (self.the_mesh().hex_of() < 0), nu[self.element_row], 0.0)
+        if (of > LOCKS).any():
+            self.log.warn_once(
+                "locking",
+                f"{int((of > LOCKS).sum())} tetrahedra have a Poisson's ratio up to {of.max():.3g}: as they have one "
+                "strain each they are much too stiff near 0.5 (they lock); hexahedra are not",
+            )
 
     def _warn_of_snap_back(self) -> None:
         """A line in the log about joints so brittle that they are gone within a tenth of their elastic opening."""

@@ -6,10 +6,11 @@ from typing import cast
 
 import numpy as np
 
-from hpcdem.physics.fdem.kernels import tet_stiffness
+from hpcdem.physics.fdem.kernels import tet_stiffness, tets
 from hpcdem.physics.fdem.kernels.joints import YIELDED
 from hpcdem.physics.fdem.linear import Pieces
 from hpcdem.physics.fdem.local_space import LocalSpace
+from hpcdem.physics.fdem.principal import principal
 from hpcdem.physics.fdem.simulation import Blocks
 
 
@@ -51,11 +52,24 @@ def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:
         who = local.who_yields[: local.yielding]
         stress, turn = np.empty((len(who), 3, 3)), np.empty((len(who), 3, 3))
         tet_stiffness.trials(rows[who], sim.x, local.c[who], local.s0[who], small, stress, turn)
-        principal, axes = np.linalg.eigh(stress)
+        values, axes = principal(stress)
         part = found[who]
         tet_stiffness.plastic(
-            rows[who], sim.x, local.c[who], principal, turn @ axes, local.law[who], local.yield_table, small, part
+            rows[who], sim.x, local.c[who], values, _product(turn, axes), local.law[who], local.yield_table, small, part
         )
         found[who] = part
     number = sim.number[rows]
-    return [Pieces(number, sim.node[number], found)]
+    if local.hexes is None:
+        return [Pieces(number, sim.node[number], found)]
+    hexes, alone = local.hexes, np.ones(len(rows), bool)
+    alone[hexes.rows - sim.n_left] = False
+    corner = hexes.place[: hexes.count]
+    nodes = sim.node[sim.number[corner // tets.ROW], corner % tets.ROW // tets.STRIDE]
+    return [
+        Pieces(number[alone], sim.node[number[alone]], found[alone]), Pieces(hexes.number, nodes, hexes.stiffness())
+    ]  # fmt: skip
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Products (n, 3, 3) of matrices, with the same bits wherever they stand."""
+    return a[:, :, 0, None] * b[:, 0, None] + (a[:, :, 1, None] * b[:, 1, None] + a[:, :, 2, None] * b[:, 2, None])

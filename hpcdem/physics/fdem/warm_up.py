@@ -176,6 +176,21 @@ def tangent_in_space(threads: int = 1) -> None:
     equilibrium.tangent(sim, softening=True)
 
 
+def hexahedra(threads: int = 1) -> None:
+    """Those of hexahedra: in motion, at rest, and their tangent."""
+    points = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(Mesh.of_hexes(points, [range(8)]))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    sim.initial_stress(None, yy=1e3)
+    sim.stress_condition([0], normal=-1.0)
+    convergence.advance(sim, 2)
+    diagnostics.values(sim, "strain_energy")
+    sim.option(dynamic=False)
+    convergence.advance(sim, 2)
+    equilibrium.tangent(sim)
+
+
 def in_space(threads: int = 1) -> None:
     """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     sim = _in_space(threads, "mech_iso_elastic", {})

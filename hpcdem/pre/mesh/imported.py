@@ -11,12 +11,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hpcdem.core.errors import CommandError, HpcdemError
+from hpcdem.physics.fdem import hexahedra
 from hpcdem.physics.fdem.connectivity import areas, corner_counts, find_edges
 from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.physics.fdem.tetrahedra import volumes
 from hpcdem.pre.mesh import optional
 
 CORNERS = {"triangle": 3, "quad": 4}
+SOLIDS = {"tetra": 4, "hexahedron": 8}
 SURFACES = frozenset("triangle6 triangle7 quad8 quad9 triangle10 quad16 polygon".split())
 """Plane elements that cannot be taken."""
 SET = "physical"
@@ -26,7 +28,8 @@ FLATNESS = 1e-9
 
 
 def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: int = 2) -> Mesh:
-    """Read a mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra.
+    """Read a mesh of triangles and quads in the x-y plane; dim 3: of tetrahedra and
+    hexahedra.
 
     Physical groups (gmsh) and element sets (Abaqus) become groups of the set SET; one that overlaps an earlier one gets
     a set of its own, of the same name. Physical lines become layers. Elements that run clockwise are turned over, and
@@ -69,48 +72,54 @@ def import_mesh(path: str | Path, merge: float = 0.0, scale: float = 1.0, dim: i
 
 
 def _in_space(path: Path, data: Any, merge: float, scale: float) -> Mesh:
-    """Tetrahedra, with physical volumes as groups and physical surfaces as layers. Those that are turned inside out are
-    turned back."""
+    """Hexahedra and tetrahedra, with physical volumes as groups and physical surfaces as layers. Those that are turned
+    inside out are turned back. Hexahedra come first."""
     points = np.asarray(data.points, np.float64) * scale
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
         raise HpcdemError(f"{path}: finite points with three coordinates were expected")
     names = {(int(v[1]), int(v[0])): str(k) for k, v in getattr(data, "field_data", {}).items() if len(v) == 2}
     physical = data.cell_data.get("gmsh:physical")
-    cells, seen = [np.empty((0, 4), np.int64)], 0
+    solids = {kind: [np.empty((0, n), np.int64)] for kind, n in SOLIDS.items()}
     groups: dict[str, list] = {}
     layers: dict[str, list] = {}
     for k, block in enumerate(data.cells):
         rows = np.asarray(block.data, np.int64)
         tags = np.zeros(len(rows), np.int64) if physical is None else np.asarray(physical[k], np.int64)
-        if block.type not in ("tetra", "triangle", "line", "vertex"):
+        if block.type not in (*SOLIDS, "triangle", "quad", "line", "vertex"):
             raise HpcdemError(
                 f"{path}: block {k + 1} holds {len(rows)} elements of type '{block.type}'; in three dimensions only "
-                "tetrahedra of four points can be used"
+                "tetrahedra of four points and hexahedra of eight can be used"
             )
         if ((rows < 0) | (rows >= len(points))).any():
             raise HpcdemError(f"{path}: block {k + 1} names a point that is not in the file")
         for tag in np.unique(tags[tags != 0]).tolist():
-            if block.type == "tetra":
-                groups.setdefault(names.get((3, tag), str(tag)), []).append(seen + np.flatnonzero(tags == tag))
-            elif block.type == "triangle":
+            if block.type in SOLIDS:
+                here = sum(map(len, solids[block.type])) + np.flatnonzero(tags == tag)
+                groups.setdefault(names.get((3, tag), str(tag)), []).append((block.type, here))
+            elif block.type in ("triangle", "quad"):
                 layers.setdefault(names.get((2, tag), str(tag)), []).append(rows[tags == tag])
-        if block.type == "tetra":
-            cells.append(rows)
-            seen += len(rows)
-    if not seen:
-        raise HpcdemError(f"{path}: there are no tetrahedra")
-    found = np.concatenate(cells)
+        if block.type in SOLIDS:
+            solids[block.type].append(rows)
     number = _merged(points, merge) if merge > 0.0 else np.arange(len(points))
-    found = number[found]
-    turned = volumes(points, found) < 0.0
-    found[turned] = found[turned][:, [0, 2, 1, 3]]
-    used = np.unique(found)
+    tets, hexes = (number[np.concatenate(solids[kind])] for kind in SOLIDS)
+    if not len(tets) + len(hexes):
+        raise HpcdemError(f"{path}: there are no tetrahedra and no hexahedra")
+    turned = volumes(points, tets) < 0.0
+    tets[turned] = tets[turned][:, [0, 2, 1, 3]]
+    turned = hexahedra.volumes(points, hexes).sum(axis=1) < 0.0
+    hexes[turned] = hexes[turned][:, [4, 5, 6, 7, 0, 1, 2, 3]]
+    used = np.unique(np.concatenate([tets.reshape(-1), hexes.reshape(-1)]))
     place = np.full(len(points), -1, np.int64)
     place[used] = np.arange(len(used))
-    mesh = Mesh.of(
-        points[used], place[found], _in_sets({n: np.concatenate(r) for n, r in groups.items()}, seen),
-        {n: place[number[np.concatenate(p)]] for n, p in layers.items()},
-    )  # fmt: skip
+    sides = {n: hexahedra.triangles([place[number[of]] for of in p]) for n, p in layers.items()}
+    made, n = Mesh.of_hexes(points[used], place[hexes], sides, place[tets]), len(hexes)
+
+    def elements(kind: str, at: np.ndarray) -> np.ndarray:
+        parts = hexahedra.PARTS
+        return parts * n + at if kind == "tetra" else (parts * at[:, None] + np.arange(parts)).reshape(-1)
+
+    of_groups = {name: np.concatenate([elements(*part) for part in parts]) for name, parts in groups.items()}
+    mesh = Mesh.of(made.points, made.cells, _in_sets(of_groups, len(made.cells)), made.layers, hexes=made.hexes)
     check(mesh, f"{path} (elements and points counted from 0)")
     return mesh
 

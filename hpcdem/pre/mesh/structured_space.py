@@ -60,6 +60,20 @@ def box(lines: Sequence[np.ndarray], split: int = 6, group: tuple[str, str] | No
     return Mesh.of(points, cells, groups, layers)
 
 
+def hexes(lines: Sequence[np.ndarray], group: tuple[str, str] | None = None) -> Mesh:
+    """Hexahedra between the grid lines in x, y and z, with the layers of `box`."""
+    made = box(lines, 6)
+    n = np.array([len(line) - 1 for line in lines])
+    number = np.arange(len(made.points)).reshape(*(n + 1)[::-1])
+    corner = {(i, j, k): number[k : n[2] + k, j : n[1] + j, i : n[0] + i].ravel() for i, j, k in np.ndindex(2, 2, 2)}
+    ring = ((0, 0), (1, 0), (1, 1), (0, 1))
+    points = np.column_stack([corner[i, j, k] for k in (0, 1) for i, j in ring])
+    found = Mesh.of_hexes(made.points, points)
+    layers = {name: _triangles_on(found.cells, _side(number, axis, end)) for name, axis, end in SIDES}
+    groups = {group[0]: {group[1]: np.arange(len(found.cells))}} if group else {}
+    return Mesh.of(found.points, found.cells, groups, layers, hexes=found.hexes)
+
+
 def _step(at: tuple[int, int, int], axis: int) -> tuple[int, ...]:
     return tuple(1 - c if k == axis else c for k, c in enumerate(at))
 
@@ -93,3 +107,33 @@ def _triangles_on(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
     on = np.isin(cells, points)
     at = np.flatnonzero(on.sum(axis=1) == 3)
     return cells[at][on[at]].reshape(-1, 3)
+
+
+def layers(points: np.ndarray, triangles: np.ndarray, heights: np.ndarray) -> Mesh:
+    """Tetrahedra between copies of triangles (m, 3) with these points (n, 2) at heights that ascend: each prism is cut
+    into three by the numbers of its points, so that neighbours fit."""
+    n = len(points)
+    every = np.concatenate([np.column_stack([points, np.full(n, z)]) for z in heights])
+    low = np.sort(triangles, axis=1)
+    parts = []
+    for k in range(len(heights) - 1):
+        (a, b, c), (d, e, f) = (low + k * n).T, (low + (k + 1) * n).T
+        parts += [[a, b, c, f], [a, b, e, f], [a, d, e, f]]
+    return Mesh.of(every, _upright(every, parts))
+
+
+def sector(radii: np.ndarray, parts: int, turn: float, heights: np.ndarray) -> Mesh:
+    """Layers of a sector from the x axis on by `turn` [rad] in so many parts, with circles of these radii, the first 0:
+    diagonals both ways in turn."""
+    m = parts + 1
+    angle = np.linspace(0.0, turn, m)
+    rings = np.stack([np.outer(radii[1:], np.cos(angle)), np.outer(radii[1:], np.sin(angle))], axis=-1)
+    points = np.concatenate([np.zeros((1, 2)), rings.reshape(-1, 2)])
+    j = np.arange(parts)
+    first = np.column_stack([np.zeros(parts, np.int64), 1 + j, 2 + j])
+    i, j = (k.reshape(-1) for k in np.meshgrid(np.arange(len(radii) - 2), j, indexing="ij"))
+    a, b = 1 + i * m + j, 1 + (i + 1) * m + j
+    even = ((i + j) % 2 == 0)[:, None]
+    one = np.where(even, np.column_stack([a, b, b + 1]), np.column_stack([a, b, a + 1]))
+    two = np.where(even, np.column_stack([a, b + 1, a + 1]), np.column_stack([b, b + 1, a + 1]))
+    return layers(points, np.concatenate([first, one, two]), heights)

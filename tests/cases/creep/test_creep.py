@@ -21,6 +21,7 @@ def test_against_the_closed_form(launch, tmp_path):
     assert 20 < done.steps < 200 and done.curve[-1][0] == 1e5
 
 
+@pytest.mark.slow  # quick: the one above, tests/blocks/test_creep.py
 def test_a_finer_change_is_more_exact_and_the_last_rate_is_known(launch, tmp_path):
     errors = []
     for change in (0.1, 0.02):

@@ -26,6 +26,8 @@ NAMES = (
     "fault",
     "sedimentation_erosion",
 )
+QUICK = ("basement_high", "extension_ductile", "sedimentation_erosion")
+"""Of which a shortened run is made every time: with these all commands of the examples are carried out."""
 
 
 # --- shortened -------------------------------------------------------------------------------------------------
@@ -37,7 +39,9 @@ def shortened(text: str) -> str:
     return re.sub(r"\b(xmove|print|save) (-?\d+\.\d+)", lambda m: f"{m[1]} {float(m[2]) / 100}", text)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in NAMES]
+)
 def test_shortened_example_runs_to_its_figure(launch: Launcher, tmp_path: Path, name: str) -> None:
     """Every command of the example is carried out, and the figure shows the last state."""
     text = (ROOT / "examples" / f"{name}.py").read_text()

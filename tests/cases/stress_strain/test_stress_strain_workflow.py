@@ -15,7 +15,7 @@ from tests.cases.stress_strain.chapter6 import PICKED, SIGMA1, Chapter, bash, ch
 from tests.conftest import ROOT, Launcher, mpi_command
 from tests.short_push import assert_same_files
 
-pytestmark = pytest.mark.figures
+pytestmark = [pytest.mark.figures, pytest.mark.slow]  # quick: unit/test_strain_stress_folder.py, test_zdem2jpg.py
 FIELDS = ("volumetric", "distortional", "mean", "shear")
 
 

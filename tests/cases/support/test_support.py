@@ -17,7 +17,7 @@ COARSE = {"size": 0.6, "coarse": 5.0, "reach": 7.0, "stages": 2000}
 
 
 def test_bolts_hold(launch, tmp_path):
-    """Each of these alone changes what the tunnel does, in the way that it should."""
+    """With them less of the rock yields, and it comes in less."""
     usual = results(launch, tmp_path / "usual", Support(**COARSE))
     assert 0.0 < usual.at_support < usual.convergence and usual.plastic_radius > 3.5
     assert 0.0 < usual.axial_force <= 250e3 and usual.yielded > 0 and usual.broken == 0
@@ -25,6 +25,13 @@ def test_bolts_hold(launch, tmp_path):
     assert none.axial_force == none.yielded == none.slipped == 0
     assert none.at_support == usual.at_support and none.convergence > 1.05 * usual.convergence
     assert none.plastic_radius > usual.plastic_radius
+
+
+@pytest.mark.slow  # bolts by themselves: tests/bolts
+def test_every_option_of_the_bolts(launch, tmp_path):
+    """Each of these alone changes what the tunnel does, in the way that it should."""
+    usual = results(launch, tmp_path / "usual", Support(**COARSE))
+    none = results(launch, tmp_path / "none", Support(bolts=0, **COARSE))
     late = results(launch, tmp_path / "late", Support(release=0.95, **COARSE))
     assert late.at_support > 1.5 * usual.at_support and usual.convergence < late.convergence <= none.convergence
     weak = results(launch, tmp_path / "weak", Support(bond_cohesion=2e5, **COARSE))

@@ -25,6 +25,7 @@ def test_water_cools_a_fracture(launch, tmp_path):
     assert (tmp_path / "data" / "lauwerier.png").stat().st_size > 5000
 
 
+@pytest.mark.slow  # quick: the one above, tests/heat
 def test_conduction_along_the_fracture_is_not_in_the_closed_form(launch, tmp_path):
     """Rock that conducts in all directions alike lies farther from it, the front is smeared ahead; still within 2 %."""
     coarse = {"size": 1.0, "coarse": 8.0, "steps": 60}
@@ -34,6 +35,7 @@ def test_conduction_along_the_fracture_is_not_in_the_closed_form(launch, tmp_pat
     assert across.error < 0.02 and alike.error < 0.03 and alike.error > 1.2 * across.error
 
 
+@pytest.mark.slow  # quick: the first one, tests/heat
 def test_cold_comes_through_between_two_wells(launch, tmp_path):
     """Coarse; half the rate takes twice as long."""
     coarse = {"size": 8.0, "steps": 80}

@@ -39,6 +39,7 @@ def test_levels_in_a_dam(launch, tmp_path):
     assert (tmp_path / "data" / "dam-seepage.png").stat().st_size > 5000
 
 
+@pytest.mark.slow  # quick: levels in a dam, tests/flow
 def test_uplift_with_curtain_and_drain(launch, tmp_path):
     """Without, the pressure is antisymmetric about the middle: as much as on the line. A curtain takes a third of it
     away, a drain more."""

@@ -153,15 +153,16 @@ def keys(points, side):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def tractions(corner, row, table, x, applied):
+def tractions(corner, row, share, table, x, applied):
     """Add a third of A sigma n of each loaded face to its corners: corner (m, 3), where they begin in x and `applied`
-    (both flat), counter-clockwise from outside; row (m,) of the table (rows, 10) [Pa]."""
+    (both flat), counter-clockwise from outside; row (m,) of the table (rows, 10) [Pa]; share (m,): of it."""
     x, applied = x.reshape(x.size), applied.reshape(applied.size)
     for m in range(len(corner)):
         a, b, d = corner[m, 0], corner[m, 1], corner[m, 2]
         ux, uy, uz = x[b] - x[a], x[b + 1] - x[a + 1], x[b + 2] - x[a + 2]
         wx, wy, wz = x[d] - x[a], x[d + 1] - x[a + 1], x[d + 2] - x[a + 2]
         nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx  # 2 A n
+        nx, ny, nz = share[m] * nx, share[m] * ny, share[m] * nz
         s = table[row[m]]
         fx = (s[XX] * nx + s[XY] * ny + s[XZ] * nz + s[NORMAL] * nx) / 6.0
         fy = (s[XY] * nx + s[YY] * ny + s[YZ] * nz + s[NORMAL] * ny) / 6.0
@@ -333,6 +334,15 @@ def _omega2(c):
             column += c[3 * j + k]
         squares += column**2
     return 4.0 / rho * (c[LAMBDA] + c[TWO_MU]) * squares
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def omegas2(c):
+    """Of tetrahedra (n,)."""
+    out = np.empty(len(c))
+    for i in range(len(c)):
+        out[i] = _omega2(c[i])
+    return out
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

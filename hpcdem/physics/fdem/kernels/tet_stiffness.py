@@ -66,7 +66,7 @@ def gradients(x, c, small, g):
 
 
 @njit(cache=True, error_model="numpy")
-def _trial(x, c, s0, small, lanes, stress):
+def trial(x, c, s0, small, lanes, stress):
     """Stress (6,) [Pa] of an elastic tetrahedron in the frame that turns with it, and that frame."""
     for k in range(ROW):
         lanes[tets.X + U(k) * _PER] = x[k]
@@ -87,7 +87,7 @@ def elastic(rows, x, c, s0, small, out):
     for i in range(len(rows)):
         xyz, k, lame, mu = x[rows[i]], out[i], c[i, LAMBDA], 0.5 * c[i, TWO_MU]
         volume = gradients(xyz, c[i], small, g)
-        r = _trial(xyz, c[i], s0[i], small, lanes, stress)
+        r = trial(xyz, c[i], s0[i], small, lanes, stress)
         xx, yy, xy, zz, xz, yz = tets.turned(stress[0], stress[1], stress[2], stress[3], stress[4], stress[5], r)
         for a in range(4):
             tx = xx * g[a, 0] + xy * g[a, 1] + xz * g[a, 2]
@@ -108,7 +108,7 @@ def trials(rows, x, c, s0, small, stress, turn):
     """Trial stresses (n, 3, 3) [Pa] of tetrahedra in the frames that turn with them, and these frames (n, 3, 3)."""
     lanes, s = np.zeros(tets.LANES * CAPACITY), np.empty(6)
     for i in range(len(rows)):
-        r = _trial(x[rows[i]], c[i], s0[i], small, lanes, s)
+        r = trial(x[rows[i]], c[i], s0[i], small, lanes, s)
         for k in range(9):
             turn[i, k // 3, k % 3] = r[k]
         stress[i, 0, 0], stress[i, 1, 1], stress[i, 2, 2] = s[0], s[1], s[3]

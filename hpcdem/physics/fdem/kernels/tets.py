@@ -111,7 +111,7 @@ def gradient(x, at, c11, c12, c13, c21, c22, c23, c31, c32, c33):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _in_frame(r, g):
+def in_frame(r, g):
     """Symmetric part of R^T G: 11, 22, 12, 33, 13, 23."""
     return (
         _product(r[0], r[3], r[6], g[0], g[3], g[6]), _product(r[1], r[4], r[7], g[1], g[4], g[7]),
@@ -123,7 +123,7 @@ def _in_frame(r, g):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _frame(f, small):
+def frame(f, small):
     """The frame in which strain is measured, by rows."""
     r = rotation(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8])
     return (
@@ -138,8 +138,8 @@ def strain(x, at, c11, c12, c13, c21, c22, c23, c31, c32, c33, small):
     """Strain U - 1 (11, 22, 12, 33, 13, 23) of a tetrahedron in the frame that turns with it, and that frame; arguments
     as for `gradient`."""
     f = gradient(x, at, c11, c12, c13, c21, c22, c23, c31, c32, c33)
-    r = _frame(f, small)
-    e11, e22, e12, e33, e13, e23 = _in_frame(r, f)
+    r = frame(f, small)
+    e11, e22, e12, e33, e13, e23 = in_frame(r, f)
     return e11 - 1.0, e22 - 1.0, e12, e33 - 1.0, e13, e23, r
 
 
@@ -150,7 +150,7 @@ def per_volume(c11, c12, c13, c21, c22, c23, c31, c32, c33):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _stress(n, small, beta, lanes):
+def stress_forces(n, small, beta, lanes):
     """Corner forces of stress, viscous parts included: f_l = -V sigma grad N_l, with the present shape functions, or
     those of the mesh if strains are small."""
     for e in range(U(n)):
@@ -158,10 +158,10 @@ def _stress(n, small, beta, lanes):
         c21, c22, c23 = lanes[C21 + e], lanes[C22 + e], lanes[C23 + e]
         c31, c32, c33 = lanes[C31 + e], lanes[C32 + e], lanes[C33 + e]
         f = gradient(lanes, X + e, c11, c12, c13, c21, c22, c23, c31, c32, c33)
-        r = _frame(f, small)
-        e11, e22, e12, e33, e13, e23 = _in_frame(r, f)
+        r = frame(f, small)
+        e11, e22, e12, e33, e13, e23 = in_frame(r, f)
         e11, e22, e33 = e11 - 1.0, e22 - 1.0, e33 - 1.0
-        d11, d22, d12, d33, d13, d23 = _in_frame(r, gradient(lanes, V + e, c11, c12, c13, c21, c22, c23, c31, c32, c33))
+        d11, d22, d12, d33, d13, d23 = in_frame(r, gradient(lanes, V + e, c11, c12, c13, c21, c22, c23, c31, c32, c33))
         m, eta = lanes[MU2 + e], lanes[VISC + e] + beta * lanes[MU2 + e]
         p = lanes[LAM + e] * (e11 + (e22 + e33)) + beta * lanes[LAM + e] * (d11 + (d22 + d33))
         s11 = lanes[S11 + e] + ((p + m * e11) + eta * d11)
@@ -325,7 +325,7 @@ def _forces(
         first = b * BLOCK
         n = min(BLOCK, count - first)
         _gather(n, first, rows, x, v, c, s0, stressed, lanes)
-        _stress(n, small, beta, lanes)
+        stress_forces(n, small, beta, lanes)
         if jointed:
             joints_space.add_joints(
                 b, n, first, rows, x, sizes, link, law, kind, state, history, head, follow, table, beyond, flat_table,
