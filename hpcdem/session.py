@@ -280,6 +280,12 @@ def _heat() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _heat_space() -> WarmUp:
+    from hpcdem.physics.heat import kernels_space, warm_up
+
+    return warm_up.in_space, (kernels_space,)
+
+
 def _yielding() -> WarmUp:
     from hpcdem.physics.fdem import warm_up
     from hpcdem.physics.fdem.kernels import plastic_quads, plasticity
@@ -362,6 +368,7 @@ KINDS = {
     "flow-space": Kernels(_flow_space, after=("space", "flow")),
     "proppant": Kernels(_proppant, after=("flow",)),
     "heat": Kernels(_heat),
+    "heat-space": Kernels(_heat_space, after=("space", "heat")),
     "yielding": Kernels(_yielding),
     "creep": Kernels(_creep),
     "tangent": Kernels(_tangent),
@@ -379,7 +386,7 @@ OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = (
     "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-    "yielding-space", "creep-space", "tangent-space", "hexes", "pictures",
+    "heat-space", "yielding-space", "creep-space", "tangent-space", "hexes", "pictures",
 )  # fmt: skip
 """Those that come when a model of blocks asks for them."""
 

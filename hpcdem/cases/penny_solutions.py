@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.cases.kgd_solutions import Fracture, toughness
-from hpcdem.pre.mesh import structured_space
 
 A1, B, OMEGA = 0.3581, 0.09269, 2.479
 """Of the pressure in the first-order solution without toughness (Savitski & Detournay, 81)."""
@@ -50,6 +49,8 @@ def write_sector(file: str, size: float, reach: float, far: float, turn: float, 
     """A mesh file of a sector of `turn` degrees around the z axis, `far` [m] wide, and as high above and below z = 0:
     circles and layers `size` apart up to `reach`, farther away each `grow` times as far as the one before."""
     import meshio
+
+    from hpcdem.pre.mesh import structured_space  # with kernels, which must not be loaded before those of the run
 
     fine = np.arange(round(reach / size) + 1) * size
     radii = np.concatenate([fine, fine[-1] + _graded(size, far - fine[-1], grow)])

@@ -307,6 +307,53 @@ def test_what_a_law_cannot_do_is_refused():
             changes.element_model(sim, [3], law(sim, "tresca"), {**ROCK, **given})
 
 
+SAND = """@element_law([Property('gain', '1', '')], [StateVariable('most', '1', 'largest volume strain', -1.0)])
+def law(e11, e22, e12, evol, most, bulk, shear, gain):
+    lame, two_mu = gain * (bulk - 2.0 / 3.0 * shear), gain * (2.0 * shear)
+    p = lame * evol
+    return p + two_mu * e11, p + two_mu * e22, two_mu * e12, p, max(most, evol)
+"""
+
+
+def test_groups_with_laws_of_two_files(tmp_path, monkeypatch):
+    """Each group has the law, properties and states of its file, in triangles and quads, across a checkpoint; one with
+    the arithmetic of the built-in one gives its bits. What is missing or wrong is named by its file."""
+    ends = []
+    for own in (False, True):
+        sim = model(shaken(rectangle(8, 5, 0.6, 0.4, kind="mixed"), 0.2))
+        half = np.flatnonzero(sim.mesh.centroids()[:, 1] > 0.2)
+        changes.element_model(sim, None, law(sim, "tresca"), {**ROCK, "limit": 2e5})
+        if own:
+            sand = user_laws.load(sim, written(tmp_path, SAND).rename(tmp_path / "sand.py"), "sand.py:law").name
+            changes.element_model(sim, half, sand, {**ROCK, "gain": 1.0})
+        else:
+            changes.element_model(sim, half, "mech_iso_elastic", ROCK)
+        sim.option(collision=False)
+        changes.set_velocity(sim, np.flatnonzero(sim.mesh.points[:, 0] < 0.3), 1.0, 0.5)
+        convergence.advance(sim, 60)
+        ends.append([sim.x.copy(), sim.v.copy()])
+    assert all(np.array_equal(*both) for both in zip(*ends))
+    slip, most = (diagnostics.values(sim, name) for name in ("law_slip", "law_most"))
+    rest = np.setdiff1d(np.arange(len(slip)), half)
+    assert np.isnan(slip[half]).all() and np.isnan(most[rest]).all()
+    assert slip[rest].max() > 0.0 and (most[half] > -1.0).all() and np.ptp(most[half]) > 0.0
+    sim.element_property(half, {"gain": 0.5})  # of one law alone
+    saved_state.save(sim, tmp_path / "a.sav")
+    again = Blocks()
+    saved_state.restore(again, tmp_path / "a.sav")
+    for one in (sim, again):
+        convergence.advance(one, 40)
+    for name in ("law_slip", "law_most", "position_x", *STRESSES):
+        found = [diagnostics.values(one, name) for one in (sim, again)]
+        assert np.array_equal(*found, equal_nan=True), name
+    monkeypatch.delitem(MODELS, sand)
+    with pytest.raises(CommandError, match=r"the law sand\.py:law, which this script has not named"):
+        saved_state.restore(Blocks(), tmp_path / "a.sav")
+    (tmp_path / "sand.py").write_text(HEAD + SAND.replace("two_mu * e12, p,", "two_nu * e12, p,"))
+    with pytest.raises(CommandError, match=r"sand\.py:8: numba: NameError: name 'two_nu'"):
+        user_laws.load(sim, tmp_path / "sand.py", "sand.py:law")
+
+
 def test_a_checkpoint_needs_the_law_with_the_same_text(tmp_path, monkeypatch):
     sim = clay()
     deform(sim, [[1.0, 0.01], [0.0, 1.0]])

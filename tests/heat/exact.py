@@ -42,3 +42,26 @@ def cylinder(r: np.ndarray, t: float, radius: float, a: float) -> np.ndarray:
     for b in special.jn_zeros(0, 200):
         out -= 2.0 * special.j0(b * r / radius) / (b * special.j1(b)) * math.exp(-b * b * a * t / radius**2)
     return out
+
+
+def sphere(r: np.ndarray, t: float, radius: float, a: float) -> np.ndarray:
+    """Share of the way of a full sphere to the temperature that its surface takes at t = 0. Carslaw & Jaeger 1959, 9.3:
+    1 + 2 R / (pi r) sum (-1)^n / n sin(n pi r / R) exp(-n^2 pi^2 a t / R^2)."""
+    x = math.pi * np.maximum(r / radius, 1e-9)
+    out = np.ones_like(x)
+    for n in range(1, 200):
+        out += 2.0 * (-1.0) ** n / (n * x) * np.sin(n * x) * math.exp(-((n * math.pi) ** 2) * a * t / radius**2)
+    return out
+
+
+def hollow_sphere(r: np.ndarray, inner: float, outer: float) -> np.ndarray:
+    """Steady temperature, 1 at the inner and 0 at the outer surface: a (b / r - 1) / (b - a)."""
+    return inner * (outer / r - 1.0) / (outer - inner)
+
+
+def hollow_sphere_stress(r: np.ndarray, inner: float, outer: float) -> tuple[np.ndarray, np.ndarray]:
+    """Its radial and tangential stress over alpha E T / (1 - nu), free surfaces. Timoshenko & Goodier 1970, 152."""
+    a, b = inner, outer
+    part = a * b / (b**3 - a**3)
+    middle, cube = (a * a + a * b + b * b) / r, a * a * b * b / r**3
+    return part * (a + b - middle + cube), part * (a + b - 0.5 * middle - 0.5 * cube)

@@ -11,7 +11,8 @@ from hpcdem.physics.fdem import changes, creep, diagnostics
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over, Value
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Over, Value
+from hpcdem.physics.heat.model import Heat
 from tests.parallel.model import Found, Model
 from tests.space.support import ROCK, box, hexes
 
@@ -218,6 +219,57 @@ def dig_beam(sim: Blocks) -> None:
         changes.reset_joint_state(sim, holds[:20])
 
 
+ROCK_OF_HEAT = {
+    "conductivity": 2.5, "capacity": 1000.0, "conductivity_across": 1.0, "conductivity_angle": 20.0,
+    "conductivity_dip": 40.0, "expansion_coeficient": 1e-4, "transfer_coeficient": 400.0,
+}  # fmt: skip
+
+
+def glowing(sim: Blocks) -> None:
+    """The same beam and blocks, warmed from places in the beam: they expand, get softer and weaker, break, touch and
+    pass heat on; the air is warm, here and there comes a flux."""
+    shattering(sim)
+    sim.table("weaker", [(20.0, 8e5), (320.0, 5e5)])
+    sim.table("softer", [(20.0, 2e8), (320.0, 1.6e8)])
+    sim.element_property(None, {"young": Over("softer", TEMPERATURE)})
+    joints = np.flatnonzero((sim.joint_row > 0) & sim.joint_exists())
+    sim.joint_property(joints[joints % 3 == 0], {"tensile_strength": Over("weaker", TEMPERATURE)})
+    heat = Heat.of(sim)
+    heat.assign(None, ROCK_OF_HEAT)
+    heat.initial(None, 20.0)
+    sim.table("oven", [(0.0, 20.0), (3e3, 320.0), (1e4, 120.0)])
+    heat.prescribe(
+        np.flatnonzero((np.abs(sim.mesh.points - (1.6, 0.2, 0.1)) < (0.5, 1.0, 1.0)).all(axis=1))[::3], "oven"
+    )
+    sim.table("room", [(0.0, 20.0), (1e4, 60.0)])
+    heat.expose(None, environment="room", transfer=20.0)
+    heat.expose(np.flatnonzero(sim.face_exists())[::7], flux=400.0)
+    sim.heat_clock(dt=10.0)
+    sim.flow_clock(every=2)
+
+
+def glow_on(sim: Blocks) -> None:
+    """What happens to it."""
+    dig_beam(sim)
+    if sim.clock.step == 620:
+        Heat.of(sim).adjust(np.flatnonzero(sim.alive)[:20], {"capacity": 700.0})
+        Heat.of(sim).initial(np.flatnonzero(sim.node_exists())[5:9], 90.0)
+        sim.heat_clock(steps=2)
+
+
+def warm_soil(sim: Blocks) -> None:
+    """Soil that yields and swings, which heat weakens."""
+    yielding(sim)
+    x = sim.mesh.centroids()[:, 0]
+    sim.table("weaker", [(0.0, 1e5), (300.0, 2e4)])
+    sim.element_property(np.flatnonzero(x < 0.6), {"cohesion": Over("weaker", TEMPERATURE)})
+    heat = Heat.of(sim)
+    heat.assign(None, {**ROCK_OF_HEAT, "transfer_coeficient": 0.0, "expansion_coeficient": 1e-5})
+    x = sim.mesh.points[:, 0]
+    heat.prescribe(np.flatnonzero(x < x.min() + 0.2), 200.0)
+    sim.heat_clock(dt=50.0)
+
+
 VECTORS = "position", "velocity", "displacement", "reaction", "unbalanced"
 NAMES = (
     *(f"{name}_{axis}" for name in VECTORS for axis in "xyz"),
@@ -291,6 +343,33 @@ def it_shatters(found: Found) -> None:
     assert len(found["contact_face"]) > 20 and (found["event_mode"] > 1.9).any() and (found["event_mode"] < 1.1).any()
 
 
+def hot(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """The same, with heat."""
+    found, heat = in_pieces(sim, notes), Heat.of(sim)
+    found |= {name: diagnostics.values(sim, name) for name in ("temperature", "mean_temperature")}
+    found |= {f"heat_{name}": np.array(value) for name, value in heat.account().items()}
+    return found | {"heat_clock": np.array([heat.time, heat.dt, heat.sub_steps, heat.cycles])}
+
+
+def it_glows(found: Found) -> None:
+    it_shatters(found)
+    t = found["temperature"]
+    assert np.nanmax(t) > 100.0 and (t > 21.0).sum() > 60 and found["heat_relative"] < 1e-12
+    assert found["heat_removed"] > 0.0 and found["heat_given"] > 0.0
+
+
+def warm_and_flowing(sim: Blocks, notes: dict[str, Any]) -> Found:
+    """Of soil, with heat."""
+    heat = Heat.of(sim)
+    found = flow(sim, notes) | {"temperature": diagnostics.values(sim, "temperature")}
+    return found | {f"heat_{name}": np.array(value) for name, value in heat.account().items()}
+
+
+def it_is_warm(found: Found) -> None:
+    it_flows(found)
+    assert np.nanmax(found["temperature"]) > 199.0 and found["heat_relative"] < 1e-12
+
+
 def it_crowds(found: Found) -> None:
     assert len(found["contact_face"]) > 50
     assert np.nanmax(found["displacement_x"]) > 0.3
@@ -316,6 +395,10 @@ MODELS = {
     "salt bar": Model(creeping, crept, it_creeps, creep_more, steps=1000, middle=401),
     "crowding": Model(crowding, touching, it_crowds, dig_below, steps=1500, middle=701, come=10),
     "shattering": Model(shattering, in_pieces, it_shatters, dig_beam, steps=900, middle=501, come=10),
+    "glowing": Model(glowing, hot, it_glows, glow_on, steps=900, middle=501, come=10),
+    "soil that gets warm": Model(
+        warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
+    ),
     "hexahedra": Model(blocks_of_hexes, touching, it_hits, dig_hexes, steps=900, middle=401, come=10),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

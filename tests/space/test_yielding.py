@@ -17,7 +17,7 @@ from hpcdem.physics.fdem.kernels import plastic_tets
 from hpcdem.physics.fdem.kernels.plasticity import SHEAR_NOW, SHEAR_PAST, TENSION_NOW
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
-from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, TEMPERATURE, Over
+from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.test_plasticity import FLOWS
 from tests.space.support import box, faces_on, nodes_on
 
@@ -398,9 +398,5 @@ def test_what_is_remembered_and_forgotten() -> None:
 
 def test_refusals() -> None:
     sim = soil()
-    sim.table("warm", [(0.0, 1e6), (100.0, 1e5)])
-    for name in ("cohesion", "young"):
-        with pytest.raises(CommandError, match="tables over temperature: this version has it in two dimensions only"):
-            sim.element_property(None, {name: Over("warm", TEMPERATURE)})
     with pytest.raises(CommandError, match="dilation must not be above friction"):
         sim.element_property(None, {"dilation": 40.0})

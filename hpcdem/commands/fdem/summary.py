@@ -116,7 +116,8 @@ def close(project: Project, figure: bool = True) -> None:
     heat = Heat.there(blocks)
     if heat is not None:
         found = heat.account()
-        log.table("heat", ("heat", "J/m"), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
+        unit = "J" if blocks.dim == 3 else "J/m"
+        log.table("heat", ("heat", unit), [(HEAT_WORDS[k], f"{found[k]:.6g}") for k in HEAT_WORDS])
     _tell_both(project)
     if figure:
         path = last_figure(project)

@@ -13,7 +13,7 @@ from hpcdem.lang.pcdc.lexer import Escape, Token, Word
 from hpcdem.lang.pcdc.statement import Statement, resolved, shown
 from hpcdem.lang.pcdc.table import PROPERTY, RANGE, Command, Level, Model, Option, Table, distinct
 from hpcdem.lang.zdem.nearest import hint
-from hpcdem.physics.fdem.tables import AXES, TEMPERATURE, Drawn, Over
+from hpcdem.physics.fdem.tables import AXES, Drawn, Over
 
 
 def parse(
@@ -286,8 +286,6 @@ class _Line:
             word = self.next(over)
             raise ValueError(f"read {word}, expected {over} after the name of the table")
         axis = self.one(kinds.choice(*kind.axes), _OVER)
-        if axis == AXES[TEMPERATURE]:
-            self.refuse_elsewhere("over temperature", (2,))
         return _later(lambda name, axis: Over(name, AXES.index(axis)), name, axis)
 
     def _value_follows(self, ahead: int = 0) -> bool:

@@ -265,7 +265,7 @@ ISO_HEAT = Model(
     "Temperatures are those of any scale of degrees.",
     declared(HEAT_PROPERTIES, "con{ductivity}", "cap{acity}", "t{ransfer}-c{oeficient}", "e{xpansion}-c{oeficient}",
              "conductivity-a{cross}", "conductivity-ang{le}", also=_COEFFICIENTS),
-    of=HEAT_PROPERTIES,
+    of=HEAT_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 
 # ---- boundary conditions of nodes and faces (tables 4 to 7, 11, 14 to 16, 18) --------------------------------------
@@ -326,7 +326,7 @@ FREE_FIELD = Model(
 )  # fmt: skip
 TEMPERATURE = Model(
     "therm{al}-s{olid}-b{oundary}-c{ondition}", "14", "Temperature of nodes; times of tables are those of heat.",
-    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),),
+    (Option("t{emperature}", (TABLED,), "temperature", "K", required=True),), dims=BOTH,
 )  # fmt: skip
 FLUID_TEMPERATURE = Model(
     "therm{al}-f{low}-b{oundary}-c{ondition}", "15", "Temperature of the fluid at flow nodes, as of what is injected "
@@ -349,7 +349,7 @@ CONST_HEAT = Model(
     (Option("h{eat}-f{lux}", (TABLED,), "heat that comes in", "W/m2"),
      Option("t{ransfer}-c{oeficient}", (NOT_NEGATIVE,), "heat transfer to the environment", "W/(m2 K)",
             "that of the elements", also=_COEFFICIENTS["transfer-coeficient"]),
-     Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True,
+     Option("e{nvironment}-t{emperature}", (TABLED,), "temperature of the environment", "K")), any_of=True, dims=BOTH,
 )  # fmt: skip
 
 # ---- contact and joints (tables 8, 9, 10, 13, 17) ------------------------------------------------------------------
@@ -629,7 +629,7 @@ _MODEL = (
                 Option("hyd{raulic}", (BOOL,), "flow of fluid in joints that have a hydraulic model", default="on"),
                 Option("one-way", (BOOL,), "fluid follows the blocks, but does not push on them", default="off"),
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
-                       "the stress that they bring, stay as they are", default="on", dims=PLANE),
+                       "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
                        "where they are", default="on", dims=PLANE)),
             needs_option=True, manual=True, dims=BOTH),
@@ -650,7 +650,7 @@ _MODEL = (
                        "s", "0"),
                 Option("therm{al}", (NOT_NEGATIVE,), "sub-step of heat, which then has a clock of its own; 0: those of "
                        "a cycle take the time of the steps of the blocks, or without motion 0.9 of what is stable", "s",
-                       "0", dims=PLANE)),
+                       "0")),
             needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} step", "So many steps.", ("pcdc model step 1000",),
             (_leading("steps", ZERO_OR_MORE, "number of steps"),), dims=BOTH),
@@ -684,7 +684,7 @@ _MODEL = (
                             "may pass their peak and break; with mechanical off, flow alone"),
                      Option("therm{al}", (), "heat by implicit steps, backward Euler, for so much time or to its "
                             "steady state at once; in static runs blocks are in equilibrium at the end of each step, "
-                            "and joints may pass their peak and break; with mechanical off, heat alone", dims=PLANE),
+                            "and joints may pass their peak and break; with mechanical off, heat alone"),
                      Option("dt", (POSITIVE,), "with hydraulic or thermal: longest time step; those of flow are "
                             "shorter where joints break or no balance is found", "s", "a hundredth of the time"),
                      Option("auto", (), "with hydraulic and time: by explicit steps, as without the word hydraulic, "
@@ -703,7 +703,7 @@ _MODEL = (
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
                             default="1"),
                      Option("therm{al}", (ZERO_OR_MORE,), "sub-steps of a cycle of heat; 0: as many as are stable",
-                            default="0", dims=PLANE),
+                            default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
                             default="0")),
             needs_option=True, dims=BOTH),
@@ -990,8 +990,7 @@ _OBJECTS = (
             ("pcdc node initial velocity (1,0) range group 'block'", "pcdc node initial temperature 20"),
             options=(Option("vel{ocity}", (VECTOR,), "velocity", "m/s"),
                      Option("temp{erature}", (FLOAT,), "temperature, of the fluid at them too; before, it is 0. "
-                            "Elements around the nodes are free of thermal stress then", "K",
-                            dims=PLANE)), ranged="node",
+                            "Elements around the nodes are free of thermal stress then", "K")), ranged="node",
             needs_option=True, dims=BOTH),
     Command("node res{et} vel{ocity}", "All velocities become zero.", ("pcdc node reset velocity",), manual=True,
     dims=BOTH),

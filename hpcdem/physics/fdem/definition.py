@@ -495,7 +495,7 @@ class ModelDefinition:
         new = {name: each.get(name, value) for name, value in given.items()}
         for name in new:
             if self.dim not in model.property(name).dims:
-                raise CommandError(f"in two dimensions there is no {name}")
+                raise CommandError(f"in {'two' if self.dim == 2 else 'three'} dimensions there is no {name}")
         wanted: dict[str, Any] = keep(dict(before), new) if keep else model.changed(before, new)
         if not each and not before:
             return self._checked_softening(model, np.array([list(model.complete(wanted).values())]))
@@ -530,7 +530,6 @@ class ModelDefinition:
                     raise CommandError(f"{name}: table '{value.table}' begins at a negative plastic strain")
                 out[name], out[softening_table(name)] = self.followed[number - 1](0.0), float(number)
             elif isinstance(value, Over) and value.axis == TEMPERATURE:
-                self.refuse_in_space("tables over temperature")
                 if not model.has(temperature_table(name)):
                     raise CommandError(f"{name} of {model.name} cannot follow a table over temperature")
                 number = self._kept(model, name, value.table)

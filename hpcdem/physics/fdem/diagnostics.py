@@ -69,7 +69,9 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "kinetic_energy": Quantity("element", "J/m", "kinetic energy", dims=BOTH),
     "strain_energy": Quantity("element", "J/m", "elastic energy", dims=BOTH),
-    "mean_temperature": Quantity("element", "K", "mean temperature of its corners; NaN without a thermal model"),
+    "mean_temperature": Quantity(
+        "element", "K", "mean temperature of its corners; NaN without a thermal model", dims=BOTH
+    ),
     "area": Quantity("element", "m2", "area in the mesh"),
     "volume": Quantity("element", "m3", "volume in the mesh", dims=(3,)),
     "element_model": Quantity("element", "1", "row of the table of element models", dims=BOTH),
@@ -99,7 +101,7 @@ QUANTITIES: dict[str, Quantity] = {
     **_vector("velocity", "node", "m/s", "velocity"),
     **_vector("reaction", "node", "N/m", "force by which conditions act on the node"),
     **_vector("unbalanced", "node", "N/m", "sum of all forces on the node, conditions included"),
-    "temperature": Quantity("node", "K", "temperature; NaN without a thermal model"),
+    "temperature": Quantity("node", "K", "temperature; NaN without a thermal model", dims=BOTH),
     "state": Quantity("joint", "1", "0 free, 1 intact, 2 behind its peak, 3 broken", dims=BOTH),
     "mode": Quantity("joint", "1", "how it broke, from 1 (opened) to 2 (slid); 0 if it is not broken", dims=BOTH),
     "break_time": Quantity("joint", "s", "model time at which it broke; NaN if it is not broken", dims=BOTH),

@@ -243,7 +243,8 @@ def forces_of_heat(sim: Blocks) -> float:
     heat = sim.surface_loads.eigenstress(sim)
     if heat is None:
         return 0.0
-    return exact_sum(np.abs(heat) * np.sqrt(sim.areas[sim.number[sim.owned]]), sim.comm)
+    size = sim.areas[sim.number[sim.owned]] ** ((sim.dim - 1) / sim.dim)
+    return exact_sum(np.abs(heat) * size, sim.comm)
 
 
 def unknowns_of(sim: Blocks, nodes: Nodes, cycles: int) -> Unknowns:

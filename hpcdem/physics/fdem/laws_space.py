@@ -3,6 +3,7 @@ creep_tets.py."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,16 @@ import numpy as np
 from hpcdem.physics.fdem.kernels import creep_tets, plastic_tets, tets
 from hpcdem.physics.fdem.local import Local, creep_table
 
+NORMAL = [0, 1, 3]
+"""Places of xx, yy and zz in a row of stress."""
+
 
 class LawsSpace(Local):
     """rows: see `LocalSpace`. There are no quads: what `Local` does with theirs finds none."""
 
     rows: np.ndarray
+    _stress: np.ndarray
+    """Initial stress (n_own, 6) [Pa]."""
 
     def _make_memories(self) -> None:
         """What is remembered of yielding and creep, and what of it is in the stress without strain. s0 is what was said
@@ -24,6 +30,7 @@ class LawsSpace(Local):
         self.yields = bool(sim.yielding().any())
         self.quad_rows, self.quad_s0 = np.empty(0, np.int32), np.empty((0, 0))
         if not (self.plastic or self.creeps):
+            self._begin_warm()
             return
         number = sim.number[self.rows[:count]]
         self.law = np.zeros(count + 3, np.int32)
@@ -39,7 +46,35 @@ class LawsSpace(Local):
             self.who_yields = np.concatenate([yielding, fill]).astype(np.int32)
             self.quad_law = np.empty((0, 4), np.int32)
             self._make_strength(self.rows[:count])
+        self._begin_warm()
+
+    def _make_warm(self) -> None:
+        """What elements have before temperatures change it."""
+        self.warms = any(bool(one.any()) for one in self.sim.warms())
+        self.stiff = self.c.copy() if self.warms else self.c
+        self.initial_part: np.ndarray | None = None
+        self._stress_said = self._stress
+
+    def _moduli(self) -> Iterable[tuple[np.ndarray, np.ndarray, list[int], np.ndarray]]:
+        yield self.c, self.stiff, [tets.LAMBDA, tets.TWO_MU], np.arange(self.count)
+
+    def _scale_initial(self, ratio: np.ndarray) -> None:
+        self._stress = self._stress_said * ratio[:, None]
+
+    def _begin_warm(self) -> None:
+        """Moduli, strengths and stress without strain at the temperatures of now."""
+        if self.warms:
+            self._follow_elements()
+        self.heated = self._find_stress_without_strain()
+
+    def _find_stress_without_strain(self) -> bool:
+        """As in the plane: what was said of it and what heat brings, less the part of plastic and creep strain."""
+        heat = self.sim.surface_loads.eigenstress(self.sim)
+        self.s0[: self.count, :6] = self._stress
+        if heat is not None:
+            self.s0[: self.count, NORMAL] += heat[:, None]
         self._relieve()
+        return heat is not None
 
     def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
         memory = self.sim.cold["creep"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -271,14 +271,10 @@ class Local:
 
     def _follow_elements(self) -> None:
         """Moduli, initial stress and strength of elements at their temperatures."""
-        sim, count = self.sim, self.count
+        sim = self.sim
         part = by_temperature.part_of_young(sim)
-        triangles, quads = self.triangle_rows[:count] - sim.n_left, self.quad_rows - sim.n_left
         if part is not None:
-            for table, full, columns, rows in (
-                (self.c, self.stiff, [elements.LAMBDA, elements.TWO_MU], triangles),
-                (self.q, self.stiff_q, [elements.Q_LAMBDA, elements.Q_TWO_MU], quads),
-            ):
+            for table, full, columns, rows in self._moduli():
                 table[: len(rows), columns] = full[: len(rows), columns] * part[rows, None]
         if sim.stress0 is not None:
             said = sim.stress0_row[sim.number[sim.owned]]
@@ -288,22 +284,35 @@ class Local:
                 if before is not None:
                     ratio /= np.where(said > 0, before, 1.0)
                 self.initial_part = ratio
-                first, second = self._said_initial
-                self._of_initial = first * ratio[triangles, None], second * ratio[quads, None]
+                self._scale_initial(ratio)
         if self.plastic and len(self.strength.of):
             t, of = by_temperature.means(sim)[self.strength_element], self.strength.of
             for column, name in ((strength.COHESION, "cohesion"), (strength.TENSILE, "tensile")):
                 self.strength.values[:, column] = by_temperature.values(sim, sim.element_rows, name, of, t)
             self._renew_strength()
 
+    def _moduli(self) -> Iterable[tuple[np.ndarray, np.ndarray, list[int], np.ndarray]]:
+        """Tables of elements: as they are, with their largest moduli, columns of these, and the how-manieth owned
+        element each row is of."""
+        triangles, quads = self.triangle_rows[: self.count] - self.sim.n_left, self.quad_rows - self.sim.n_left
+        yield self.c, self.stiff, [elements.LAMBDA, elements.TWO_MU], triangles
+        yield self.q, self.stiff_q, [elements.Q_LAMBDA, elements.Q_TWO_MU], quads
+
+    def _scale_initial(self, ratio: np.ndarray) -> None:
+        """The initial stress of owned elements is so much (n_own,) of what was said."""
+        first, second = self._said_initial
+        triangles, quads = self.triangle_rows[: self.count] - self.sim.n_left, self.quad_rows - self.sim.n_left
+        self._of_initial = first * ratio[triangles, None], second * ratio[quads, None]
+
     def _follow_joints(self) -> None:
         """The laws of joints at their temperatures."""
         sim, slots = self.sim, self.warm_slots
         face = self.slot_face[slots]
-        e, k = face // 4, face % 4
-        t, own = sim.cold[by_temperature.TEMPERATURE], sim.where[e] - sim.n_left
-        ends = t[own, k], t[own, (k + 1) % connectivity.corner_counts(sim.the_mesh().cells[e])]
-        mean, rows, of = 0.5 * (ends[0] + ends[1]), sim.joint_rows, self.warm_of
+        t, own = sim.cold[by_temperature.TEMPERATURE], sim.where[face // 4] - sim.n_left
+        first, *others = (t[own, k] for k in (sim.the_mesh().face_corners(face) % 4).T)
+        # Both sides of a face in space begin at one corner and go round it the other way.
+        mean = 0.5 * (first + others[0]) if len(others) == 1 else (first + (others[0] + others[1])) / 3.0
+        rows, of = sim.joint_rows, self.warm_of
         warm = {name: by_temperature.values(sim, rows, name, of, mean) for name in _WARM_JOINT}
         self.joint_table[len(rows) :], self.joint_beyond[len(rows) :] = joint_tables(rows, warm, of)
 

@@ -29,7 +29,6 @@ class LocalSpace(LawsSpace):
     """See `Local`; count, rows: tetrahedra and their storage rows, with three more at the end."""
 
     dim, force_width, stride = 3, tets.ROW, tets.STRIDE
-    warms = False
 
     def __init__(self, sim: State) -> None:
         self.sim = sim
@@ -72,9 +71,10 @@ class LocalSpace(LawsSpace):
             self.hexes = Hexes(sim, self.true_mass)
         self.c[self.count :] = self.c[self.count - 1] if self.count else 1.0
         self.s0 = np.zeros((self.count + 3, tets.STRESSES))
+        self._stress = np.zeros((self.count, 6))
         if sim.stress0 is not None:
-            self.s0[: self.count, :6] = sim.initial_stresses(sim.number[sim.owned])
-        self.heated = False
+            self._stress = sim.initial_stresses(sim.number[sim.owned])
+        self._make_warm()
 
     def _make_joints(self) -> None:
         """Slots of the faces, four per tetrahedron."""
@@ -244,7 +244,7 @@ class LocalSpace(LawsSpace):
     def _fill(self, force: np.ndarray, of_joints: np.ndarray, keep: bool) -> None:
         sim, o = self.sim, self.sim.options
         self.obey()
-        stressed = sim.stress0 is not None or self.plastic or self.creeps
+        stressed = sim.stress0 is not None or self.plastic or self.creeps or self.heated
         hexes = self.hexes
         some = 0 if hexes is not None and 6 * hexes.count == self.count else self.count
         self._forces(
@@ -361,6 +361,8 @@ class LocalSpace(LawsSpace):
         tets.stresses(x, np.arange(n, dtype=np.int32), self.c[at], s0[at], small, 0, stress, energy)
         if energies:
             energy += self.remembered_energy(plastic, crept)[at]
+            if self.heated:
+                energy += self._energy_of_heat()[at]
         if self.hexes is not None:
             self.hexes.spread(stress, energy, at)
         return stress, energy

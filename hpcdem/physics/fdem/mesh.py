@@ -121,10 +121,7 @@ class Mesh:
 
     def face_sizes(self, faces: np.ndarray) -> np.ndarray:
         """(n,) length of each face [m]; in space its area [m2]."""
-        at = self.points[self.face_points(faces)]
-        if self.dim == 3:
-            return 0.5 * np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1)
-        return np.hypot(*(at[:, 1] - at[:, 0]).T)
+        return sizes(self.points[self.face_points(faces)])
 
     def edges(self) -> Edges:
         """All edges, in space all faces, ascending by number. Computed again at each call."""
@@ -161,6 +158,13 @@ class Mesh:
             ends = np.unique(np.sort(both, axis=1), axis=0)
         way = self.points[ends[:, 1]] - self.points[ends[:, 0]]
         return float(np.sqrt((way * way).sum(axis=1)).mean())
+
+
+def sizes(corners: np.ndarray) -> np.ndarray:
+    """(n,) lengths [m] of edges with these ends (n, 2, 2), areas [m2] of faces with these corners (n, 3, 3)."""
+    if corners.shape[2] == 3:
+        return 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.hypot(*(corners[:, 1] - corners[:, 0]).T)
 
 
 def centres(points: np.ndarray, cells: np.ndarray) -> np.ndarray:

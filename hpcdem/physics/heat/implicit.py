@@ -233,7 +233,7 @@ class Implicit:
         self._made_for = made_for
 
     def _pieces(self, dt: float) -> list[Pieces]:
-        """Of triangles, quads and faces of this rank."""
+        """Of triangles, of quads or tetrahedra, and of faces of this rank."""
         sim, heat = self.sim, self.heat
         own, number = sim.owned, sim.number[sim.owned]
         quad = sim.the_mesh().cells[number, 3] >= 0
@@ -252,9 +252,9 @@ class Implicit:
             order = np.argsort(number[at])
             found.append(Pieces(number[at][order], heat.node[number[at]][:, :k][order], stiffness[order]))
         at, ends, transfer = heat.transfers()
-        faces = np.zeros((2 * len(at), 2, 2))
-        faces[:, 0, 0] = np.repeat(transfer, 2)
-        key = np.repeat(at, 2)
+        key = np.repeat(at, ends.shape[1])
+        faces = np.zeros((len(key), 2, 2))
+        faces[:, 0, 0] = np.repeat(transfer, ends.shape[1])
         found.append(Pieces(key, heat.node.reshape(-1)[ends.reshape(-1)][:, None], faces))
         found.append(self._contact_pieces())
         return found
@@ -267,7 +267,7 @@ class Implicit:
         row = corner // width
         mine = (row[:, 0] >= sim.owned.start) & (row[:, 0] < sim.owned.stop)
         corner, weight, row = corner[mine] % width, weight[mine], row[mine]
-        stiffness = np.zeros((len(corner), 8, 8))
+        stiffness = np.zeros((len(corner), *2 * [2 * corner.shape[1]]))
         stiffness[:, ::2, ::2] = pass_on[mine, None, None] * weight[:, :, None] * weight[:, None, :]
         return Pieces(sim.number[row[:, 0]], heat.node[sim.number[row], corner], stiffness)
 
@@ -285,7 +285,7 @@ class Implicit:
             lower = fluid.flow.network.channels
             bound[body[np.append(lower, sim.partner[lower]) // 4]] = True
         row = heat.contacts[0] // heat.t.shape[1]
-        touch = np.unique(np.concatenate(sim.comm.allgather(body[sim.number[row[:, [0, 2]]]])), axis=0)
+        touch = np.unique(np.concatenate(sim.comm.allgather(body[sim.number[row[:, [0, row.shape[1] // 2]]]])), axis=0)
         while True:  # what touches a body that something holds
             reached = touch[bound[touch].any(axis=1)]
             if bound[reached].all():

@@ -1,8 +1,8 @@
 """The loops of heat: conduction in elements, exchange at faces, sums at nodes, thermal stress.
 
 Temperatures stand at the corners of elements, rows t (n, w) in storage order, ghosts too; w is 3, with quads in the
-mesh 4. Corners that are one node of heat carry equal copies. Sources: Fourier's law with linear triangles (manual,
-7.6.1, (93) to (99)), transfer after Newton ((100), (101)), thermal strain after Duhamel and Neumann.
+mesh, and in space, 4. Corners that are one node of heat carry equal copies. Sources: Fourier's law with linear
+triangles (manual, 7.6.1, (93) to (99)), transfer after Newton ((100), (101)), thermal strain after Duhamel and Neumann.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numba import njit, prange
 from hpcdem.physics.fdem.kernels.elements import PARTS
 
 PAIRS = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]])
-"""Pairs of corners between which heat flows, of triangles the first three."""
+"""Pairs of corners between which heat flows, of triangles the first three, of quads and tetrahedra all."""
 FLUX, TRANSFER, ENVIRONMENT = range(3)
 """Columns of the table of conditions of faces [W/m2, W/(m2 K), K]."""
 
@@ -88,14 +88,15 @@ def conduct_threaded(threads, t, g, q):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def through_faces(corner, half, row, table, first, last, t, q, dt, given):
-    """Heat through faces: a flux, and transfer from an environment, half of the face at each end.
+    """Heat through faces: a flux, and transfer from an environment, an equal part of the face at each of its corners.
 
-    corner (m, 2): ends in t, flat; half (m,): half lengths [m]; row (m,), table (rows, 3): conditions; t, q, given:
-    flat; faces first : last are this rank's, what they bring in dt [s] is booked in given [J/m].
+    corner (m, 2 or 3): in t, flat; half (m,): half lengths [m], in space thirds of areas [m2]; row (m,), table (rows,
+    3): conditions; t, q, given: flat; faces first : last are this rank's, what they bring in dt [s] is booked in given
+    [J/m].
     """
     for i in range(len(corner)):
         one = table[row[i]]
-        for end in range(2):
+        for end in range(corner.shape[1]):
             at = corner[i, end]
             heat = half[i] * (one[FLUX] + one[TRANSFER] * (one[ENVIRONMENT] - t[at]))
             q[at] += heat
@@ -168,12 +169,17 @@ def touching(first, second, start, free, element, cells, where, x, h, near, deep
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def through_contacts(corner, weight, pass_on, t, q):
-    """Add the heat that passes from face to face where they touch, see `touching`; t, q: flat."""
+    """Add the heat that passes from face to face where they touch, see `touching`; the first half of the corners are
+    those of the first face; t, q: flat."""
+    many = corner.shape[1]
+    half = many // 2
     for n in range(len(pass_on)):
-        apart = (weight[n, 0] * t[corner[n, 0]] + weight[n, 1] * t[corner[n, 1]]) + (
-            weight[n, 2] * t[corner[n, 2]] + weight[n, 3] * t[corner[n, 3]]
-        )
-        for k in range(4):
+        here = there = 0.0
+        for k in range(half):
+            here += weight[n, k] * t[corner[n, k]]
+            there += weight[n, half + k] * t[corner[n, half + k]]
+        apart = here + there
+        for k in range(many):
             q[corner[n, k]] -= pass_on[n] * weight[n, k] * apart
 
 

@@ -18,14 +18,16 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, PhysicsError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import build, by_temperature, connectivity, said, user_laws
+from hpcdem.physics.fdem import build, by_temperature, said, user_laws
 from hpcdem.physics.fdem.kernels.elements import FORCE
+from hpcdem.physics.fdem.mesh import sizes as sizes_of
+from hpcdem.physics.fdem.pairs_space import Surface
 from hpcdem.physics.fdem.properties import ELEMENT
 from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.fdem.tables import Value
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.heat import friction, kernels
+from hpcdem.physics.heat import friction, kernels, kernels_space
 from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.properties import ISO_HEAT
 
@@ -96,10 +98,13 @@ class Heat(SurfaceLoad):
         self.fluid: FluidHeat | None = None
         self._found_for: tuple[float, ...] = ()
         self._passes = False
+        self._pairs_of: Any = None
+        self._facing = np.empty((0, 2), np.int64)
         self._touch = np.empty((0, 4), np.int64), np.empty((0, 4)), np.empty(0)
         self._rubs = False
         self._power: np.ndarray | None = None
         self._told = 0.0
+        self._told_obtuse = False
         self._limit = math.inf
 
     @property
@@ -126,6 +131,8 @@ class Heat(SurfaceLoad):
         """Elements (None: all) have this thermal model; at the temperature that they have now they are free of thermal
         stress."""
         at = self.blocks.numbers_of_elements(elements)
+        if len(self.blocks.the_mesh().hexes) and (self.blocks.the_mesh().hex_of()[at] >= 0).any():
+            raise CommandError("hexahedra have no heat in this version: thermal-iso-heat is for tetrahedra")
         self._put(at, self.blocks.complete(ELEMENT, at, ISO_HEAT, {}, given))
         self._take_unstressed(at)
 
@@ -166,7 +173,7 @@ class Heat(SurfaceLoad):
         """The columns of elements; the model is open."""
         cold, n = self.blocks.cold, len(self.blocks.number)
         if TEMPERATURE not in cold:
-            width = 4 if self.blocks.wide else 3
+            width = 4 if self.blocks.wide or self.blocks.dim == 3 else 3
             for name in (TEMPERATURE, GIVEN, CAPACITY):
                 cold[name] = np.zeros((n, width))
             cold[UNSTRESSED] = np.zeros((n, 1))
@@ -356,12 +363,12 @@ class Heat(SurfaceLoad):
 
     def reach(self, blocks: Any, middle: np.ndarray) -> float:
         """Elements around a node of heat."""
-        cells = blocks.the_mesh().cells[blocks.number]
+        cells, stride = blocks.the_mesh().cells[blocks.number], blocks.stride
         far = np.zeros(1)
         for k in range(4):
             there = cells[:, k] >= 0
             if there.any():
-                way = blocks.x[there, 2 * k : 2 * k + 2] - middle[there]
+                way = blocks.x[there, stride * k : stride * k + blocks.dim] - middle[there]
                 far[0] = max(far[0], float((way * way).sum(axis=1).max()))
         return 2.0 * math.sqrt(float(blocks.comm.max_into(far)[0])) + SPREAD * float(blocks.mean_edge)
 
@@ -406,33 +413,71 @@ class Heat(SurfaceLoad):
 
     def _make_conductances(self) -> None:
         blocks, number = self.blocks, self.blocks.number
-        along, across, angle = (
-            self.column(name)[self.row[number]]
-            for name in ("conductivity", "conductivity_across", "conductivity_angle")
-        )
-        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        same = along == across  # no rounding where the angle has no meaning
-        c, s = np.where(same, 1.0, c), np.where(same, 0.0, s)
-        k = np.column_stack([
-            along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * c * s,
-        ])  # fmt: skip
+        row = self.row[number]
+        along, across = (self.column(name)[row] for name in ("conductivity", "conductivity_across"))
         heat = (
             self.column("capacity")[self.row[number]]
             * blocks.element_rows.column("density")[blocks.element_row[number]]
         )
         self._effusivity = np.sqrt(np.sqrt(along * across) * heat)
-        self._g = np.empty((len(number), 6 if blocks.wide else 3))
+        self._g = np.empty((len(number), 6 if self.t.shape[1] == 4 else 3))
         mesh = blocks.reference
-        kernels.conductances(number, mesh.points, mesh.cells, k, self._g)
+        make = kernels_space.conductances if blocks.dim == 3 else kernels.conductances
+        make(number, mesh.points, mesh.cells, self._conductivities(row), self._g)
         self._q = np.zeros_like(self.t)
+
+    def _conductivities(self, row: np.ndarray) -> np.ndarray:
+        """Of elements with these rows (n,), [W/(m K)]: xx, yy, xy (n, 3), in space xx, yy, xy, zz, xz, yz (n, 6)."""
+        along, across, angle, dip = (
+            self.column(name)[row]
+            for name in ("conductivity", "conductivity_across", "conductivity_angle", "conductivity_dip")
+        )
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        same = along == across  # no rounding where the angle has no meaning
+        c, s = np.where(same, 1.0, c), np.where(same, 0.0, s)
+        if self.blocks.dim == 2:
+            return np.column_stack([
+                along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * c * s,
+            ])  # fmt: skip
+        normal = np.sin(np.radians(dip))[:, None] * np.column_stack([-s, c, np.zeros(len(s))])
+        normal[:, 2] = np.cos(np.radians(dip))
+        less = np.where(same, 0.0, across - along)
+        x, y, z = normal.T
+        one = [along + less * x * x, along + less * y * y, less * x * y]
+        return np.column_stack([*one, along + less * z * z, less * x * z, less * y * z])
+
+    def _tell_obtuse(self) -> None:
+        """Where flat angles make heat flow from cold to warm: the temperatures of explicit steps may leave the range of
+        those around them. Rank 0 alone."""
+        blocks, cells = self.blocks, self.blocks.the_mesh().cells
+        if self._told_obtuse or blocks.log is None or blocks.dim == 2:
+            return
+        self._told_obtuse = True
+        every = np.flatnonzero(blocks.alive & (self.row > 0))
+        g = np.empty((len(every), 6))
+        mesh = blocks.reference
+        kernels_space.conductances(every, mesh.points, mesh.cells, self._conductivities(self.row[every]), g)
+        ends = np.sort(self.node[every][:, kernels.PAIRS], axis=2).reshape(-1, 2)
+        key, at = np.unique(ends[:, 0] * len(self.leads) + ends[:, 1], return_inverse=True)
+        total = np.bincount(at.reshape(-1), g.reshape(-1), len(key))
+        size = np.bincount(at.reshape(-1), np.abs(g).reshape(-1), len(key))
+        against = total < -1e-12 * size
+        if against.any():
+            blocks.log.warn_once(
+                "obtuse tetrahedra",
+                f"along {int(against.sum())} of {len(key)} edges heat is conducted from the colder to the warmer end, "
+                f"as angles between faces are obtuse (in {int((g < 0.0).any(axis=1).sum())} of {len(cells)} "
+                "tetrahedra): near steep fronts temperatures may leave the range of those around them",
+            )
 
     def _make_nodes(self) -> None:
         """Nodes of heat that this rank's elements have, and the faces that are exposed, as faces hang together now."""
         blocks, mesh, own = self.blocks, self.blocks.the_mesh(), self.blocks.owned
         dead = np.repeat(~blocks.alive, 4)
-        node, lead = connectivity.corner_clusters(mesh.cells, blocks.partner, blocks.open | dead)
+        node, lead = mesh.corner_clusters(blocks.partner, blocks.open | dead)
         node[~blocks.alive] = -1
         self.node, self.leads = node, lead
+        self._tell_obtuse()
         sizes = np.bincount(node[node >= 0], minlength=len(lead))
         member_begin = np.zeros(len(lead) + 1, np.int64)
         member = np.empty(int(sizes[sizes > 1].sum()), np.int64)
@@ -483,8 +528,8 @@ class Heat(SurfaceLoad):
         return self._g
 
     def transfers(self, everywhere: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Exposed faces (m,), ascending, their ends as corners (m, 2), element * 4 + k, and what each passes on per
-        degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
+        """Exposed faces (m,), ascending, their corners (m, 2 or 3), element * 4 + k, and what each passes on to one of
+        them per degree [W/(m K)]: of this rank's elements, or of all. Not collective."""
         at, ends, half = self._exposed()
         if not everywhere:
             row = self.blocks.where[at // 4]
@@ -497,14 +542,17 @@ class Heat(SurfaceLoad):
         return at, 4 * (at // 4)[:, None] + ends, transfer
 
     def _exposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Free faces with a condition, of all ranks: numbers (m,), their two corners (m, 2) and half lengths [m]."""
-        blocks, mesh = self.blocks, self.blocks.reference
+        """Free faces with a condition, of all ranks: numbers (m,), their corners (m, 2), in space (m, 3), and the part
+        of the face of each: half the length [m], in space a third of the area [m2]."""
+        blocks = self.blocks
         at = np.flatnonzero((self.face > 0) & blocks.face_exists() & ~blocks.closed_faces())
-        e, k = at // 4, at % 4
-        ends = np.column_stack([k, (k + 1) % connectivity.corner_counts(mesh.cells[e])])
-        points = mesh.points[np.take_along_axis(mesh.cells[e], ends, axis=1)]
-        way = points[:, 1] - points[:, 0]
-        return at, ends, 0.5 * np.hypot(way[:, 0], way[:, 1])
+        return at, *self._parts_of(at)
+
+    def _parts_of(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The second and third of these of any faces (m,)."""
+        mesh = self.blocks.the_mesh()
+        ends = mesh.face_corners(faces) % 4
+        return ends, sizes_of(self.blocks.reference.points[mesh.face_points(faces)]) / ends.shape[1]
 
     def _make_faces(self) -> None:
         """Exposed faces of the elements held here, by their numbers."""
@@ -531,21 +579,42 @@ class Heat(SurfaceLoad):
 
     def find_contacts(self) -> None:
         """Where faces touch now, of pairs with an element of this rank; the model is closed. Not collective."""
-        blocks, pairs = self.blocks, self.blocks.local.pairs
         self._passes, room = self.passes, 0
         while True:
-            self._touch = np.empty((room, 4), np.int64), np.empty((room, 4)), np.empty(room)
-            if not self._passes or not len(pairs):
+            ends = 2 * self.blocks.dim
+            self._touch = np.empty((room, ends), np.int64), np.empty((room, ends)), np.empty(room)
+            if not self._passes or not len(self.blocks.local.pairs):
                 return
-            new = (np.diff(pairs.first, prepend=-1) != 0) | (np.diff(pairs.second, prepend=-1) != 0)
-            edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
-            found = kernels.touching(
-                pairs.first[new], pairs.second[new], pairs.start, pairs.free, pairs.element, blocks.the_mesh().cells,
-                blocks.where, blocks.x, h, NEAR * edge, DEEP * edge, self.t.shape[1], *self._touch,
-            )  # fmt: skip
+            found = (self._touching_in_space if self.blocks.dim == 3 else self._touching)()
             if found == room:
                 return
             room = found
+
+    def _touching(self) -> int:
+        """Fill what there is room for of places where faces touch; how many there are."""
+        blocks, pairs = self.blocks, self.blocks.local.pairs
+        new = (np.diff(pairs.first, prepend=-1) != 0) | (np.diff(pairs.second, prepend=-1) != 0)
+        edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
+        return kernels.touching(
+            pairs.first[new], pairs.second[new], pairs.start, pairs.free, pairs.element, blocks.the_mesh().cells,
+            blocks.where, blocks.x, h, NEAR * edge, DEEP * edge, self.t.shape[1], *self._touch,
+        )  # fmt: skip
+
+    def _touching_in_space(self) -> int:
+        """The same for tetrahedra: every free face with those of its targets, each pair of faces once."""
+        blocks, pairs = self.blocks, self.blocks.local.pairs
+        if self._pairs_of is not pairs:
+            self._pairs_of = pairs
+            free = np.zeros(self.face.size, bool)
+            free[Surface.of(blocks).faces] = True
+            face = np.repeat(pairs.face[pairs.first], 4)
+            other = (4 * pairs.element[pairs.second][:, None] + np.arange(4)).reshape(-1)
+            both = np.sort(np.column_stack([face, other])[free[other]], axis=1)
+            self._facing = np.unique(both, axis=0).reshape(-1, 2)
+        face, other = self._facing.T.copy()
+        edge, h = float(blocks.mean_edge), self._transfers[blocks.number]
+        rows = blocks.where[face // 4], blocks.where[other // 4]
+        return kernels_space.touching(face, other, *rows, blocks.x, h, NEAR * edge, DEEP * edge, *self._touch)
 
     @property
     def contacts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -579,7 +648,9 @@ class Heat(SurfaceLoad):
             corner[:, a] += each[:, pair]
             corner[:, b] += each[:, pair]
         h = self._faces_at(self.time)[:, kernels.TRANSFER][self._face_row]
-        np.add.at(corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, 2))
+        np.add.at(
+            corner.reshape(-1), self._face_corner.reshape(-1), np.repeat(self._half * h, self._face_corner.shape[1])
+        )
         if self.passes:
             self._add_most_of_contacts(corner)
         if (fluid := self.flowing) is not None:
@@ -592,15 +663,13 @@ class Heat(SurfaceLoad):
 
     def _add_most_of_contacts(self, corner: np.ndarray) -> None:
         """What free faces pass on to corners (n, w) where they touch all along, whatever they touch."""
-        blocks, mesh = self.blocks, self.blocks.reference
-        h = self._transfers
+        blocks, h = self.blocks, self._transfers
         most = h[blocks.alive].max()
         at = np.flatnonzero(blocks.face_exists() & ~blocks.closed_faces() & np.repeat(h > 0.0, 4))
         at = at[blocks.where[at // 4] >= 0]
-        way = np.diff(mesh.points[connectivity.face_points(mesh.cells, at)], axis=1)[:, 0]
-        each = np.hypot(way[:, 0], way[:, 1]) * h[at // 4] * most / (h[at // 4] + most)
-        k, n = at % 4, connectivity.corner_counts(mesh.cells[at // 4])
-        for end in (k, (k + 1) % n):
+        ends, part = self._parts_of(at)
+        each = 2.0 * part * h[at // 4] * most / (h[at // 4] + most)
+        for end in ends.T:
             np.add.at(corner, (blocks.where[at // 4], end), each)
 
     def limit(self) -> float:

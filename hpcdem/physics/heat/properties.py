@@ -20,10 +20,11 @@ ISO_HEAT = Model(
         Property("expansion_coeficient", "1/K", "linear thermal expansion", 0.0, low=-math.inf),
         Property("conductivity_across", "W/(m K)", "conductivity across the direction of conductivity-angle",
                  optional=True, follows="conductivity", otherwise="conductivity", low_itself=False),
-        Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise; it turns with "
-                 "the element", 0.0, low=-math.inf),
+        Property("conductivity_angle", "degrees", "direction of conductivity from x, counter-clockwise, in space the "
+                 "strike of the planes along which it is; it turns with the element", 0.0, low=-math.inf),
         Property("friction_heat", "1", "how much of its share of the work of friction an element takes as heat where "
-                 "its faces slide on others", 0.0, high=1.0),
+                 "its faces slide on others", 0.0, high=1.0, dims=(2,)),
+        Property("conductivity_dip", "degrees", "dip of these planes", 90.0, low=-math.inf, dims=(3,)),
     ),
 )  # fmt: skip
 FLUID_HEAT = Model(

@@ -1,4 +1,4 @@
-"""A warm crack between two blocks, which calls every kernel of heat once."""
+"""A warm crack between two blocks, in the plane and in space, which calls every kernel of heat once."""
 
 from __future__ import annotations
 
@@ -17,8 +17,24 @@ GRANITE = {"conductivity": 2.7, "capacity": 1000.0, "expansion_coeficient": 1e-5
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    sim = _heated(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+    pairs, one = np.array([0]), np.ones(2)
+    friction.rub(
+        pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
+        np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
+    )  # fmt: skip
+    _fluid()
+
+
+def in_space(threads: int = 1) -> None:
+    """The same between two tetrahedra."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+    _heated(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+
+
+def _heated(mesh: Mesh, threads: int) -> Blocks:
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     heat = Heat.of(sim)
     heat.assign(None, GRANITE)
@@ -26,12 +42,7 @@ def warm_up(threads: int = 1) -> None:
     heat.expose(None, flux=1.0)
     changes.crack(sim, np.flatnonzero(sim.joint_exists()))
     sim.step()
-    pairs, one = np.array([0]), np.ones(2)
-    friction.rub(
-        pairs, pairs + 1, np.zeros(2, np.int64), np.arange(2), np.zeros(2, bool), sim.x, sim.v,
-        np.zeros((1, 6)), one, one, 1.0, np.zeros((2, 3)),
-    )  # fmt: skip
-    _fluid()
+    return sim
 
 
 def _fluid() -> None:

@@ -1,0 +1,166 @@
+"""What heat in tetrahedra has of its own: conductances, and where faces touch. All other loops are those of kernels.py,
+for which a tetrahedron is a row with four corners. Source: Fourier's law with linear tetrahedra (manual, 7.6.1).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from hpcdem.physics.fdem.tetrahedra import FACES
+from hpcdem.physics.heat.kernels import PAIRS
+
+MOST = 10
+"""Corners of a triangle that is cut five times, with room."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def conductances(number, points, cells, k, out):
+    """Conductances [W/K] between the corners of tetrahedra, (n, 6), in the order of PAIRS: -V grad N_a . k . grad N_b.
+
+    k (n, 6): conductivity xx, yy, xy, zz, xz, yz. With the normals of the faces times their areas, s = 3 V grad N, this
+    is -(s_a . k . s_b) / (9 V), the sum of the manual.
+    """
+    slope = np.empty((4, 3))
+    for i in range(len(number)):
+        e = number[i]
+        a, b, c, d = cells[e, 0], cells[e, 1], cells[e, 2], cells[e, 3]
+        ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+        wx, wy, wz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
+        tx, ty, tz = points[d, 0] - points[a, 0], points[d, 1] - points[a, 1], points[d, 2] - points[a, 2]
+        # Six times the volume times the gradients of the shape functions.
+        slope[1, 0], slope[1, 1], slope[1, 2] = wy * tz - wz * ty, wz * tx - wx * tz, wx * ty - wy * tx
+        slope[2, 0], slope[2, 1], slope[2, 2] = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
+        slope[3, 0], slope[3, 1], slope[3, 2] = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+        det = ux * slope[1, 0] + (uy * slope[1, 1] + uz * slope[1, 2])
+        for axis in range(3):
+            slope[0, axis] = -(slope[1, axis] + (slope[2, axis] + slope[3, axis]))
+        xx, yy, xy, zz, xz, yz = k[i, 0], k[i, 1], k[i, 2], k[i, 3], k[i, 4], k[i, 5]
+        for pair in range(6):
+            one, two = slope[PAIRS[pair, 0]], slope[PAIRS[pair, 1]]
+            flow = one[0] * (xx * two[0] + (xy * two[1] + xz * two[2]))
+            flow += one[1] * (xy * two[0] + (yy * two[1] + yz * two[2]))
+            flow += one[2] * (xz * two[0] + (yz * two[1] + zz * two[2]))
+            out[i, pair] = -flow / (6.0 * det)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cut(n, polygon, other, a, b, c):
+    """The part of a polygon (n corners, columns u, v) where a + b u + c v >= 0 into `other`: its number of corners."""
+    m, last = 0, n - 1
+    before = a + (b * polygon[last, 0] + c * polygon[last, 1])
+    for i in range(n):
+        here = a + (b * polygon[i, 0] + c * polygon[i, 1])
+        if (before < 0.0) != (here < 0.0):
+            part = before / (before - here)
+            for axis in range(2):
+                other[m, axis] = polygon[last, axis] + part * (polygon[i, axis] - polygon[last, axis])
+            m += 1
+        if here >= 0.0:
+            other[m, 0], other[m, 1] = polygon[i, 0], polygon[i, 1]
+            m += 1
+        before, last = here, i
+    return m
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _seen(one, two, near, deep, polygon, other, onto):
+    """The part of a face, corners one (3, 3), that sees a second one, two (3, 3), along its normal, no farther than
+    `near` above and `deep` below it [m]: corners of a polygon in `polygon`, as parts (u, v) of the sides of the first,
+    and `onto` (3, 2 + 1): of the second face the same as a linear function of them, u' = onto[0] . (1, u, v), v' =
+    onto[1]; gap onto[2]. Returns the number of corners, and the area of the first face [m2]."""
+    ux, uy, uz = one[1, 0] - one[0, 0], one[1, 1] - one[0, 1], one[1, 2] - one[0, 2]
+    wx, wy, wz = one[2, 0] - one[0, 0], one[2, 1] - one[0, 1], one[2, 2] - one[0, 2]
+    nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+    double = math.sqrt(nx * nx + (ny * ny + nz * nz))
+    px, py, pz = two[1, 0] - two[0, 0], two[1, 1] - two[0, 1], two[1, 2] - two[0, 2]
+    qx, qy, qz = two[2, 0] - two[0, 0], two[2, 1] - two[0, 1], two[2, 2] - two[0, 2]
+    mx, my, mz = py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx
+    against = nx * mx + (ny * my + nz * mz)
+    if 2.0 * against > -double * math.sqrt(mx * mx + (my * my + mz * mz)):
+        return 0, 0.0
+    # Where the normal through one[0] + u U + w W meets the plane of the second: two[0] + u' P + v' Q, gap along n.
+    for column in range(3):
+        if column == 0:
+            x, y, z = one[0, 0] - two[0, 0], one[0, 1] - two[0, 1], one[0, 2] - two[0, 2]
+        elif column == 1:
+            x, y, z = ux, uy, uz
+        else:
+            x, y, z = wx, wy, wz
+        way = (x * mx + (y * my + z * mz)) / against  # times -n
+        onto[2, column] = -way * double
+        x, y, z = x - way * nx, y - way * ny, z - way * nz
+        # u' = (r x Q) . m / m^2 and v' = (P x r) . m / m^2.
+        m2 = mx * mx + (my * my + mz * mz)
+        onto[0, column] = ((y * qz - z * qy) * mx + ((z * qx - x * qz) * my + (x * qy - y * qx) * mz)) / m2
+        onto[1, column] = ((py * z - pz * y) * mx + ((pz * x - px * z) * my + (px * y - py * x) * mz)) / m2
+    polygon[0, 0] = polygon[0, 1] = polygon[1, 1] = polygon[2, 0] = 0.0
+    polygon[1, 0] = polygon[2, 1] = 1.0
+    n = 3
+    for cut in range(5):
+        if cut < 2:
+            a, b, c = onto[cut, 0], onto[cut, 1], onto[cut, 2]
+        elif cut == 2:
+            a, b, c = 1.0 - (onto[0, 0] + onto[1, 0]), -(onto[0, 1] + onto[1, 1]), -(onto[0, 2] + onto[1, 2])
+        elif cut == 3:
+            a, b, c = near - onto[2, 0], -onto[2, 1], -onto[2, 2]
+        else:
+            a, b, c = deep + onto[2, 0], onto[2, 1], onto[2, 2]
+        n = _cut(n, polygon, other, a, b, c)
+        if n < 3:
+            return 0, 0.0
+        polygon[:n] = other[:n]
+    return n, 0.5 * double
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def touching(face, other, row, other_row, x, h, near, deep, corner, weight, pass_on):
+    """Where faces touch: how many places, and as many rows of the rest as there are; see `kernels.touching`.
+
+    face, other (m,): pairs of free faces of elements in the storage rows row, other_row (m,); x (n, 16); h (rows,)
+    [W/(m2 K)]. The part of a face that sees the other one is a polygon; triangles from the mean of its corners to its
+    sides pass a third of their heat on at each of their corners, at the mean that of the means of all: so linear
+    temperatures give the exact heat. corner (n, 6) in t, flat, of four columns, weight (n, 6), pass_on (n,) [W/K].
+    """
+    n = 0
+    one, two, onto = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    polygon, scratch = np.empty((MOST, 2)), np.empty((MOST, 2))
+    for p in range(len(face)):
+        i, j = row[p], other_row[p]
+        if h[i] <= 0.0 or h[j] <= 0.0:
+            continue
+        mine, theirs = FACES[face[p] % 4], FACES[other[p] % 4]
+        for k in range(3):
+            for axis in range(3):
+                one[k, axis], two[k, axis] = x[i, 4 * mine[k] + axis], x[j, 4 * theirs[k] + axis]
+        many, area = _seen(one, two, near, deep, polygon, scratch, onto)
+        if many < 3:
+            continue
+        if n + many <= len(pass_on):
+            third = 2.0 * h[i] * h[j] / (h[i] + h[j]) * area / 3.0
+            middle_u = middle_v = whole = 0.0
+            for m in range(many):
+                middle_u, middle_v = middle_u + polygon[m, 0] / many, middle_v + polygon[m, 1] / many
+                pass_on[n + m] = 0.0
+            for m in range(many):
+                o = (m + 1) % many
+                # Twice its area in the plane of (u, v) is its part of that of the face.
+                part = (polygon[m, 0] - middle_u) * (polygon[o, 1] - middle_v)
+                part -= (polygon[m, 1] - middle_v) * (polygon[o, 0] - middle_u)
+                whole += part
+                pass_on[n + m] += third * part
+                pass_on[n + o] += third * part
+            for m in range(many):
+                pass_on[n + m] += third * whole / many
+            for m in range(many):
+                u, v = polygon[m, 0], polygon[m, 1]
+                s = onto[0, 0] + (onto[0, 1] * u + onto[0, 2] * v)
+                t = onto[1, 0] + (onto[1, 1] * u + onto[1, 2] * v)
+                for k in range(3):
+                    corner[n + m, k], corner[n + m, 3 + k] = 4 * i + mine[k], 4 * j + theirs[k]
+                weight[n + m, 0], weight[n + m, 1], weight[n + m, 2] = 1.0 - (u + v), u, v
+                weight[n + m, 3], weight[n + m, 4], weight[n + m, 5] = -(1.0 - (s + t)), -s, -t
+        n += many
+    return n
