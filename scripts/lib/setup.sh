@@ -52,14 +52,6 @@ once() {
     ) 9>"${1%/}.setup.lock"
 }
 
-# in_turn COMMAND...: building hpcdem writes into the sources: not for two environments at the same time.
-in_turn() {
-    (
-        if command -v flock >/dev/null; then flock 8; fi
-        "$@"
-    ) 8>.setup.lock
-}
-
 # wheels_venv DIR EXTRAS: everything from wheels, MPI included; no root, any Linux.
 wheels_venv() {
     local python
@@ -76,7 +68,7 @@ fill_from_wheels() {
     rm -r "$uv_at"
     if [[ -n $filled ]]; then return; fi
     make_venv "$1" "$2" || return
-    if ! install_locked "$1" || [[ -n $extras ]]; then in_turn install "$1" --editable ".[$3]"; fi
+    if ! install_locked "$1" || [[ -n $extras ]]; then install "$1" --editable ".[$3]"; fi
 }
 
 # lock_without_uv FILE / lock_of_uv FILE: requirements.lock is what is installed, and the installer.
@@ -109,10 +101,10 @@ fill_with_uv() {
     "$uv" pip install -q --python "$2/bin/python" --require-hashes --only-binary :all: --no-deps --requirement "$1/lock" \
         >/dev/null 2>&1 &
     job=$!
-    in_turn "$uv" pip install -q --python "$2/bin/python" --no-deps --editable . pip >/dev/null 2>&1 || failed=yes
+    "$uv" pip install -q --python "$2/bin/python" --no-deps --editable . pip >/dev/null 2>&1 || failed=yes
     wait "$job" || failed=yes
     if [[ -z $failed && -n ${4:-} ]]; then
-        in_turn "$uv" pip install -q --python "$2/bin/python" --editable ".$4" >/dev/null 2>&1 || failed=yes
+        "$uv" pip install -q --python "$2/bin/python" --editable ".$4" >/dev/null 2>&1 || failed=yes
     fi
     [[ -z $failed ]] && compile_modules "$2"
 }
@@ -139,7 +131,7 @@ install_locked() {
             --requirement "$parts/$job" >"$parts/said-$job" 2>&1 &
         jobs+=($!)
     done
-    in_turn "$1/bin/pip" install -q --disable-pip-version-check --no-deps --editable . >"$parts/said-2" 2>&1 &
+    "$1/bin/pip" install -q --disable-pip-version-check --no-deps --editable . >"$parts/said-2" 2>&1 &
     jobs+=($!)
     for job in "${jobs[@]}"; do wait "$job" || failed=yes; done
     if [[ -z $failed ]]; then
@@ -222,7 +214,7 @@ fill_from_debian() {
     make_venv "$1" /usr/bin/python3 --system-site-packages &&
         # Debian's binaries hold to the numpy they were built with.
         /usr/bin/python3 -c 'import numpy; print("numpy==" + numpy.__version__)' >"$1/constraints.txt" &&
-        in_turn install "$1" --constraint "$1/constraints.txt" --editable ".[$2]" &&
+        install "$1" --constraint "$1/constraints.txt" --editable ".[$2]" &&
         # pip does not see Debian's h5py and brings its own without MPI, which would hide it.
         "$1/bin/pip" uninstall -qq --yes h5py
 }

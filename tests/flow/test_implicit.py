@@ -426,6 +426,7 @@ def test_a_well_opens_a_joint_and_is_shut_in() -> None:
     found = {}
     for drill in (True, False):
         sim, flow = plate()
+        sim.option(collision=True)
         equilibrium.solve_elastic(sim)
         if drill:
             flow.drill("w", at(sim, 0.0, 0.0))
@@ -439,6 +440,7 @@ def test_a_well_opens_a_joint_and_is_shut_in() -> None:
             assert flow.account()["given"] == pytest.approx(1e-4, rel=1e-12)
             assert 1e6 < flow.well_value("w", "pressure") < found[True][0]
             assert flow.well_value("w", "rate") == 0.0 and diagnostics.unbalanced_ratio(sim) < 1e-6
+            assert len(sim.event_rows) == diagnostics.joint_counts(sim)[2] >= 2  # each breaks once
     assert found[True] == pytest.approx(found[False], rel=1e-6, abs=1.0)
 
 
@@ -490,6 +492,98 @@ def test_a_file_in_mid_injection(tmp_path) -> None:
         one, other = (Flow.of(sim).values("flow-node", name) for sim in (whole, again))
         assert other == pytest.approx(one, rel=1e-9, abs=1e-12 * np.abs(one).max())
     assert Flow.of(again).implicit_dt == Flow.of(whole).implicit_dt
+
+
+# ---- faces that touch ----------------------------------------------------------------------------------------------
+
+
+def joint_stresses(sim: Blocks) -> np.ndarray:
+    """Normal and shear stress (n, 2) [Pa] of the joints while implicit steps go on."""
+    return sim.local.joint_means(sim.local.slot_of(Flow.of(sim).network.channels))[:, 2:]
+
+
+def test_faces_of_a_crack_press_on_each_other() -> None:
+    """A crack all along under the stress of the rock: it is carried, command after command; with pressure in the crack
+    they press by the rest, and part where the pressure is larger."""
+    sim, flow = plate()
+    sim.option(collision=True)
+    changes.crack(sim, flow.network.channels)
+    flow.fill(None, saturation=1.0)
+    for pressure in (0.0, 4e5, 4e5, 1.5e6):
+        hold(flow, flow.numbers("flow-node"), pressure)
+        with Coupled(sim, 1.0) as run:
+            run.advance(flow.time + 1.0)
+            normal, shear = joint_stresses(sim).T
+        assert np.abs(shear).max() < 1e-3 * 1e6
+        gone = pressure > 1e6
+        assert normal == pytest.approx(0.0 if gone else pressure - 1e6, rel=0.05, abs=1.0)
+        if gone:
+            assert flow.values("flow-channel", "aperture").min() > 1.1e-5
+        assert diagnostics.joint_counts(sim) == (0, 0, 0)  # a crack, not a joint that broke
+    assert not sim.event_rows and not (sim.broken > 0).any()
+
+
+def sheared(friction: float = 30.0) -> tuple[Blocks, Flow]:
+    """The same rock, its crack between stresses that friction does not hold."""
+    sim, flow = plate()
+    sim.option(collision=True)
+    law = {**JOINT, "friction": friction, "tensile_strength": 2e6, "penalty_normal": 100.0 * ROCK["young"]}
+    sim.joint_model(flow.network.channels, "classic_intrinsic_cohesive_interface", law)
+    changes.crack(sim, flow.network.channels)
+    sim.initial_stress(None, yy=-1e6, xy=8e5)
+    flow.fill(None, saturation=1.0)
+    return sim, flow
+
+
+@pytest.mark.parametrize("friction", [0.0, 20.0, 30.0])
+def test_faces_of_a_crack_rub(friction: float) -> None:
+    """No more shear than friction holds, and as much where they slip; pressure of the fluid takes it away."""
+    sim, flow = sheared(friction)
+    limit = math.tan(math.radians(friction))
+    for pressure in (0.0, 5e5):
+        hold(flow, flow.numbers("flow-node"), pressure)
+        with Coupled(sim, 1.0) as run:
+            run.advance(flow.time + 1.0)
+            normal, shear = joint_stresses(sim)[5:-5].T
+        assert normal.mean() == pytest.approx(pressure - 1e6, rel=0.05)
+        assert np.abs(shear) == pytest.approx(-limit * normal, rel=1e-6, abs=1.0)
+
+
+def test_rubbing_in_two_commands_or_one(tmp_path) -> None:
+    """Pressure makes a crack slip, then falls: what friction remembers is kept in between, also in a file."""
+    ends = []
+    for halves in (1, 2):
+        sim, flow = sheared()
+        sim.initial_stress(None, yy=-1e6, xy=5e5)
+        sim.table("p", [(0.0, 0.0), (4.0, 5e5), (8.0, 0.0)])
+        hold(flow, flow.numbers("flow-node"), "p")
+        for end in (8.0,) if halves == 1 else (6.0, 8.0):
+            flow.implicit_dt = 0.0
+            with Coupled(sim, 1.0) as run:
+                while flow.time < end - 1e-9:
+                    run.advance(end)
+                stresses = joint_stresses(sim)
+            if end == 6.0:
+                saved_state.save(sim, tmp_path / "middle.sav")
+                sim = Blocks()
+                saved_state.restore(sim, tmp_path / "middle.sav")
+                flow = Flow.of(sim)
+        ends.append((stresses, diagnostics.values(sim, "displacement_x")))
+    (one, moved), (other, again) = ends
+    assert np.abs(one[5:-5, 1]).max() > 1e5
+    assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
+    assert again == pytest.approx(moved, rel=1e-6, abs=1e-6 * np.nanmax(np.abs(moved)))
+
+
+def test_faces_that_slid_away_are_refused_by_name() -> None:
+    sim, _ = sheared()
+    sim.close_model()
+    moved = equilibrium.all_nodes(sim)
+    way = np.zeros_like(moved.x)
+    way[sim.mesh.centroids()[moved.lead // 4, 1] > 0.0] = 0.04, -2e-6
+    equilibrium.settle(sim, moved, moved.x + way, np.zeros_like(way))
+    with pytest.raises(CommandError, match=r"surfaces touch.* use relaxation"), Coupled(sim, 1.0):
+        pass
 
 
 SOIL = {**ROCK, "cohesion": 1e6, "tensile": 1e5}

@@ -193,7 +193,9 @@ class ModelDefinition:
         self.open = np.zeros(4 * elements, bool)
         """Faces that do not hold on to their partner (any more): broken, cracked, or the partner was taken out."""
         self.broken = np.zeros(4 * elements, np.uint8)
-        """By the lower face: 1 if the joint broke."""
+        """By the lower face: 1 if the joint broke; more, while it is a joint again, see pressed.py."""
+        self.slid: dict[int, tuple[float, ...]] = {}
+        """By face what broken joints remember of their slip at three points [m], see pressed.py."""
         self.face_row = np.zeros(4 * elements, np.int32)
         self.point_row = np.zeros(points, np.int32)
         self.load_row = np.zeros(4 * elements, np.int32)
@@ -1030,6 +1032,7 @@ class ModelDefinition:
         """All but the arrays, as JSON values."""
         return {
             "options": asdict(self.options),
+            "slid": [[face, *values] for face, values in sorted(self.slid.items())],
             "tables": {name: table.pairs() for name, table in self.tables.items()},
             "fields": {name: _plain(asdict(field)) for name, field in self.fields.items()},
             "varied": self.varied,
@@ -1048,6 +1051,7 @@ class ModelDefinition:
         """Inverse of `definition_state`."""
         self._closed = None
         self.options = Options(**state["options"])
+        self.slid = {int(row[0]): tuple(row[1:]) for row in state.get("slid", [])}
         self.tables = {name: Table.of(pairs, name) for name, pairs in state["tables"].items()}
         self.fields = {name: RandomField(**_bounds(field)) for name, field in state.get("fields", {}).items()}
         self.varied = [list(one) for one in state.get("varied", [])]

@@ -549,7 +549,7 @@ def joint_counts(sim: Blocks) -> tuple[int, int, int]:
     state = sim.local.slot_state[sim.local.lower_slots]
     counts = np.bincount(state, minlength=BROKEN + 1)[[INTACT, YIELDED, BROKEN]].astype(np.int64)
     intact, yielded, broken = sim.comm.sum_into(counts).tolist()
-    return intact, yielded, broken + int(sim.broken[sim.local.edges].sum())
+    return intact, yielded, broken + int((sim.broken[sim.local.edges] == 1).sum())
 
 
 def unbalanced_ratio(sim: Blocks) -> float:

@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, pressed, user_laws
 from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
@@ -456,6 +456,8 @@ class Blocks(State):
         """Joints that broke since the last rebuild, in order of steps, see `Crack`. Collective."""
         local, clock, rebuild_state = self.local, self.clock, self.rebuild_state
         slots = np.flatnonzero(local.slot_state == BROKEN)
+        face = local.slot_face[slots]
+        slots = slots[self.broken[np.minimum(face, self.partner[face])] <= 1]
         mine = np.column_stack([local.slot_face[slots].astype(float), local.slot_history[slots, MODE:]])
         rows = np.concatenate(self.comm.allgather(mine)) if self.comm.size > 1 else mine
         if not len(rows):
@@ -505,12 +507,13 @@ class Blocks(State):
 
     def _collect_events(self) -> None:
         """Joints that broke since the last rebuild become free faces, on all ranks. Collective."""
-        rows = self.waiting_events()
-        if rows:
+        rows, again = self.waiting_events(), np.flatnonzero(self.broken > 1)
+        if rows or len(again):
             self.event_rows += rows
-            joints = np.array([row[0] for row in rows])
+            joints = np.array([row[0] for row in rows], np.int64)
             self.broken[joints] = 1
-            self.open_faces(joints)
+            self.broken[again] = self.broken[again] == pressed.AGAIN
+            self.open_faces(np.append(joints, again))
             self.surface_loads.joints_opened()
 
     def close_again(self) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.numerics.exact_sum import exact_sum
-from hpcdem.physics.fdem import equilibrium, user_laws
+from hpcdem.physics.fdem import equilibrium, pressed, user_laws
 from hpcdem.physics.fdem.linear import MANY, MANY_IN_SPACE, Condensed, Direct, Petsc, Pieces, Unknowns, petsc_there
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.costs import Cost, implicit
@@ -136,6 +136,9 @@ class Coupled:
             equilibrium.refuse_loose_bodies(sim, self.nodes, self.of_blocks)
             sim.before_change()
             sim.close_model()
+            self.again = pressed.join(sim, self.nodes)
+            if len(self.again):
+                self._take_nodes()
         flow.implicit = True
         self.fluid = Fluid(flow, reference_pressure(flow, self._stress()))
         self.solver = self._solver()
@@ -145,6 +148,8 @@ class Coupled:
                 self._rest.__enter__()
             except CommandError:
                 self.solver.close()
+                flow.implicit = False
+                pressed.part(sim)
                 raise
         return self
 
@@ -152,15 +157,17 @@ class Coupled:
         self.flow.implicit = False
         if self.moves:
             sim = self.sim
-            if sim.comm.any(bool((sim.local.slot_state == equilibrium.BROKEN).any())):
-                sim._renew_lists()
+            pressed.part(sim)
             self._rest.__exit__(None, None, None)
             equilibrium.settle(sim, self.nodes, self.x, np.zeros_like(self.x))
-            if (pairs := equilibrium.touching(sim)) and sim.log is not None:
+            held = pressed.beside(sim, pressed.opposite(sim, self.x))
+            pairs = [pair for pair in equilibrium.touching(sim) if not held[list(pair)].all()]
+            if pairs and sim.log is not None:
                 one, other = pairs[0]
                 sim.log.warn(
-                    f"{len(pairs)} pairs of surfaces touch, the first of elements {one} and {other}: steps go on from "
-                    "here, further implicit ones do not"
+                    f"{len(pairs)} pairs of surfaces touch that are no faces of one joint, or have slid by more than "
+                    f"{pressed.APART:g} of its length, the first of elements {one} and {other}: steps go on from here, "
+                    "further implicit ones do not"
                 )
         self.solver.close()
 

@@ -475,7 +475,11 @@ class Flow(SurfaceLoad):
         faces = (4 * number[:, None] + np.arange(4))[np.arange(4) < corner_counts(mesh.cells[number])[:, None]]
         channel = np.zeros(mesh.cells.size, bool)
         channel[self.network.channels] = True
-        return wet_faces(mesh, blocks.partner, faces, blocks.closed_faces(), channel, self.network.there)
+        closed, again = blocks.closed_faces(), np.flatnonzero(blocks.broken > 1)
+        if len(again):  # free faces but for the static solve, see physics/fdem/pressed.py
+            closed = closed.copy()
+            closed[again] = closed[blocks.partner[again]] = False
+        return wet_faces(mesh, blocks.partner, faces, closed, channel, self.network.there)
 
     def corners(self, blocks: Any) -> np.ndarray:
         out = np.zeros((blocks.n_own, 4), bool)
