@@ -255,15 +255,8 @@ REFUSED_IN_SPACE = [
     ("face-joint c-model hydr-p-p-m property viscosity 1", "'hydraulic-porous-proppant-medium' is for two dimensions"),
     ("element c-model user 'a.py:a' property density 1", "'user' is for two dimensions"),
     ("element law 'a.py:a'", "'element law' is for two dimensions"),
-    ("element c-model therm-iso-h property conductivity 3", "'thermal-iso-heat' is for two dimensions"),
-    ("element property conductivity 3", "'conductivity' is for two dimensions"),
     ("element property parameter 'a' 3", "'parameter' is for two dimensions"),
-    ("element property young table 't' over temperature", "'over temperature' is for two dimensions"),
-    ("element c-model mech-m-c property coh table 't' over temperature", "'over temperature' is for two dimensions"),
-    ("element-face boundary m-s-b-c quiet on", "'quiet' is for two dimensions"),
     ("model option energy on", "'energy' is for two dimensions"),
-    ("node initial temperature 3", "'temperature' is for two dimensions"),
-    ("bolt create polyline (0,0) (1,1)", "'bolt create polyline' is for two dimensions"),
 ]  # fmt: skip
 
 
