@@ -384,10 +384,7 @@ KINDS = {
 others are loaded, or compiled, by the first model that needs them."""
 OF_PARTICLES = ("energy", "clumps")
 """Those that come when a model of particles asks for them."""
-OF_BLOCKS = (
-    "bolts", "liners", "flow", "proppant", "heat", "yielding", "creep", "tangent", "plastic-tangent", "space",
-    "heat-space", "yielding-space", "creep-space", "tangent-space", "hexes", "pictures",
-)  # fmt: skip
+OF_BLOCKS = tuple(kind for kind in KINDS if kind not in ("shared", "", "blocks", "coupled", *OF_PARTICLES))
 """Those that come when a model of blocks asks for them."""
 
 

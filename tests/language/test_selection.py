@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hpcdem.core.errors import CommandError
@@ -57,6 +57,7 @@ def test_a_quadrilateral_that_crosses_itself_is_taken_by_the_even_odd_rule():
 coordinate = st.integers(-4, 4).map(float) | st.floats(-4, 4)
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=30), coordinate, coordinate)
 def test_polygons_that_share_an_edge_share_no_particle_and_lose_none(points, a, b):
     """Two halves of a square cut from (a, -4) to (b, 4), whatever the cut, also for centres on it."""

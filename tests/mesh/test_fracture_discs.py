@@ -15,7 +15,8 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.fdem.mesh import Mesh, check
 from hpcdem.pre.mesh import fill, snap
 from hpcdem.pre.mesh.cracks import between_sides, faces_on, with_cracks
-from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles, area, area_inside, discs
+from hpcdem.pre.mesh.disc_sets import DiscSet, Poles
+from hpcdem.pre.mesh.fracture_discs import area, area_inside, discs
 from hpcdem.pre.mesh.fracture_sets import Length
 from hpcdem.pre.mesh.solids import made
 from tests.space.support import box

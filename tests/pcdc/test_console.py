@@ -71,7 +71,7 @@ def test_exit_ends(bench):
     [
         ("pcdc mod", "model"),
         ("pcdc model ", "new save restore gravity units option time-step step solve sub-step rayleigh creep"),
-        ("pcdc geom cr p", "polyline polygon point"),
+        ("pcdc geom cr p", "polyline polygon point plane"),
         ("pcdc model option dynamic ", "on off true false"),
         ("pcdc element c-model null ", "property relax range"),
         ("pcdc element-face c-model contact-m-c property p-n 1 p", "penalty-normal penalty-shear"),

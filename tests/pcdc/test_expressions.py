@@ -20,6 +20,7 @@ SAMPLES: dict[str, tuple[str, object]] = {
     "<i>": ("2", 2), "[<i>]": ("3", 3), "3": ("3", 3),
     "0|1|2": ("2", 2), "5|6|12": ("6", 6), "2|3": ("2", 2), "<s>": ("'a'", "a"),
     "on|off": ("on", True), "<v>": ("(1,2)", (1, 2)), "(<f>,<f>)": ("(1,2)", (1, 2)), "[<v>]": ("(1,2)", (1, 2)),
+    "<v> <v> [...]": ("(0,0) (1,0)", [(0, 0), (1, 0)]),
     "<v> <v> ...": ("(0,0) (1,0) (1,1)", [(0, 0), (1, 0), (1, 1)]), "<s> ...": ("'a' 'b'", ["a", "b"]),
 }  # fmt: skip
 """By the pattern of a kind: as it is written, and as an expression gives it."""
@@ -62,7 +63,7 @@ class Writer:
     def option(self, option: Option) -> str:
         """A keyword with its values and all that may follow it."""
         words = [option.name, *(self.value(kind) for kind in option.values if self.dim in kind.dims)]
-        return " ".join(words + [self.option(more) for more in option.more])
+        return " ".join(words + [self.option(more) for more in option.more if self.dim in more.dims])
 
 
 def _without(options: tuple[Option, ...], dim: int, *names: str) -> list[Option]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from hpcdem.core.errors import ScriptError
@@ -243,7 +245,7 @@ def test_every_example_of_the_table_is_read():
     examples = [(command.name, text) for command in PCDC.commands for text in command.example]
     assert len(examples) > 50 and {name for name, _ in examples} == {c.name for c in PCDC.commands}
     for name, text in examples:
-        dim = 3 if PCDC.command(name).dims == (3,) else 2
+        dim = 3 if PCDC.command(name).dims == (3,) or re.search(r"\(\S+?,\S+?,\S+?\)", text) else 2
         assert parse(text.removeprefix("pcdc"), "a.sc", 1, text, PCDC, dim=dim).command.name == name
 
 

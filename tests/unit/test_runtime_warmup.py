@@ -162,6 +162,9 @@ pcdc model new dim 3
 pcdc geometry create box (0,0,0) (1,1,1) as-layer 'cube'
 pcdc geometry create sphere (0,0,0) 1 as-layer 'ball'
 pcdc geometry create cylinder (0,0,0) (0,0,1) 1 as-layer 'core'
+pcdc geometry create cone (0,0,0) (0,0,1) 1 0.5 as-layer 'cone'
+pcdc geometry create disc (0,0,0) (0,0,1) 1 as-layer 'disc'
+pcdc geometry create plane (0,0,0) (0,0,1) as-layer 'plane'
 '''
 read = {statement.command.name for statement in check.read(text, "script.sc").statements}
 assert trial._TRIALS.keys() | {"model new"} == read

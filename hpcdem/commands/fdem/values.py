@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.pre.mesh.fracture_discs import DiscSet, Poles
+from hpcdem.pre.mesh.disc_sets import DiscSet, Poles
 from hpcdem.pre.mesh.fracture_sets import FractureSet, Length, Orientation
 from hpcdem.pre.mesh.sizes import spaced
 

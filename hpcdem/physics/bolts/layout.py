@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem.tetrahedra import FACES
+
 
 SHORTEST = 0.1
 """Crossings of edges that are nearer to each other than this part of the mean edge count once."""
@@ -88,6 +88,8 @@ def _crossings(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndar
 def _crossed_faces(a: np.ndarray, b: np.ndarray, corners: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Parts (k,) of the way from a to b, ascending, at which it crosses faces of tetrahedra: a + t (b - a) is a point
     of the face with the barycentric coordinates 1 - u - w, u, w."""
+    from hpcdem.physics.fdem.tetrahedra import FACES  # brings kernels with it; points are checked before there are any
+
     low, high = np.minimum(a, b), np.maximum(a, b)
     near = (cells[:, 0] >= 0) & (corners.min(axis=1) <= high).all(axis=1) & (corners.max(axis=1) >= low).all(axis=1)
     p, q, r = np.moveaxis(corners[near][:, FACES].reshape(-1, 3, len(a)), 1, 0)

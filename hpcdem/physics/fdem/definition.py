@@ -50,6 +50,8 @@ OVERLAP = REFUSE, RELAX, KEEP = "refuse", "relax", "keep"
 POTENTIAL = DISTANCE, MUNJIZA = "distance", "munjiza"
 """What contact in space presses with: the distance to the nearest side of an element, over a length of its body, or
 four times the smallest of its barycentric coordinates (Munjiza 2004)."""
+AGAIN, CRACK = 2, 3
+"""In `broken`: a joint that broke before, or never was whole, and is a joint again for so long (pressed.py)."""
 RAYLEIGH = {"both": (1.0, 1.0), "mass": (2.0, 0.0), "stiffness": (0.0, 2.0)}
 """Parts of Rayleigh damping, and the factors of both that make its ratio what was said at its frequency."""
 

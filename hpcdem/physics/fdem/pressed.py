@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hpcdem.physics.fdem.definition import AGAIN, CRACK
 from hpcdem.physics.fdem.histories import FIRST, KEY, STATE, WORDS, Histories
 from hpcdem.physics.fdem.kernels.joints import BROKEN, DAMAGE, MODE, SLIPPED
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 APART = 0.1
 """Opening and slip over the length of a joint up to which its faces count as opposite each other."""
-AGAIN, CRACK = 2, 3
-"""In `broken`: a joint that broke before, or never was whole, and is a joint again for so long."""
 
 
 def opposite(sim: Blocks, x: np.ndarray) -> np.ndarray:

@@ -28,8 +28,8 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, pressed, user_laws
-from hpcdem.physics.fdem.definition import COMPONENTS, DISTANCE, Numbers
+from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_laws
+from hpcdem.physics.fdem.definition import AGAIN, COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
 from hpcdem.physics.fdem.kernels.creep_tets import IN_KELVIN
@@ -512,7 +512,7 @@ class Blocks(State):
             self.event_rows += rows
             joints = np.array([row[0] for row in rows], np.int64)
             self.broken[joints] = 1
-            self.broken[again] = self.broken[again] == pressed.AGAIN
+            self.broken[again] = self.broken[again] == AGAIN
             self.open_faces(np.append(joints, again))
             self.surface_loads.joints_opened()
 
