@@ -10,7 +10,6 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError
 
-
 SHORTEST = 0.1
 """Crossings of edges that are nearer to each other than this part of the mean edge count once."""
 INSIDE = 1e-9
