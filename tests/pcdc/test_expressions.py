@@ -43,6 +43,10 @@ class Writer:
     def value(self, kind: kinds.Kind) -> str:
         if self.dim == 3 and kind.pattern in ("<v>", "[<v>]"):
             text, value = "(1,2,3)", (1, 2, 3)
+        elif self.dim == 3 and kind.pattern == "<v> <v> [...]":
+            text, value = "(0,0,0) (1,0,0)", [(0, 0, 0), (1, 0, 0)]
+        elif self.dim == 3 and "tet" in kind.words:
+            text, value = "tet", "tet"
         else:
             text, value = self._sample(kind)
         if not self.expressions:
