@@ -14,6 +14,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.coupled import Coupled
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat import kernels
 from hpcdem.physics.heat.fluid import FluidHeat
 from hpcdem.physics.heat.implicit import Implicit
 from hpcdem.physics.heat.model import Heat
@@ -95,6 +96,24 @@ def test_a_sub_step_against_plain_sums(second: float) -> None:
     )  # fmt: skip
     assert np.abs(wanted - t).max() > 5.0 and of_nodes(flow) == pytest.approx(wanted, abs=1e-9)
     assert fluid.wall_heat.sum() == pytest.approx(to_rock, rel=1e-10)
+
+
+@pytest.mark.parametrize(("before", "after"), [(0.0, 1e-12), (1e-9, 1e-12), (1e-6, 5e-7), (3e-7, 9e-7)])
+def test_a_node_that_hands_what_comes_to_the_rock(before: float, after: float) -> None:
+    """1e-6 m2 at 200 degrees flow into a node at 20: what leaks off mixes with them first, so the temperature is that
+    of the mixture, however little stays; the account has what it took along."""
+    state = np.zeros((2, kernels.FLUID_STATE))
+    state[:, kernels.T] = 200.0, 20.0
+    out, given, dt = np.zeros(2), np.zeros(2), 1e-3
+    kernels.carry(
+        dt, np.array([0, 1, 2]), np.array([0, 0]), np.array([-1.0, 1.0]), np.array([[0, 1]]), np.array([1e-6 / dt]),
+        np.array([200.0]), np.zeros(1), np.zeros((1, 4), np.int64), np.zeros(1), np.zeros(1), np.full(2, -1),
+        np.zeros(1), np.array([2e-6, before]), np.array([1e-6, after]), np.array([0.0, before + 1e-6 - after]), RHO_C,
+        state, out, given,
+    )  # fmt: skip
+    mixed = (before * 20.0 + 1e-6 * 200.0) / (before + 1e-6)
+    assert out == pytest.approx([200.0, mixed], rel=1e-12)
+    assert given[1] == pytest.approx(-RHO_C * (before + 1e-6 - after) * mixed, rel=1e-12) and abs(given[0]) < 1e-9
 
 
 def test_heat_goes_over_to_the_rock() -> None:

@@ -184,7 +184,6 @@ def test_of_two_threads(late, tmp_path: Path) -> None:
     assert late(1, "both.sc", "-j", 2) == [NOTHING]
 
 
-@pytest.mark.xfail(reason="a late kernel is not told since rng is loaded by others first: to be mended")
 def test_what_was_forgotten_is_told_and_not_stored(launch: Launcher, tmp_path: Path) -> None:
     """A kernel of the particles with arguments that no run has."""
     (tmp_path / "model.py").write_text(

@@ -149,6 +149,7 @@ class Flow(SurfaceLoad):
         self.kept = np.empty(0)
         """Part of the fluid of this rank's nodes (n,) that the last change of channels left there."""
         self.carried: np.ndarray | None = None
+        self._leaked_before = np.empty(0)
         """Volumes [m2] that flowed along the channels of this rank in the last cycle; None: nobody asks."""
         self._told: tuple[float, float] = (0.0, 0.0)
 
@@ -618,6 +619,7 @@ class Flow(SurfaceLoad):
         self._law_table = self.laws()
         self._table = np.empty((len(ends), kernels.CHANNEL))
         self.carried = None if self.carried is None else np.empty(0)
+        self._leaked_before = np.empty(0)
         self.find_geometry()
         lost = int(comm.max_into(np.array([lost], np.int64))[0])
         if lost >= 0:
@@ -819,6 +821,7 @@ class Flow(SurfaceLoad):
                 self._find_step()
             if self.carried is not None:
                 self.carried = np.zeros(len(self._ends))
+                self._leaked_before = self.nodes[:, kernels.LEAKED].copy()
             for _ in range(self.sub_steps):
                 self._sub_step()
             self.cycles += 1
@@ -886,6 +889,14 @@ class Flow(SurfaceLoad):
         if passes:
             return well.asked(time, time + dt, value)
         return well.asked_now(time, dt, value)
+
+    def leaked(self) -> np.ndarray:
+        """What each of this rank's nodes (n,) lost to the rock in the last cycle [m2], where `carried` is kept; nothing
+        where flow is switched off. Not collective."""
+        nodes = self.nodes[:, kernels.LEAKED]
+        if self.carried is None or not self.blocks.options.hydraulic or len(self._leaked_before) != len(nodes):
+            return np.zeros(len(nodes))
+        return nodes - self._leaked_before
 
     @property
     def _condition(self) -> np.ndarray:

@@ -259,7 +259,7 @@ class FluidHeat:
         delta = np.where(there, aperture[known], 0.0) if len(q) else np.zeros(len(known))
         w0, w, room = self.had, flow.nodes[:, flowing.W], flow.nodes[:, flowing.V]
         least = np.minimum(w0, w)
-        self._period, self._passed, self._w0 = period, 0.0, w0.copy()
+        self._period, self._passed, self._w0, self._leaked = period, 0.0, w0.copy(), flow.leaked()
         wet = np.minimum(np.divide(least, room, out=np.zeros(n), where=room > 0.0), 1.0)
         self.state[:n, kernels.S], self.state[:n, kernels.X], self.state[:n, kernels.FULL] = wet, part(wet), w0
         self._refresh()
@@ -279,13 +279,13 @@ class FluidHeat:
             into = self._q if end else -self._q
             counts = np.abs(into) if self._second else np.maximum(into, 0.0)
             passes += np.bincount(ends[:, end], counts, total)[: len(w)]
-        more = np.maximum(w - w0, 0.0) / period if period > 0.0 else 0.0
+        more = (np.maximum(w - w0, 0.0) + self._leaked) / period if period > 0.0 else 0.0
         there = least > 0.0
         most = np.where(there, least, w)
         rate = np.divide(np.where(there, np.maximum(passes - more, 0.0), 0.0), most, out=np.zeros(len(w)),
                          where=most > 0.0)  # fmt: skip
         drained = ~there & (w > 0.0)  # filled just now: what has come in is all that is there
-        rate[drained] = np.maximum(passes[drained] / w[drained] - 1.0 / period, 0.0)
+        rate[drained] = np.maximum(passes[drained] / (w + self._leaked)[drained] - 1.0 / period, 0.0)
         for end in range(2):
             passed = np.bincount(ends[:, end], self._conduct, total)[: len(w)]
             rate += np.divide(passed, self.rho_c * least, out=np.zeros(len(w)), where=there)
@@ -314,6 +314,7 @@ class FluidHeat:
         short = dt / count
         self.wall_heat[:] = 0.0
         face, fresh = np.empty(len(self.channels)), np.empty(n)
+        lost = short / self._period * self._leaked if self._period > 0.0 else self._leaked
         for k in range(count):
             share = min(1.0, (self._passed + (k + 1) * short) / self._period) if self._period > 0.0 else 1.0
             w = self._w0 + share * (w1 - self._w0) if share < 1.0 else w1.copy()
@@ -322,7 +323,8 @@ class FluidHeat:
             kernels.faces(self._ends, self._q, self._length, self._second, short, self.state, face)
             kernels.carry(
                 short, self._begin, self._channel, self._side, self._ends, self._q, face, self._conduct, self._walls,
-                self._exchange, t, self._held, table, self.had, w, self.rho_c, self.state, fresh, self.given,
+                self._exchange, t, self._held, table, self.had, w,
+                lost, self.rho_c, self.state, fresh, self.given,
             )  # fmt: skip
             self.state[:n, kernels.T], self.state[:n, kernels.FULL], self.had = fresh, w, w
             self._refresh()

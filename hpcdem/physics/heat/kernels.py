@@ -267,6 +267,8 @@ def thermal_stress(quad, t, stiffness, unstressed, out):
 # by other heat than what flows in [K/s].
 T, S, X, U, FROM, FULL, RISE = range(7)
 FLUID_STATE = 7
+LITTLE_MORE = 1.0 + 1e-6
+"""Rounding of what nodes leak, a difference of sums, over what the balance of a node says."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -326,11 +328,13 @@ def faces(ends, q, length, second, dt, state, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def carry(
-    dt, begin, channel, side, ends, q, face, conduct, walls, exchange, t, held, table, before, after, rho_c, state, out,
-    given,
+    dt, begin, channel, side, ends, q, face, conduct, walls, exchange, t, held, table, before, after, leaked, rho_c,
+    state, out, given,
 ):  # fmt: skip
-    """Temperatures out (n,) of own flow nodes after dt [s], with fluid before, after (n,) [m2] of heat capacity rho_c
-    [J/(m3 K)]; the walls (m, 4) in t, flat, two at each end, count with the new temperature of the node.
+    """Temperatures out (n,) of own flow nodes after dt [s], with fluid before, after, and leaked to the rock (n,) [m2]
+    of heat capacity rho_c [J/(m3 K)]; the walls (m, 4) in t, flat, two at each end, count with the new temperature of
+    the node, and so does what leaks: a node that hands all that comes to the rock stays between the temperatures
+    around it.
 
     face (m,): temperatures of what flows; conduct, exchange (m,) [W/(m K)]; held (n,): row of the table of prescribed
     temperatures, -1: free; given (n,) [J/m]: heat by conditions is booked.
@@ -348,15 +352,18 @@ def carry(
             for k in range(2 * end, 2 * end + 2):
                 passes += a
                 wall += a * (t[walls[c, k]] - old)
+        came = (after[i] - before[i]) - dt * net
+        gone = min(max(-came, 0.0), LITTLE_MORE * leaked[i])  # it mixes with what flows in before it goes
         capacity = rho_c * after[i]
-        new, whole = old, capacity + dt * passes
+        new, whole = old, rho_c * (after[i] + gone) + dt * passes
         if held[i] >= 0:
             new = table[held[i]]
-        elif whole > 0.0:
-            new = old + dt * (rho_c * carried + conducted + wall) / whole
-        brought = rho_c * old * ((after[i] - before[i]) - dt * net)
-        if held[i] >= 0:
+            brought = rho_c * old * came
             brought += capacity * (new - old) - dt * (rho_c * carried + conducted + wall - passes * (new - old))
+        else:
+            if whole > 0.0:
+                new = old + dt * (rho_c * carried + conducted + wall) / whole
+            brought = rho_c * old * (came + gone) - rho_c * gone * new
         given[i] += brought
         out[i] = new
 

@@ -55,7 +55,7 @@ def _fluid() -> None:
     kernels.rises(begin, channel, side, ends, one, walls, one, one, held, 1.0, state[:2], state)
     kernels.faces(ends, one, one, True, 1.0, state, face)
     kernels.carry(
-        1.0, begin, channel, side, ends, one, face, one, walls, one, one, held, one, two, two, 1.0, state, out, out
+        1.0, begin, channel, side, ends, one, face, one, walls, one, one, held, one, two, two, two, 1.0, state, out, out
     )
     kernels.to_walls(1.0, ends, walls, one, one, state, wall_heat)
     kernels.from_walls(walls, wall_heat, one)
