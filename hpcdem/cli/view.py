@@ -10,7 +10,7 @@ import click
 
 from hpcdem.cli.common import HELP, PATH, messages_only, read_command_line
 from hpcdem.core.errors import EXIT_OK, UsageError
-from hpcdem.runtime import launch
+from hpcdem.runtime import launch, run_folder
 
 if TYPE_CHECKING:
     from hpcdem.page.desk import Desk
@@ -61,9 +61,7 @@ def start(words: list[str]) -> NoReturn:
 
             paths, desk = [*options["paths"]], desk_of(options)
             if desk is not None:
-                from hpcdem.page.desk import FOLDER
-
-                paths = [desk.console.outdir, desk.console.outdir / FOLDER, *paths[1:]]
+                paths = [desk.console.outdir, desk.console.outdir / run_folder.PRESENT, *paths[1:]]
             elif not paths:
                 raise UsageError("expected a folder or file with frames, or --run [SCRIPT]")
             serve(paths, options["view_file"], options["port"], not options["no_browser"], click.echo, desk)

@@ -17,8 +17,7 @@ from hpcdem.io.vtkhdf import write_vtkhdf
 from hpcdem.io.vtkhdf_mesh import write_mesh_frame
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.simulation import Simulation
-
-FOLDER = "now"
+from hpcdem.runtime import run_folder
 
 
 def particles(sim: Simulation) -> Path | None:
@@ -27,7 +26,7 @@ def particles(sim: Simulation) -> Path | None:
         return None
     sim.close()
     output.settle(sim)
-    path = output.folder(sim) / FOLDER / frame_name(sim.clock.step, ".vtkhdf")
+    path = output.folder(sim) / run_folder.PRESENT / frame_name(sim.clock.step, ".vtkhdf")
     return _alone(path, lambda: write_vtkhdf(path, diagnostics.frame(sim), sim.comm))
 
 
@@ -38,7 +37,7 @@ def blocks(project: Project) -> Path | None:
     except CommandError:
         return None
     mesh_frames.settle(project)
-    path = project.folder() / FOLDER / f"{FOLDER}_{project.step:010d}.vtkhdf"
+    path = project.folder() / run_folder.PRESENT / f"{run_folder.PRESENT}_{project.step:010d}.vtkhdf"
     return _alone(path, lambda: write_mesh_frame(path, mesh_frames.frame(project), project.comm))
 
 

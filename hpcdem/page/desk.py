@@ -24,9 +24,8 @@ from hpcdem.core.errors import HpcdemError, ScriptError
 from hpcdem.lang import detect
 from hpcdem.page.pipe import DONE, MARK, READY
 from hpcdem.page.server import Answer, Call, as_json
+from hpcdem.runtime import run_folder
 
-FOLDER = "now"
-"""Below the results: what the console shows of its model (commands/present.py)."""
 LANGUAGES = ("pcdc", "zdem")
 LINES = 5000
 """Lines of output that are kept."""
@@ -91,7 +90,7 @@ class Console:
             raise HpcdemError(f"language: expected one of {', '.join(LANGUAGES)}")
         with self.lock:
             self.end()
-            for frame in (self.outdir / FOLDER).glob("*.vtkhdf"):  # of a model that is no more
+            for frame in (self.outdir / run_folder.PRESENT).glob("*.vtkhdf"):  # of a model that is no more
                 frame.unlink(missing_ok=True)
             self.language = language
             root = str(Path(__file__).resolve().parents[2])

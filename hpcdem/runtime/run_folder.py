@@ -23,6 +23,8 @@ from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of
 from hpcdem.io.run_record import RECORD, Record, is_older, left_behind, read
 
+PRESENT = "now"
+"""Folder below the results: the present state of a model to which commands are typed (commands/present.py)."""
 _NUMBERED = re.compile(r"(auto_)?(\d{10,})\.sav")
 
 _held: dict[Path, FolderLock] = {}

@@ -414,7 +414,7 @@ def test_properties_by_temperature(name: str, at: tuple[float, float], of: str) 
     there = at[0] + 0.25 * (at[1] - at[0])
     found = run(Over("by_heat", TEMPERATURE))
     exactly = run(there)
-    if name in ("young", "cohesion"):  # moduli are those of the largest times a part, yield surfaces made anew
+    if name in ("young", "cohesion"):  # moduli are those of the largest times a part, yield surfaces are computed again
         assert found == pytest.approx(exactly, rel=1e-9, abs=1e-12)
     else:
         assert np.array_equal(found, exactly)

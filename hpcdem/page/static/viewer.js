@@ -591,7 +591,7 @@ async function look() {
       try { await begin(); } finally { beginning = false; }
     }
     if (about) {
-      let anew = false;
+      let rewritten = false;
       windows.forEach((one) => {
         const old = before[one.source];
         const found = state.sources.findIndex((source) => source.name === old?.name);
@@ -600,12 +600,12 @@ async function look() {
         const now = state.sources[found], n = now.frames.length;
         if (one.frame !== old.frames.length - 1) return;
         if (now.stamp === old.stamp && n === old.frames.length) return;
-        if (now.stamp !== old.stamp && n === old.frames.length) anew = true;  // the same frame was written again
+        if (now.stamp !== old.stamp && n === old.frames.length) rewritten = true;
         else if (!$("follow").checked) return;
         one.frame = n - 1;
         one.redraw();
       });
-      if (anew) await renewed();
+      if (rewritten) await renewed();
       controls();
       histories();
     }

@@ -28,7 +28,7 @@ add({
     state_running: "running on {host}", state_done: "done at step {step}", state_stopped: "stopped at step {step}",
     state_failed: "failed at step {step}", state_killed: "killed", frames: "{n} frames", part: "{shown} of {all}",
     desk: "Commands", console: "Console", editor: "Scripts", tongue: "Language of commands", interrupt: "Interrupt",
-    restart: "Start anew", restart_title: "End the process and begin with an empty model",
+    restart: "Restart", restart_title: "End the process and begin with an empty model",
     restart_sure: "End the process? Its model is lost.", output: "What was said", input: "A command", clear: "Clear",
     desk_busy: "at work …", desk_ready: "ready", desk_off: "begins with the first command", script: "Script",
     script_new: "New…", script_save: "Save", script_save_title: "Ctrl+S", script_save_as: "Save as…", script_check: "Check",

@@ -177,6 +177,8 @@ class Flow(SurfaceLoad):
         """Joints (None: all) are channels with these properties. Fluid that has no room any more goes with it; new room
         is dry."""
         at = self.blocks.numbers_of_joints(joints)
+        if not len(at):
+            raise CommandError("there is no joint here that could be a channel; between hexahedra there are none")
         self._put(at, self.blocks.complete(JOINT, at, POROUS, {}, given))
 
     def adjust(self, joints: np.ndarray | None, given: Mapping[str, Value]) -> None:
