@@ -194,7 +194,8 @@ def test_who_sends_nothing_is_not_waited_for(server, monkeypatch):
 
 
 def test_more_conversations_than_allowed_are_closed_and_later_ones_answered(server, monkeypatch):
-    monkeypatch.setattr(server, "free", threading.BoundedSemaphore(2))
+    free = threading.BoundedSemaphore(2)
+    monkeypatch.setattr(server, "free", free)
     lines = [socket.create_connection(("127.0.0.1", server.server_port), timeout=10) for _ in range(3)]
     assert lines[2].recv(1) == b""
     for line in lines:
@@ -203,7 +204,9 @@ def test_more_conversations_than_allowed_are_closed_and_later_ones_answered(serv
     while time.monotonic() < deadline:
         try:
             if ask(server, "GET", f"/{server.key}/")[0] == 200:
-                return
+                break
         except (OSError, http.client.HTTPException):
             time.sleep(0.05)
-    pytest.fail("not answered again")
+    else:
+        pytest.fail("not answered again")
+    assert all(free.acquire(timeout=10) for _ in range(2)), "conversations that have ended were not counted"
