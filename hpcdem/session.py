@@ -274,6 +274,12 @@ def _proppant() -> WarmUp:
     return warm_up.warm_up, (kernels,)
 
 
+def _proppant_space() -> WarmUp:
+    from hpcdem.physics.proppant import kernels_space, warm_up
+
+    return warm_up.in_space, (kernels_space,)
+
+
 def _heat() -> WarmUp:
     from hpcdem.physics.heat import kernels, warm_up
 
@@ -367,6 +373,7 @@ KINDS = {
     "flow": Kernels(_flow),
     "flow-space": Kernels(_flow_space, after=("space", "flow")),
     "proppant": Kernels(_proppant, after=("flow",)),
+    "proppant-space": Kernels(_proppant_space, after=("proppant", "flow-space")),
     "heat": Kernels(_heat),
     "heat-space": Kernels(_heat_space, after=("space", "heat")),
     "yielding": Kernels(_yielding),

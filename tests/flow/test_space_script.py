@@ -47,8 +47,8 @@ pcdc model step 150
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("flow-node initial concentration 0.2", "two dimensions"),
-        ("face-joint c-model hydr-p-p-m property fluid-density 1000", "two dimensions"),
+        ("face-joint c-model thermal-fluid property conductivity 0.6", "two dimensions"),
+        ("node boundary therm-f-b-c temperature 20", "two dimensions"),
     ],
 )
 def test_what_is_not_there_in_space_is_refused_by_name(line: str, says: str) -> None:

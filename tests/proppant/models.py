@@ -10,7 +10,7 @@ from hpcdem.physics.fdem.groups import CHANNEL, FLOW_NODE
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.proppant.model import CONCENTRATION, RATE, Proppant
-from tests.flow.models import bursting, move, pumped, seeping, water_bursts
+from tests.flow.models import bursting, it_tears, more_in_space, move, pumped, seeping, tearing, water_bursts
 from tests.flow.models import more as burst_on
 from tests.flow.models import result as of_fluid
 from tests.parallel.model import Found, Model
@@ -53,6 +53,30 @@ def sand_on(sim: Blocks) -> None:
         sim.parts(proppant=True)
 
 
+def sandy_in_space(sim: Blocks) -> None:
+    """Slurry is pumped into a bar of tetrahedra that flies through the strips of the ranks, and tears it apart."""
+    tearing(sim)
+    proppant = Proppant.of(sim)
+    joints = Flow.of(sim).network.channels
+    proppant.assign(joints[joints % 11 > 0], SAND)
+    x = sim.mesh.points[:, 0]
+    proppant.fill(np.flatnonzero(x < 0.5), 0.3)
+    Flow.of(sim).fill(np.flatnonzero(x > 1.1), saturation=1.0)
+    proppant.fill(np.flatnonzero(x > 1.1), 0.35)
+    sim.table("sand", [(0.0, 0.1), (3e-4, 0.3), (1.0, 0.3)])
+    proppant.prescribe(np.flatnonzero((x > 0.3) & (x < 0.95)), CONCENTRATION, "sand")
+    proppant.prescribe(np.flatnonzero(x < 0.05), RATE, 2e-5)
+
+
+def sand_on_in_space(sim: Blocks) -> None:
+    """What happens to it."""
+    more_in_space(sim)
+    if sim.clock.step == 400:
+        Proppant.of(sim).adjust({"proppant_concentration_limit": 0.33, "proppant_size": 5e-5})
+    if sim.clock.step in (700, 750):
+        sim.parts(proppant=sim.clock.step == 750)
+
+
 def muddy(sim: Blocks) -> None:
     """Mud rises in a block that stands still, then moves, and settles in it."""
     seeping(sim)
@@ -86,6 +110,12 @@ def sand_bursts(found: Found) -> None:
     assert found["sand_packed"] > 0.0 and found["sand_removed"] > 0.0 and found["pack_pressure"].max() > 0.0
 
 
+def sand_tears(found: Found) -> None:
+    it_tears(found)
+    sand_moves(found)
+    assert found["sand_packed"] > 0.0 and found["sand_removed"] > 0.0 and found["pack_pressure"].max() > 0.0
+
+
 def mud_rises(found: Found) -> None:
     wet = found["flow-node_saturation"]
     assert (wet == 1.0).sum() > 5 and ((wet > 0.0) & (wet < 1.0)).sum() > 20
@@ -96,5 +126,6 @@ def mud_rises(found: Found) -> None:
 MODELS = {
     "bursting with sand": Model(sandy, result, sand_bursts, sand_on, steps=1100, middle=703),
     "sand by wells": Model(sandy_wells, result, sand_moves, sand_on, steps=1100, middle=703, slow=True),
+    "sand in space": Model(sandy_in_space, result, sand_tears, sand_on_in_space, steps=900, middle=603),
     "mud": Model(muddy, result, mud_rises, move, steps=1300, middle=703),
 }

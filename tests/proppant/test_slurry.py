@@ -179,11 +179,6 @@ def test_kernels_compute_what_the_plain_loop_does() -> None:
     state[:, own.C], state[:, own.PACKED] = c, packed
     table = np.zeros((m, kernels.CHANNEL))
     table[:, kernels.APERTURE] = delta
-    # Both faces of a channel along x, a unit long: corners that begin at 4 c of x and of the other half.
-    x = np.zeros((2 * m, 4))
-    x[:m, 2], x[m:, 0] = 1.0, 1.0
-    x = x.reshape(-1)
-    one, other = 4 * np.arange(m), 4 * (m + np.arange(m))
     both = np.concatenate([ends[:, 0], ends[:, 1]])
     order = np.argsort(both, kind="stable")
     begin = np.searchsorted(both[order], np.arange(n + 1))
@@ -191,9 +186,7 @@ def test_kernels_compute_what_the_plain_loop_does() -> None:
     out, takes, dt = np.zeros((m, 2)), np.zeros(n), 0.02
     fluid = np.zeros((n, kernels.STATE))
     fluid[:, kernels.S] = rng.choice([0.3, 1.0], n)
-    for k in range(m):  # a grain's velocity is one for all: channels one by one
-        own.carry(ends[k : k + 1], one[k : k + 1], other[k : k + 1], carries[k : k + 1], x, q[k : k + 1],
-                  table[k : k + 1], fluid, 2e-3, along[k], 0.0, state, out[k : k + 1])  # fmt: skip
+    own.carry(ends, along, carries, q, table, fluid, 2e-3, 1.0, state, out)
     own.give(begin, channel, side, out, dt, nodes, state)
     own.come(begin, channel, side, ends, out, dt, nodes, state)
     for _ in range(4):

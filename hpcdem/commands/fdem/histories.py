@@ -22,7 +22,8 @@ from hpcdem.physics.flow.model import Flow
 
 IN_SPACE = (
     "time", "cycle", "ratio", "intact_joints", "yielded_joints", "broken_joints", "flow_time", "fluid_given",
-    "fluid_stored", "fluid_leaked", "heat_time", "heat_given", "heat_stored",
+    "fluid_stored", "fluid_leaked", "proppant_came", "proppant_stored", "proppant_packed", "proppant_left", "heat_time",
+    "heat_given", "heat_stored",
 )  # fmt: skip
 """What a history of a model in three dimensions can follow."""
 FLUSH = 500

@@ -101,18 +101,14 @@ def close(project: Project, figure: bool = True) -> None:
                 found = there.energies()
                 rows = [(SUPPORT_WORDS[name], f"{found[name]:.6g}") for name in SUPPORT_WORDS if name in found]
                 log.table(f"energy of {support.name}", ("energy", "J/m"), rows)
-    flow = Flow.there(blocks)
+    flow, volume = Flow.there(blocks), "m2" if blocks.dim == 2 else "m3"
     if flow is not None:
         found = flow.account()
-        log.table(
-            "fluid",
-            ("volume", "m2" if blocks.dim == 2 else "m3"),
-            [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS],
-        )
+        log.table("fluid", ("volume", volume), [(FLUID_WORDS[k], f"{found[k]:.6g}") for k in FLUID_WORDS])
     proppant = Proppant.there(blocks)
     if proppant is not None:
         found = proppant.account()
-        log.table("proppant", ("volume", "m2"), [(PROPPANT_WORDS[k], f"{found[k]:.6g}") for k in PROPPANT_WORDS])
+        log.table("proppant", ("volume", volume), [(PROPPANT_WORDS[k], f"{found[k]:.6g}") for k in PROPPANT_WORDS])
     heat = Heat.there(blocks)
     if heat is not None:
         found = heat.account()

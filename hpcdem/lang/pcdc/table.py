@@ -339,8 +339,8 @@ PROPPANT_CONDITION = Model(
     (Option("p{roppant}-v{olumetric}-c{oncentration}", (TABLED,), "concentration of the slurry that conditions and "
             "wells bring: volume of grains over that of the slurry", "1"),
      Option("p{roppant}-v{olumetric}-f{low}-r{ate}", (TABLED,), "volume of grains that comes in at each node, in the "
-            "slurry that is there", "m2/s")),
-    any_of=True,
+            "slurry that is there; in space m3/s", "m2/s")),
+    any_of=True, dims=BOTH,
 )  # fmt: skip
 CONST_HEAT = Model(
     "therm{al}-c{onst}-h{eat}", "16",
@@ -412,13 +412,14 @@ GRAINS = Model(
     "",  # p-s is the penalty of shear where cohesive models are changed too
     tuple(replace(o, notation="prop{pant}-s{ize}") if o.name == "proppant-size" else o for o in _GRAINS),
     of=PROPPANT_PROPERTIES,
+    dims=BOTH,
 )
 PROPPANT = Model(
     "hydr{aulic}-p{orous}-p{roppant}-m{edium}", "17",
     "Fluid in joints that carries proppant, one kind in all channels. Grains move with the slurry, make it heavier and "
     "more viscous, settle, and bridge where it is narrow. A node that is filled to the limit is a pack: no grains pass "
     "it, fluid does, and the walls lean on it.",
-    (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES,
+    (*_POROUS, *_GRAINS), of=MEDIUM_PROPERTIES, dims=BOTH,
 )  # fmt: skip
 
 # ---- bolts (tables 19 to 21) ---------------------------------------------------------------------------------------
@@ -631,7 +632,7 @@ _MODEL = (
                 Option("therm{al}", (BOOL,), "heat flows in elements that have a thermal model; off: temperatures, and "
                        "the stress that they bring, stay as they are", default="on"),
                 Option("prop{pant}", (BOOL,), "grains move in the fluid of channels that carry them; off: they stay "
-                       "where they are", default="on", dims=PLANE)),
+                       "where they are", default="on")),
             needs_option=True, manual=True, dims=BOTH),
     Command("mod{el} time-s{tep}", "The time step of dynamic runs. In static runs a step is one unit of time. Without "
             "this command it is estimated at the first step and after each change of the model. Of value, mass-scaling "
@@ -1001,8 +1002,7 @@ _OBJECTS = (
                                                "pcdc flow-node initial pressure 1e6 range x 0 1"),
             options=(Option("p{ressure}", (NOT_NEGATIVE,), "filled, at this pressure", "Pa"),
                      Option("sat{uration}", (limited(0.0, 1.0, True),), "part of the room that is filled", "1"),
-                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1",
-                            dims=PLANE)),
+                     Option("conc{entration}", (NOT_NEGATIVE,), "of proppant in the fluid that is there", "1")),
             ranged="node", needs_option=True, dims=BOTH),
     Command("well cr{eate}", "Flow nodes of a range are a well: one room, whose pressure is that at its highest node. "
             "Stages say what it does; without one it is shut in.",

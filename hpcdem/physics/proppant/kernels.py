@@ -3,7 +3,8 @@
 Finite volumes after 7.7 of the manual, (119) to (137). Proppant N [m2] of a node moves along a channel with the slurry
 and settles in it: C q and C delta (1 - mean C)^5.65 v (Richardson & Zaki 1954), each of the node that it comes from.
 Two factors per node keep this within bounds and its volume the same: `GIVES`, of all that leaves a node, so that no
-more leaves than is there, and `TAKES`, of all that comes, so that a node is filled to the limit and not beyond.
+more leaves than is there, and `TAKES`, of all that comes, so that a node is filled to the limit and not beyond. In
+space "channels" are the links of triangles (kernels_space.py), m2 are m3.
 """
 
 from __future__ import annotations
@@ -35,24 +36,32 @@ NEAR = 0.999
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def carry(ends, one, other, carries, x, q, channels, fluid, narrow, vx, vy, state, out):
-    """What channels carry, out (m, 2) [m2/s]: volume rates of proppant. one, other (m,): where both faces begin in x;
-    carries (m,) bool; q (m,): flow of slurry [m2/s]; fluid: state of the flow's nodes, grains settle in as much of a
-    channel as is filled at both ends; narrow [m]: least aperture that grains pass; vx, vy: velocity of
-    a single grain [m/s]. Slurry that flows brings none into a pack and takes none out of it; grains settle into one
-    that is not quite full, and out of one with room below."""
+def falls(one, other, x, down, out):
+    """How far down each channel goes, out (m,): the cosine of its angle to down (2,), a direction. one, other (m,):
+    where both faces begin in x."""
     x = x.reshape(x.size)
+    for c in range(len(one)):
+        i, j = one[c], other[c]
+        wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
+        wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
+        out[c] = (down[0] * wx + down[1] * wy) / math.sqrt(wx * wx + wy * wy)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def carry(ends, fall, carries, q, channels, fluid, narrow, speed, state, out):
+    """What channels carry, out (m, 2) [m2/s]: volume rates of proppant. fall (m,): see `falls`; carries (m,) bool; q
+    (m,): flow of slurry [m2/s]; fluid: state of the flow's nodes, grains settle in as much of a channel as is filled at
+    both ends; narrow [m]: least aperture that grains pass; speed: of a single grain that settles [m/s]. Slurry that
+    flows brings none into a pack and takes none out of it; grains settle into one that is not quite full, and out of
+    one with room below."""
     for c in range(len(ends)):
         a, b = ends[c, 0], ends[c, 1]
         forth = back = 0.0
         delta = channels[c, flowing.APERTURE]
         if carries[c] and delta >= narrow and (state[a, C] > 0.0 or state[b, C] > 0.0):
-            i, j = one[c], other[c]
-            wx = (x[i + 2] - x[i]) + (x[j] - x[j + 2])
-            wy = (x[i + 3] - x[i + 1]) + (x[j + 1] - x[j + 3])
-            along = (vx * wx + vy * wy) / math.sqrt(wx * wx + wy * wy)
             filled = delta * min(fluid[a, flowing.S], fluid[b, flowing.S])
-            slip = along * filled * max(1.0 - 0.5 * (state[a, C] + state[b, C]), 0.0) ** HINDERED  # 0: crushed pack
+            hindered = max(1.0 - 0.5 * (state[a, C] + state[b, C]), 0.0) ** HINDERED  # 0: crushed pack
+            slip = speed * fall[c] * filled * hindered
             flow = q[c] if state[a, PACKED] == 0.0 and state[b, PACKED] == 0.0 else 0.0
             forth = state[a, C] * (max(flow, 0.0) + max(slip, 0.0))
             back = state[b, C] * (max(-flow, 0.0) + max(-slip, 0.0))
@@ -60,7 +69,7 @@ def carry(ends, one, other, carries, x, q, channels, fluid, narrow, vx, vy, stat
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def fastest(begin, channel, side, q, channels, speed, fluid, nodes):
+def fastest(begin, channel, side, q, channels, fall, speed, fluid, nodes):
     """Shortest time [s] in which a node could lose its slurry: room over flow and settling out of it. fluid (n,
     flowing.NODE): of the nodes; of one that is nearly empty a part of its volume counts, its factor does the rest."""
     least = math.inf
@@ -68,7 +77,7 @@ def fastest(begin, channel, side, q, channels, speed, fluid, nodes):
         rate = 0.0
         for m in range(begin[i], begin[i + 1]):
             c = channel[m]
-            rate += max(-side[m] * q[c], 0.0) + speed * channels[c, flowing.APERTURE]
+            rate += max(-side[m] * q[c], 0.0) + abs(speed * fall[c]) * channels[c, flowing.APERTURE]
         if rate > 0.0:
             least = min(least, max(nodes[i, ROOM], EMPTY * fluid[i, flowing.V]) / rate)
     return least
@@ -171,24 +180,30 @@ def settle(part, limit, power, modulus, nodes, state):
 
 
 @njit(cache=True, error_model="numpy")
-def _resistance(thick, packed, pack):
-    """Of half a channel over that of the fluid alone: a slurry is at most as stiff as the fluid in a pack."""
-    return pack if packed > 0.0 else min(thick, pack)
+def resistance(state, node, delta, factor, permeability):
+    """Of a channel's part at a node over that of the fluid alone, see `thicken`: a slurry is at most as stiff as the
+    fluid in a pack."""
+    pack = 1.0 / (factor * factor * factor) if factor > 0.0 else max(delta * delta / (12.0 * permeability), 1.0)
+    return pack if state[node, PACKED] > 0.0 else min(state[node, THICK], pack)
+
+
+@njit(cache=True, error_model="numpy")
+def weight(state, a, b, heavier):
+    """Of what is between two nodes over that of the fluid alone. A pack rests on its walls."""
+    return 1.0 + heavier * 0.5 * ((1.0 - state[a, PACKED]) * state[a, C] + (1.0 - state[b, PACKED]) * state[b, C])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def thicken(ends, state, factor, permeability, heavier, channels):
     """What proppant does to channels (m, flowing.CHANNEL): their conductance, of two halves one behind the other, and
     the weight of what is in them over that of the fluid. factor: aperture of a pack over that of the channel, 0: by its
-    permeability [m2]; heavier: rho_p / rho_f - 1. A pack rests on its walls."""
+    permeability [m2]; heavier: rho_p / rho_f - 1."""
     for c in range(len(ends)):
         a, b, delta = ends[c, 0], ends[c, 1], channels[c, flowing.APERTURE]
-        pack = 1.0 / (factor * factor * factor) if factor > 0.0 else max(delta * delta / (12.0 * permeability), 1.0)
-        one = _resistance(state[a, THICK], state[a, PACKED], pack)
-        other = _resistance(state[b, THICK], state[b, PACKED], pack)
+        one = resistance(state, a, delta, factor, permeability)
+        other = resistance(state, b, delta, factor, permeability)
         channels[c, flowing.CONDUCT] *= 2.0 / (one + other)
-        solid = 0.5 * ((1.0 - state[a, PACKED]) * state[a, C] + (1.0 - state[b, PACKED]) * state[b, C])
-        channels[c, flowing.WEIGHT] = 1.0 + heavier * solid
+        channels[c, flowing.WEIGHT] = weight(state, a, b, heavier)
 
 
 def kozeny_carman(limit: float, size: float) -> float:

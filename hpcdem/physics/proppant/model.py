@@ -22,7 +22,8 @@ from hpcdem.physics.fdem.said import Number
 from hpcdem.physics.fdem.surface_loads import SurfaceLoad
 from hpcdem.physics.flow import kernels as flowing
 from hpcdem.physics.flow.model import Flow
-from hpcdem.physics.proppant import kernels, settling
+from hpcdem.physics.flow.network import LINKS
+from hpcdem.physics.proppant import kernels, kernels_space, settling
 from hpcdem.physics.proppant.properties import NAMES, PROPPANT
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ COURANT = 0.1
 """Part of its slurry that a node may lose in a sub-step, or a little more where the flow has just changed."""
 LOOK = 100
 """Cycles of flow, by explicit steps, after which sub-steps are counted again."""
+STALE = 10.0
+"""Times, as long as a node needs to lose its slurry, that a step of flow may be without a word."""
 SWEEPS = 4
 """Over the nodes, for the factors of what they take."""
 MANY = 100_000
@@ -129,7 +132,7 @@ class Proppant(SurfaceLoad):
         """Those of these points (None: all) at which a channel ends that carries proppant."""
         network = self.flow.network
         asked = self.flow.flow_nodes(points)
-        found = np.intersect1d(asked, network.ends[self.carries[network.channels]])
+        found = np.intersect1d(asked, network.corners[self.carries[network.channels]])
         if not len(found):
             raise CommandError(f"no channel that carries proppant ends at node {asked[0]}" + " nor at the others" * (
                 len(asked) > 1))  # fmt: skip
@@ -225,10 +228,15 @@ class Proppant(SurfaceLoad):
 
     def speed(self) -> float:
         """Of a single grain that settles [m/s], up if negative. Not collective."""
-        o, flow, v = self.blocks.options, self.flow, self.values
+        flow, v = self.flow, self.values
         law = settling.stokes if v["proppant_stokes"] > 0.0 else settling.terminal
-        gravity = math.hypot(o.gx, o.gy)
+        gravity = math.hypot(*self._gravity())
         return law(v["proppant_size"], v["proppant_density"], flow.fluid("fluid_density"), flow.viscosity, gravity)
+
+    def _gravity(self) -> list[float]:
+        """By components [m/s2]."""
+        o = self.blocks.options
+        return [o.gx, o.gy, o.gz][: self.blocks.dim]
 
     def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
         """`thicken` for all channels of the model; gathered: values of all flow nodes from those of this rank."""
@@ -247,7 +255,8 @@ class Proppant(SurfaceLoad):
     def _thicken(self, ends: np.ndarray, state: np.ndarray, table: np.ndarray) -> None:
         v = self.values
         limit, size = v["proppant_concentration_limit"], v["proppant_size"]
-        kernels.thicken(
+        of = kernels if self.blocks.dim == 2 else kernels_space
+        of.thicken(
             ends, state, v["aperature_factor"], kernels.kozeny_carman(limit, size),
             v["proppant_density"] / self.flow.fluid("fluid_density") - 1.0, table,
         )  # fmt: skip
@@ -289,9 +298,8 @@ class Proppant(SurfaceLoad):
         if comm.any(bool(lost.any())):
             self.accounts["removed"] += exact_sum(lost, comm)
             self.nodes[:, [kernels.ROOM, kernels.VOLUME]] *= flow.kept[:, None]
-        channels = flow.channels_here
-        self._carries = self.carries[channels]
-        self._out = np.zeros((len(channels), 2))
+        self._carries = np.repeat(self.carries[flow.channels_here], LINKS[self.blocks.dim])
+        self._out, self._falls = np.zeros((len(self._carries), 2)), np.zeros(len(self._carries))
         self._takes = np.zeros(len(mine))
         self._prescribed = self.condition[mine].astype(np.int64)
         self._settle()
@@ -369,7 +377,7 @@ class Proppant(SurfaceLoad):
             self.blocks.log.info(f"proppant: a grain settles by {v:.4g} m/s after {law}, Reynolds number {found:.3g}")
             if stokes and found > NO_STOKES:
                 slow = settling.terminal(size, self.values["proppant_density"], density, flow.viscosity,
-                                         math.hypot(self.blocks.options.gx, self.blocks.options.gy))  # fmt: skip
+                                         math.hypot(*self._gravity()))  # fmt: skip
                 self.blocks.log.warn(
                     f"proppant-stokes: at a Reynolds number of {found:.3g} Stokes' law does not hold; after Schiller "
                     f"and Naumann a grain settles by {slow:.4g} m/s"
@@ -394,14 +402,18 @@ class Proppant(SurfaceLoad):
 
     def _advance(self, dt: float) -> None:
         """As long [s] as the fluid has flowed."""
-        flow, v, o, nodes, comm = self.flow, self.values, self.blocks.options, self.nodes, self.blocks.comm
+        flow, v, nodes, comm = self.flow, self.values, self.nodes, self.blocks.comm
         nodes[:, kernels.ROOM_BEFORE] = nodes[:, kernels.ROOM]
         self._find_rooms()
         ends, begin, channel, side = flow.links
         assert flow.carried is not None
         q, table, speed = flow.carried / dt, flow.channel_table, self.speed()
+        if self.blocks.dim == 3:
+            q -= np.repeat(q.reshape(-1, 3).mean(axis=1), 3)
+        self._find_falls()
+        fall = self._falls
         if flow.implicit or self.cycles % LOOK == 0:
-            least = kernels.fastest(begin, channel, side, q, table, abs(speed), flow.nodes, nodes)
+            least = kernels.fastest(begin, channel, side, q, table, fall, speed, flow.nodes, nodes)
             least = float(comm.min_into(np.array([least]))[0])
             self.sub_steps = max(1, math.ceil(dt / (COURANT * least)))
             if self.sub_steps > MANY:
@@ -409,21 +421,16 @@ class Proppant(SurfaceLoad):
                     f"proppant would need {self.sub_steps} sub-steps in a step of flow of {dt:.3g} s: shorter ones are "
                     "needed"
                 )
+            self._tell_stale(dt, least)
         count = self.sub_steps
         short = dt / count
         self._sources(dt, count)
-        g = math.hypot(o.gx, o.gy)
-        vx, vy = (speed * o.gx / g, speed * o.gy / g) if g > 0.0 else (0.0, 0.0)
         limit, narrow = v["proppant_concentration_limit"], v["proppant_size_factor"] * v["proppant_size"]
-        one, other = flow.sides
         refused = 0.0
         for k in range(1, count + 1):
             part = k / count
             refused += kernels.pour(short, limit, nodes, self.state)
-            kernels.carry(
-                ends, one, other, self._carries, self.blocks.x, q, table, flow.state, narrow, vx, vy, self.state,
-                self._out,
-            )  # fmt: skip
+            kernels.carry(ends, fall, self._carries, q, table, flow.state, narrow, speed, self.state, self._out)
             kernels.give(begin, channel, side, self._out, short, nodes, self.state)
             self._refresh()
             kernels.come(begin, channel, side, ends, self._out, short, nodes, self.state)
@@ -438,6 +445,23 @@ class Proppant(SurfaceLoad):
             self._refresh()
         self.time = flow.time
         self._tell_refused(refused)
+
+    def _tell_stale(self, dt: float, least: float) -> None:
+        """Grains that move far by one flow around loops, which their weight would have changed meanwhile."""
+        flow, log = self.flow, self.blocks.log
+        if dt > STALE * least and len(flow.network.ends) >= len(flow.network.nodes) and log is not None:
+            log.warn_once(
+                "proppant stale",
+                f"a step of flow of {dt:.3g} s is {dt / least:.3g} times as long as grains need from node to node: "
+                f"currents that their weight drives follow them in steps of {STALE * least:.3g} s at most",
+            )
+
+    def _find_falls(self) -> None:
+        """How far down the channels of this rank go where they are now."""
+        down = np.array(self._gravity())
+        down /= max(float(np.sqrt((down * down).sum())), 1e-300)
+        of = kernels if self.blocks.dim == 2 else kernels_space
+        of.falls(*self.flow.sides, self.blocks.x, down, self._falls)
 
     def _sources(self, dt: float, count: int) -> None:
         """What conditions bring or take in each sub-step of the owned nodes."""

@@ -1,4 +1,4 @@
-"""A crack full of slurry between two blocks, which calls every kernel of proppant once."""
+"""A crack full of slurry between two blocks, in the plane and in space, which calls every kernel of proppant once."""
 
 from __future__ import annotations
 
@@ -19,8 +19,18 @@ SAND = {
 
 def warm_up(threads: int = 1) -> None:
     """Call the kernels of a run with this many threads per rank. Writes nothing."""
+    _settles(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]), threads)
+
+
+def in_space(threads: int = 1) -> None:
+    """The same between two tetrahedra."""
+    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
+    _settles(Mesh.of(points, [(0, 1, 2, 3), (1, 4, 2, 3)]), threads)
+
+
+def _settles(mesh: Mesh, threads: int) -> None:
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)], [(0, 1, 2, -1), (0, 2, 3, -1)]))
+    sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     flow = Flow.of(sim)
     flow.assign(None, WATER)
