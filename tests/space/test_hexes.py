@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError, HpcdemError
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, hexahedra, saved_state
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, hexahedra, reference, saved_state
 from hpcdem.physics.fdem import mesh as meshes
 from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
@@ -91,6 +91,47 @@ def test_the_matrix_is_the_derivative_of_the_forces(large, within):
     x = x + rng.uniform(-2e-5, 2e-5, x.shape)
     for product, slope in slopes_by_difference(sim, x, 1e-6):
         assert np.abs(product - slope).max() < within * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("large, beta", [(True, 0.0), (True, 2e-7), (False, 2e-7)])
+def test_forces_are_those_of_the_plain_reference(large, beta):
+    """Of any shape, strain, turn and motion, with initial stress, viscosity, gravity and Rayleigh damping; of more than
+    a block of them, and on several threads."""
+    rng = np.random.default_rng(5)
+    sim = body(hexes((5, 3, 3), (1.0, 0.9, 0.6), 0.3), damp_factor=0.4)
+    sim.option(large_strain=large)
+    sim._set(mass_damping=30.0, stiffness_damping=beta)
+    sim.gravity(1.0, -2.0, -9.0)
+    sim.initial_stress(None, xx=5e8, yy=-3e8, zz=1e8, xy=2e8, xz=-1e8, yz=3e8)
+    sim.close_model()
+    own, place = sim.local.hexes, sim.local.hexes.place[: sim.local.hexes.count]
+    x, v = sim.x.reshape(-1), sim.v.reshape(-1)
+    mesh = sim.mesh.points[own.nodes]
+    for i in range(own.count):
+        gradient = turned(np.eye(3), rng.uniform(0.0, 6.0)).T @ (np.eye(3) + rng.uniform(-0.05, 0.05, (3, 3)))
+        now = mesh[i] @ gradient.T + rng.uniform(-3e-3, 3e-3, (8, 3)) + [7.0, -3.0, 5.0]
+        for axis in range(3):
+            x[place[i] + axis], v[place[i] + axis] = now[:, axis], rng.uniform(-3.0, 3.0, 8)
+        force = np.full(sim.x.shape, np.nan)  # neighbours share no rows
+        own.forces(force)
+        exact = reference.hexahedron_forces(mesh[i], now, *speeds_and_solid(sim, v, place, i))
+        exact += own.h[i, 8:16, None] * (np.array([1.0, -2.0, -9.0]) - 30.0 * v[place[i][:, None] + np.arange(3)])
+        found = force.reshape(-1)[place[i][:, None] + np.arange(3)]
+        assert np.abs(found - exact).max() < 1e-11 * np.abs(exact).max()
+        assert np.isfinite(force.reshape(-1, 4)[:, :3]).sum() == 24 * own.count
+    several = np.full(sim.x.shape, np.nan)
+    sim.threads = 3
+    own.forces(several)
+    assert np.array_equal(force, several, equal_nan=True)
+
+
+def speeds_and_solid(sim, v, place, i):
+    h = sim.local.hexes.h[i]
+    xx, yy, xy, zz, xz, yz = h[:6]
+    stress = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    o = sim.options
+    solid = reference.Solid(h[16], h[17], h[18], stress, not o.large_strain, o.stiffness_damping)
+    return v[place[i][:, None] + np.arange(3)], solid
 
 
 def turned(points: np.ndarray, angle: float) -> np.ndarray:

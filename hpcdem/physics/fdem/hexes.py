@@ -34,8 +34,9 @@ def place_masses(sim: State, mass: np.ndarray) -> None:
 
 
 class Hexes:
-    """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; begin, place: see
-    `hexes.forces`; of (count, 24): corner of the hexahedron at each corner of these."""
+    """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; place: see
+    `hexes.forces`; of (count, 24): corner of the hexahedron at each corner of these; corner_of (n, 4): of all rows of
+    storage, the place in x and force of the corner that has the forces of each corner."""
 
     def __init__(self, sim: State, true_mass: np.ndarray) -> None:
         self.sim = sim
@@ -57,52 +58,63 @@ class Hexes:
                 f"elements {self.number[apart[0]]} and following are one hexahedron of several materials"
             )
         first, self.of = hexahedra.places(mesh.cells, of)
-        self.begin = (tets.ROW * self.rows[:, 0]).astype(np.int32)
+        begin = (tets.ROW * self.rows[:, 0]).astype(np.int32)
         self.place = np.zeros((n + 3, 8), np.int32)
-        self.place[:n] = self.begin[:, None] + tets.ROW * (first // 4) + tets.STRIDE * (first % 4)
-        self.mass = np.zeros((n + 3, 8))
-        self.mass[:n] = true_mass[self.place[:n] // tets.ROW, self.place[:n] % tets.ROW // tets.STRIDE]
-        self.s0 = np.zeros((n + 3, tets.STRESSES))
+        self.place[:n] = begin[:, None] + tets.ROW * (first // 4) + tets.STRIDE * (first % 4)
+        self.corner_of = np.arange(0, sim.x.size, tets.STRIDE, dtype=np.int32).reshape(-1, 4)
+        self.corner_of[self.rows] = np.take_along_axis(self.place[:n], self.of, axis=1).reshape(n, PARTS, 4)
+        mass = true_mass[self.place[:n] // tets.ROW, self.place[:n] % tets.ROW // tets.STRIDE]
+        self._make_constants(models[:, 0], mass)
         if sim.stress0 is not None and n:
-            self.s0[:n, :6] = sim.initial_stresses(self.number)
-        self._make_constants(models[:, 0])
+            self.h[:n, :6] = sim.initial_stresses(self.number)
 
-    def _make_constants(self, model: np.ndarray) -> None:
+    def _make_constants(self, model: np.ndarray, mass: np.ndarray) -> None:
+        """parts (blocks, 10, 10, 32), h (count + 3, 20): see `hexes.forces`."""
         sim, mesh, n = self.sim, self.sim.the_mesh(), self.count
         models = element_table(sim.element_rows)
-        self.c = np.zeros((10 * n + 3, tets.TET))
-        self.c[:, [0, 4, 8]] = 1.0
         volume = hexahedra.volumes(mesh.points, np.column_stack([self.nodes, self.number]))
-        every = np.arange(n)
-        for j in range(10):
-            corners = self.nodes[:, OVERLAYS[j]]
+        blocks, every = -(-n // hexes.BLOCK), np.arange(n)
+        found = np.zeros((blocks * hexes.BLOCK, hexes.PARTS, hexes.WORDS))
+        self.h, self.omega2, eta = np.zeros((n + 3, hexes.HEX)), np.zeros(n), np.zeros(n)
+        c = np.zeros((n, tets.TET))
+        for j in range(hexes.PARTS):
+            whole = volume[:, 5 * (j // 5) : 5 * (j // 5) + 5].sum(axis=1)
             quarter = np.repeat((models[model, space.RHO] * volume[:, j] / 4.0)[:, None], 4, axis=1)
-            rows = self.c[j * n : (j + 1) * n]
             space.constants(
-                every, mesh.points, np.ascontiguousarray(corners), model, models, sim.options.dynamic, every, quarter,
-                rows,
+                every, mesh.points, np.ascontiguousarray(self.nodes[:, OVERLAYS[j]]), model, models,
+                sim.options.dynamic, every, quarter, c,
             )  # fmt: skip
-            rows[:, hexes.VOLUME] = volume[:, j]
+            found[:n, j, :9], found[:n, j, hexes.SHARE] = c[:, :9], volume[:, j] / whole
+            self.omega2 = np.maximum(self.omega2, space.omegas2(c))
+            eta += 0.5 * found[:n, j, hexes.SHARE] * c[:, tets.ETA]
+            self.h[:n, hexes.H_VOLUME + j // 5] = whole
+        of = found.reshape(blocks, hexes.BLOCK, hexes.PARTS, hexes.WORDS)
+        self.parts = np.ascontiguousarray(np.moveaxis(of, 1, 3))
+        self.h[:n, hexes.H_MASS : hexes.H_MASS + 8] = mass
+        self.h[:n, hexes.H_LAMBDA], self.h[:n, hexes.H_TWO_MU] = models[model, space.LAME], models[model, space.MU2]
+        self.h[:n, hexes.H_ETA] = eta
         self.modulus = models[model, space.LAME] + models[model, space.MU2]
-        self.eta = self.c[: 10 * n, tets.ETA].reshape(10, n).max(axis=0) if n else np.zeros(0)
-        self.omega2 = np.zeros(n)
-        if n:
-            self.omega2 = space.omegas2(self.c[: 10 * n]).reshape(10, n).max(axis=0)
 
     def forces(self, force: np.ndarray) -> None:
         """Into the rows (n, 16) [N] of these tetrahedra."""
         sim, o = self.sim, self.sim.options
         kernel: Any = hexes.forces if sim.threads == 1 else hexes.forces_threaded
         kernel(
-            sim.threads, self.count, self.begin, self.place, sim.x, sim.v, self.c, self.mass, self.s0,
-            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
+            sim.threads, self.count, self.place, sim.x, sim.v, self.parts, self.h, not o.large_strain, force, o.gx,
+            o.gy, o.gz, o.mass_damping, o.stiffness_damping,
         )  # fmt: skip
+
+    def add_contact(self, pairs: Any, force: np.ndarray) -> None:
+        """`ContactSpace.add_to`; what pushes on hexahedra goes to the corners that have their forces."""
+        if not len(pairs.rows):
+            return
+        hexes.add(pairs.rows, self.corner_of, pairs.pushed, force)
 
     def stresses(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Stress (n, 6) [Pa] and elastic energy (n,) [J] of some of them."""
         stress, energy = np.empty((len(which), 6)), np.empty(len(which))
         small = not self.sim.options.large_strain
-        hexes.stresses(which, self.count, self.place, self.sim.x, self.c, self.s0, small, stress, energy)
+        hexes.stresses(which, self.place, self.sim.x, self.parts, self.h, small, stress, energy)
         return stress, energy
 
     def spread(self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray) -> None:
@@ -124,7 +136,7 @@ class Hexes:
         """K (count, 24, 24) [N/m]."""
         found = np.empty((self.count, 24, 24))
         small = not self.sim.options.large_strain
-        hexes.stiffness(self.count, self.place, self.sim.x, self.c, self.s0, small, found)
+        hexes.stiffness(self.count, self.place, self.sim.x, self.parts, self.h, small, found)
         return found
 
     def at_corners(self, of_rows: np.ndarray) -> np.ndarray:
@@ -138,8 +150,8 @@ class Hexes:
         """Largest stable one [s]; springs, dashpots (n_own, 4); see `space.time_step`."""
         o = self.sim.options
         return hexes.time_step(
-            self.omega2, self.eta, self.modulus, self.place, self.at_corners(springs), self.at_corners(dashpots),
-            o.mass_damping, o.stiffness_damping, o.safety, target, mass,
+            self.omega2, self.h[: self.count, hexes.H_ETA], self.modulus, self.place, self.at_corners(springs),
+            self.at_corners(dashpots), o.mass_damping, o.stiffness_damping, o.safety, target, mass,
         )  # fmt: skip
 
     def static_masses(self, springs: np.ndarray, alpha: float, mass: np.ndarray) -> None:
@@ -149,7 +161,9 @@ class Hexes:
         for axis in range(3):
             flat[self.place[: self.count] + axis] = self.sim.the_mesh().points[self.nodes, axis]
         k = np.empty((self.count, 24, 24))
-        hexes.stiffness(self.count, self.place, x, self.c, np.zeros_like(self.s0), True, k)
+        h = self.h.copy()
+        h[:, :6] = 0.0
+        hexes.stiffness(self.count, self.place, x, self.parts, h, True, k)
         rows = np.abs(k).sum(axis=2).reshape(self.count, 8, 3).max(axis=2)
         place = self.place[: self.count]
         mass[self.rows.reshape(-1)] = 0.0
@@ -165,6 +179,6 @@ class Hexes:
         hex_of[self.rows - self.sim.n_left] = np.arange(self.count)[:, None]
         of = np.flatnonzero(hex_of[element] >= 0)
         which = hex_of[element[of]]
-        inside = (corner[of] - self.begin[which, None]) // tets.STRIDE
+        inside = (corner[of] - tets.ROW * self.rows[which, :1]) // tets.STRIDE
         a, b, c = np.take_along_axis(self.of[which], inside, axis=1).T
         return of, np.take_along_axis(self.place[which], hexahedra.OTHER_CUT[a, b, c], axis=1)

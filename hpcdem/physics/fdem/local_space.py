@@ -141,7 +141,12 @@ class LocalSpace(LawsSpace):
         self.load_share = np.concatenate([self.load_share, np.full(len(of), 0.5)])
 
     def _mark_special(self) -> None:
-        """All forces are stored."""
+        """All forces are stored. Of hexahedra only one corner at each of their points has some."""
+        self.pulled = self.node_begin, self.node_corner
+        if self.hexes is not None:
+            some = self.true_mass.reshape(-1)[self.node_corner // tets.STRIDE] > 0.0
+            before = np.concatenate([[0], np.cumsum(some)])
+            self.pulled = before[self.node_begin], self.node_corner[some]
         if len(self.force) < len(self.sim.number):
             self.force = np.zeros((len(self.sim.number), self.force_width))
 
@@ -253,9 +258,13 @@ class LocalSpace(LawsSpace):
             self.slot_law, self.slot_kind, self.slot_state, self.slot_history, self.head, self.follow,
             self.joint_table, self.joint_beyond, keep, of_joints, sim.clock.step, self.tally,
         )  # fmt: skip
-        if hexes is not None:
+        if hexes is None:
+            self.pairs.add_to(force)
+        else:
+            if some:
+                force[hexes.rows.reshape(-1)] = 0.0  # the forces of their tetrahedra
             hexes.forces(force)
-        self.pairs.add_to(force)
+            hexes.add_contact(self.pairs, force)
 
     def open_joints(self) -> None:
         """See `Local.open_joints`."""
@@ -293,9 +302,8 @@ class LocalSpace(LawsSpace):
             half = 0.5 * clock.dt if sim.options.dynamic else 0.0
             table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
         self._move(
-            sim.threads, self.node_begin, self.node_corner, self.node_kick, self.node_condition, self.node_share, table,
-            self.some_applied, self.force, self.applied, sim.v, alpha, self.outside,
-            self.felt,
+            sim.threads, self.node_begin, self.node_corner, *self.pulled, self.node_kick, self.node_condition,
+            self.node_share, table, self.some_applied, self.force, self.applied, sim.v, alpha, self.outside, self.felt,
         )  # fmt: skip
 
     def loads_now(self, placed: Placed, time: float) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""What elements.py, tets.py, plasticity.py, creep_tets.py, joints.py, joints_space.py and nodes.py compute, for one
-element, joint or node and in small matrices, written plainly. To be read beside them; tests hold the two against each
-other."""
+"""What elements.py, tets.py, hexes.py, plasticity.py, creep_tets.py, joints.py, joints_space.py and nodes.py compute,
+for one element, joint or node and in small matrices, written plainly. To be read beside them; tests hold the two
+against each other."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.kernels.elements import PARTS
 
 ONE = np.eye(2)
@@ -87,6 +88,21 @@ def quad_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) ->
         for k, d in zip(overlay, parts):
             strain = d.strain + 0.5 * (volume - np.trace(d.strain)) * ONE
             rate = d.rate + 0.5 * (swell - np.trace(d.rate)) * ONE
+            force[k] += 0.5 * forces_of_strain(d, strain, rate, solid)
+    return force
+
+
+def hexahedron_forces(mesh: np.ndarray, x: np.ndarray, v: np.ndarray, solid: Solid) -> np.ndarray:
+    """The same (8, 3) [N] of a hexahedron: two overlays of five tetrahedra, with means by volume."""
+    force = np.zeros((8, 3))
+    for overlay in (OVERLAYS[:5], OVERLAYS[5:]):
+        parts = [deformation(mesh[k], x[k], v[k], solid.small) for k in overlay]
+        volumes = [float(np.linalg.det(mesh[k][1:] - mesh[k][0])) / 6.0 for k in overlay]
+        volume = np.average([np.trace(d.strain) for d in parts], weights=volumes)
+        swell = np.average([np.trace(d.rate) for d in parts], weights=volumes)
+        for k, d in zip(overlay, parts):
+            strain = d.strain + (volume - np.trace(d.strain)) / 3.0 * np.eye(3)
+            rate = d.rate + (swell - np.trace(d.rate)) / 3.0 * np.eye(3)
             force[k] += 0.5 * forces_of_strain(d, strain, rate, solid)
     return force
 

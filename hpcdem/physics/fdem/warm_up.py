@@ -177,10 +177,10 @@ def tangent_in_space(threads: int = 1) -> None:
 
 
 def hexahedra(threads: int = 1) -> None:
-    """Those of hexahedra: in motion, at rest, and their tangent."""
-    points = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+    """Those of hexahedra: two that touch in motion, at rest, and their tangent."""
+    points = [(x, y, z) for z in (0.0, 1.0, 1.001, 2.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
     sim = Blocks(SerialComm(), threads)
-    sim.take_mesh(Mesh.of_hexes(points, [range(8)]))
+    sim.take_mesh(Mesh.of_hexes(points, [range(8), range(8, 16)]))
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
     sim.initial_stress(None, yy=1e3)
     sim.stress_condition([0], normal=-1.0)

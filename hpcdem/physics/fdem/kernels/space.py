@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit, prange
 
 from hpcdem.core.cells import COLUMN, index
+from hpcdem.numerics.lanes import U
 from hpcdem.physics.fdem.kernels import laws
 from hpcdem.physics.fdem.kernels.limits import corner_step
 from hpcdem.physics.fdem.kernels.nodes import ACCELERATION, FREE, VELOCITY
@@ -200,46 +201,64 @@ def dashpots(corner, along, across, row, table, x, v, applied):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _move(
-    t, threads, begin, corner, kick, condition, share, table, some_applied, force, applied, v, alpha, outside, felt
-):
+    t, threads, begin, corner, pull_begin, pull_corner, kick, condition, share, table, some_applied, force, applied, v,
+    alpha, outside, felt,
+):  # fmt: skip
     force, applied, v = force.reshape(force.size), applied.reshape(applied.size), v.reshape(v.size)
     n = len(kick)
-    f, e, w, before, drawn = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    f, before, w, drawn = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for i in range(n * t // threads, n * (t + 1) // threads):
         q, k = condition[i], kick[i]
-        for c in range(3):
-            f[c] = e[c] = 0.0
+        fx = fy = fz = ex = ey = ez = 0.0
+        for m in range(pull_begin[i], pull_begin[i + 1]):
+            at = U(pull_corner[m])
+            fx, fy, fz = fx + force[at], fy + force[at + U(1)], fz + force[at + U(2)]
+        if some_applied:
             for m in range(begin[i], begin[i + 1]):
-                f[c] += force[corner[m] + c]
-                if some_applied:
-                    e[c] += applied[corner[m] + c]
-            e[c] += share[i] * table[q, FORCE + c]
-            f[c] += e[c]
-            before[c] = v[corner[begin[i]] + c]
-            w[c] = before[c] + k * laws.damped(f[c], before[c], alpha)
+                at = U(corner[m])
+                ex, ey, ez = ex + applied[at], ey + applied[at + U(1)], ez + applied[at + U(2)]
         if q > 0:
-            for c in range(3):
-                drawn[c] = 0.0
-                if table[q, DOES + c] == VELOCITY:
-                    w[c] = table[q, AT + c]
-                elif table[q, DOES + c] == ACCELERATION:
-                    w[c] = before[c] + table[q, AT + c]
-            kind = table[q, CONSTRAINT]
-            if kind == FIXED:
-                w[0] = w[1] = w[2] = 0.0
-            elif kind == ALONG or kind == ACROSS:
-                _bind(kind, k, alpha, table[q], f, before, w, drawn)
-            # What the conditions had to add so that the node does this.
-            for c in range(3):
-                outside[i, c] = 0.0
-                if kind == ALONG or kind == ACROSS:
-                    outside[i, c] = -drawn[c]
-                elif kind == FIXED or table[q, DOES + c] != FREE:
-                    outside[i, c] = (w[c] - before[c]) / k - f[c]
-        for c in range(3):
-            felt[i, c], felt[i, 3 + c] = f[c], e[c]
-            for m in range(begin[i], begin[i + 1]):
-                v[corner[m] + c] = w[c]
+            ex += share[i] * table[q, FORCE]
+            ey += share[i] * table[q, FORCE + 1]
+            ez += share[i] * table[q, FORCE + 2]
+        fx, fy, fz = fx + ex, fy + ey, fz + ez
+        at = U(corner[begin[i]])
+        vx, vy, vz = v[at], v[at + U(1)], v[at + U(2)]
+        wx = vx + k * laws.damped(fx, vx, alpha)
+        wy = vy + k * laws.damped(fy, vy, alpha)
+        wz = vz + k * laws.damped(fz, vz, alpha)
+        if q > 0:
+            f[0], f[1], f[2] = fx, fy, fz
+            before[0], before[1], before[2] = vx, vy, vz
+            w[0], w[1], w[2] = wx, wy, wz
+            _obey(k, alpha, table[q], f, before, w, drawn, outside[i])
+            wx, wy, wz = w[0], w[1], w[2]
+        felt[i, 0], felt[i, 1], felt[i, 2], felt[i, 3], felt[i, 4], felt[i, 5] = fx, fy, fz, ex, ey, ez
+        for m in range(begin[i], begin[i + 1]):
+            at = U(corner[m])
+            v[at], v[at + U(1)], v[at + U(2)] = wx, wy, wz
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _obey(k, alpha, condition, f, before, w, drawn, outside):
+    """The velocity w of a node with conditions, and what they had to add so that it moves like that."""
+    for c in range(3):
+        drawn[c] = 0.0
+        if condition[DOES + c] == VELOCITY:
+            w[c] = condition[AT + c]
+        elif condition[DOES + c] == ACCELERATION:
+            w[c] = before[c] + condition[AT + c]
+    kind = condition[CONSTRAINT]
+    if kind == FIXED:
+        w[0] = w[1] = w[2] = 0.0
+    elif kind == ALONG or kind == ACROSS:
+        _bind(kind, k, alpha, condition, f, before, w, drawn)
+    for c in range(3):
+        outside[c] = 0.0
+        if kind == ALONG or kind == ACROSS:
+            outside[c] = -drawn[c]
+        elif kind == FIXED or condition[DOES + c] != FREE:
+            outside[c] = (w[c] - before[c]) / k - f[c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -301,20 +320,22 @@ def kick_threaded(threads, first, kick, force, v, alpha):
 @njit(cache=True, nogil=True, error_model="numpy")
 def move(threads, *args):
     """New velocities of the nodes from the forces of their corners, see `nodes.move`; corner (m,): where they begin in
-    `force`, `applied` and v (flat); table (rows, 13); outside (n, 3) [N], felt (n, 6)."""
+    `force`, `applied` and v (flat); pull_begin, pull_corner: the same of those that can have a force; table (rows, 13);
+    outside (n, 3) [N], felt (n, 6)."""
     for t in range(threads):
         _move(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def move_threaded(
-    threads, begin, corner, kick, condition, share, table, some_applied, force, applied, v, alpha, outside, felt
-):
+    threads, begin, corner, pull_begin, pull_corner, kick, condition, share, table, some_applied, force, applied, v,
+    alpha, outside, felt,
+):  # fmt: skip
     """The same on several threads."""
     for t in prange(threads):
         _move(
-            t, threads, begin, corner, kick, condition, share, table, some_applied, force, applied, v, alpha, outside,
-            felt,
+            t, threads, begin, corner, pull_begin, pull_corner, kick, condition, share, table, some_applied, force,
+            applied, v, alpha, outside, felt,
         )  # fmt: skip
 
 
