@@ -3,9 +3,10 @@
 python equilibrium_worker.py RUN...
 
 RUN: SOLVER, or SOLVER-yields: instead, rock that yields under a stamp, in increments, the second of which softens, or
-SOLVER-pumped: a joint that fluid opens by implicit steps, -propped: slurry, or SOLVER-cooled: a jointed bar that cools,
-SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed, SOLVER-burst: tetrahedra, with joints that break,
-that yield and are dug out, whose joints fluid opens; one after the other. Files are RUN.npz.
+SOLVER-pumped: a joint that fluid opens by implicit steps, in one go and from a file in mid-injection, -propped: slurry,
+or SOLVER-cooled: a jointed bar that cools, SOLVER-rinsed: rock that water cools, or SOLVER-solid, SOLVER-crushed,
+SOLVER-burst: tetrahedra, with joints that break, that yield and are dug out, whose joints fluid opens; one after the
+other. Files are RUN.npz.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.connectivity import face_points
 from hpcdem.physics.fdem.kernels import space
 from hpcdem.physics.fdem.simulation import Blocks
@@ -44,6 +45,7 @@ NAMES = (
 )  # fmt: skip
 
 
+FLUID = "pressure", "saturation", "fluid"
 SPACE = ("stress_xx", "stress_yz", "displacement_x", "displacement_z", "reaction_x", "opening", "slip")
 
 
@@ -102,6 +104,14 @@ def stamp(sim: Blocks, solver: str, out: str) -> None:
         np.savez(out, **found)
 
 
+def go_on(sim: Blocks, end: float, solver: str) -> None:
+    """Implicit steps of the fluid to this flow time [s]."""
+    flow = Flow.of(sim)
+    with Coupled(sim, 0.05, solver) as run:
+        while flow.time < end * (1.0 - 1e-12):
+            run.advance(end)
+
+
 def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
     sim.take_mesh(rectangle(24, 8, 2.4, 0.8, y0=-0.4, kind="mixed"))
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
@@ -125,13 +135,19 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
         flow.stage("pump", RATE, 5e-5, 0.83, math.inf)
         flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
     sim.gravity(5.0, 0.0)
+    middle, again = Path(out).with_suffix(".sav"), Blocks(sim.comm)
     for end in (1.0,) if propped else (0.6, 1.0):  # joints that broke are joints again, see pressed.py
-        with Coupled(sim, 0.05, solver) as run:
-            while flow.time < end * (1.0 - 1e-12):
-                run.advance(end)
+        go_on(sim, end, solver)
+        if end < 1.0:
+            saved_state.save(sim, middle)
+    if not propped:
+        saved_state.restore(again, middle)
+        go_on(again, 1.0, solver)
     found = {name: diagnostics.values(sim, name) for name in NAMES}
-    for name in ("pressure", "saturation", "fluid"):
+    for name in FLUID:
         found[name] = flow.values("flow-node", name)
+        if not propped:
+            found[f"again_{name}"] = Flow.of(again).values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])
     found["wells"] = np.array([flow.well_value(one.name, name) for one in flow.wells for name in QUANTITIES])
@@ -259,11 +275,9 @@ def burst(sim: Blocks, solver: str, out: str) -> None:
     flow.stage("pump", RATE, 1e-5, 0.43, math.inf)
     flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
     sim.gravity(5.0, 1.0, -2.0)
-    with Coupled(sim, 0.05, solver) as run:
-        while flow.time < 0.5:
-            run.advance(0.5)
+    go_on(sim, 0.5, solver)
     found = {name: diagnostics.values(sim, name) for name in SPACE}
-    for name in ("pressure", "saturation", "fluid"):
+    for name in FLUID:
         found[name] = flow.values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])

@@ -66,6 +66,13 @@ def test_fluid_opens_the_joint(runs):
     assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(5e-5 * 0.83, rel=1e-12)
 
 
+def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs):
+    """Written by as many ranks as go on from it; on more of them: test_the_same_bits."""
+    found = runs(1, "direct-pumped")
+    for name in ("pressure", "saturation", "fluid"):
+        assert np.array_equal(found[f"again_{name}"], found[name])
+
+
 def test_slurry_opens_it_too(runs):
     found, water = runs(1, "direct-propped"), runs(1, "direct-pumped")
     stored, packed, came, left, removed = found["sand"]

@@ -364,8 +364,9 @@ class Coupled:
             with timers.around("matrix"):
                 pieces = self._pieces(step, fluid, u, x)
             try:
-                with timers.around("solve"):
+                with timers.around("factors"):
                     self.solver.factor(pieces)
+                with timers.around("solve"):
                     way = self.solver.solve(force, 0.0)
             except CommandError as singular:
                 error = str(singular)
@@ -422,7 +423,8 @@ class Coupled:
             return self._evaluated(step, x, u)
 
     def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
-        now = self.fluid.balance(step, u, x)
+        with self.sim.timers.around("flow"):
+            now = self.fluid.balance(step, u, x)
         right = np.zeros((len(x) + self.fluid.n, self.sim.dim))
         right[len(x) :, 0] = -now.residual
         sizes = float((now.sizes + now.rounding).sum())

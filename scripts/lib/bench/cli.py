@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from bench import blocks, coupled, launch, other, runs, strain_stress, tables, view
+from bench import blocks, coupled, fracture, launch, other, runs, strain_stress, tables, view
 from bench.launch import Layout
 from bench.peers import PEERS
 from bench.workloads import PEER_WORKLOADS, cache_folder, workloads
@@ -149,6 +149,19 @@ def coupled_(layouts: list[Layout], repeats: int, seconds: float, json_file: str
         lines.close()
         if warning := tables.disturbed(lines.rows):
             runs.say(f"warning: {warning}")
+
+
+@bench.command("fracture", context_settings=HELP)
+@layouts_option("1x1")
+@click.option("--seconds", type=float, default=5.0, metavar="S", help="Injected time [5].")
+@JSON
+def fracture_(layouts: list[Layout], seconds: float, json_file: str | None) -> None:
+    """A hydraulic fracture of 20 000 triangles by implicit steps: time by stages."""
+    lines = tables.Lines(json_file)
+    try:
+        fracture.fracture(layouts, seconds, lines)
+    finally:
+        lines.close()
 
 
 @bench.command(context_settings=HELP)

@@ -17,7 +17,7 @@ from typing import Any
 
 import hpcdem
 from bench import bed as beds
-from bench import blocks, coupled, strain_stress
+from bench import blocks, coupled, fracture, strain_stress
 from bench.scaling import measure as scaling
 from bench.workloads import MATERIAL, Bed
 from hpcdem import session
@@ -234,7 +234,7 @@ def forget_peak() -> None:
 
 TASKS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
     "run": run, "bed": beds.make, "memory": memory, "strain-stress": strain_stress.work, "scaling": scaling.work,
-    "blocks": blocks.work, "coupled": coupled.work,
+    "blocks": blocks.work, "coupled": coupled.work, "fracture": fracture.work,
 }  # fmt: skip
 
 if __name__ == "__main__":
