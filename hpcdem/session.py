@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 class Session:
     """comm: all ranks; threads: per rank; outdir: where results go if the script does not say; directory: that of the
     script, where its relative file names begin; figure: draw the last state of each simulation; draws: DRAW makes
-    pictures; text: of the script; job: the same in a few words, for run.json; keep: numbered checkpoints that are kept,
-    0: all; ends_with_frame: write the last state of each simulation, too, if no command has; reproduction: of
+    pictures; text: of the script; job: the same in a few words, for run.json; keep: which numbered checkpoints
+    stay; ends_with_frame: write the last state of each simulation, too, if no command has; reproduction: of
     --check-reproducible; interpreter: what carries out the PCDC commands of this process, if it has any.
     """
 
@@ -52,7 +52,7 @@ class Session:
     draws: bool = False
     text: str = ""
     job: run_folder.Job = field(default_factory=run_folder.Job)
-    keep: int = 0
+    keep: run_folder.Retention = field(default_factory=run_folder.Retention)
     ends_with_frame: bool = False
     reproduction: Reproduction | None = None
     ready: set[str] = field(default_factory=set)

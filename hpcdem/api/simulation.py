@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -485,12 +486,14 @@ class Simulation(BlockCommands):
             self._log.info(f"{file} holds names of a script, which programs do not take: {', '.join(names)}")
 
     @_command
-    def resume(self) -> bool:
-        """Take up the newest whole checkpoint of `outdir` and finish the command in which it was written, `cycle`,
+    def resume(self, before: float | None = None) -> bool:
+        """Take up the newest whole checkpoint of `outdir`, or the last one at or before this time of the model [s]
+        (UsageError if there is none), and finish the command in which it was written, `cycle`,
         `imple`, `step` or `solve`; False if there is none. Functions of `every` must have been given before. Particles
         that were coupled to blocks made before them come with these: `coupling` is there then."""
         self._refuse_coupled("resume")
-        found = self._newest(self._folder)
+        latest = math.inf if before is None else before
+        found = self._newest(self._folder, latest)
         if found is None or not self._kind(found):
             beside = self._newest(self._folder / "blocks")
             if beside is not None:
@@ -499,9 +502,9 @@ class Simulation(BlockCommands):
                     "particles alone cannot be told. Make the blocks first in programs that are to go on; or build "
                     "both again, couple() and restore(...)"
                 )
-            return self._resume_particles()
+            return self._resume_particles(latest)
         project = self._made_project()
-        if not fdem.checkpoints.restore_newest(project):
+        if not fdem.checkpoints.restore_newest(project, latest):
             return False
         if project.continues is not None:
             project.asleep = self.engine.number
@@ -509,10 +512,10 @@ class Simulation(BlockCommands):
         fdem.steps.resume(project)
         return True
 
-    def _resume_particles(self) -> bool:
+    def _resume_particles(self, before: float) -> bool:
         from hpcdem.physics.dem import saved_state
 
-        found = saved_state.restore_newest(self.engine, [self.engine.outdir])
+        found = saved_state.restore_newest(self.engine, [self.engine.outdir], before)
         if found is None:
             return False
         self.engine.progress = found["progress"]
@@ -520,10 +523,10 @@ class Simulation(BlockCommands):
         dem.cycles.resume(engine)
         return True
 
-    def _newest(self, folder: Path) -> str | None:
+    def _newest(self, folder: Path, before: float = math.inf) -> str | None:
         """The newest checkpoint of a folder; looked for by rank 0."""
         comm = self._session.comm
-        found = newest_first([folder])[0] if comm.rank == 0 else []
+        found = newest_first([folder], before)[0] if comm.rank == 0 else []
         return comm.bcast(str(found[0]) if found else None)
 
     def _kind(self, path: str) -> str:

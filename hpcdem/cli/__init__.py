@@ -103,7 +103,7 @@ def new_session(comm: SerialComm, log: Log, options: Options, threads: int) -> S
     stop = StopRequests(options.time_limit, end, options.autosave)
     return Session(
         comm, log, stop, threads, options.script.parent, options.outdir, options.figure, options.balance, options.draw,
-        keep=options.keep,
+        keep=options.retention,
     )  # fmt: skip
 
 

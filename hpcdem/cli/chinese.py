@@ -18,6 +18,15 @@ TEXTS = {
     "Save and stop before this much time is up.": "在这段时间用完之前存盘并停止。",
     "Go on from the newest checkpoint of this script.": "从此脚本最新的重启文件继续。",
     "Keep the last K checkpoints [all].": "只保留最近 K 个重启文件 [全部]。",
+    "Of older checkpoints keep the last at or before each multiple of N steps.":
+    "更早的重启文件中,另保留每 N 步整数倍处或之前最后的一个。",
+    "Of older checkpoints keep the last at or before each multiple of T seconds of the model.":
+    "更早的重启文件中,另保留模型时间每 T 秒整数倍处或之前最后的一个。",
+    "Of older checkpoints keep the last at or before these times of the model, in s.":
+    "更早的重启文件中,另保留这些模型时间(秒)处或之前最后的一个。",
+    "With --resume: from the last checkpoint at or before T seconds of the model.":
+    "与 --resume 合用:从模型时间 T 秒处或之前最后的重启文件继续。",
+    "From the last checkpoint at or before T seconds of the model.": "从模型时间 T 秒处或之前最后的重启文件继续。",
     "A checkpoint so long after the last one, or off [30:00].": "距上次存盘这么久后自动存盘,或 off [30:00]。",
     "Read the whole script, say what it would do, run nothing.": "读完整个脚本并说明会做什么,不运行。",
     "Results [data beside the script].": "结果目录 [脚本旁的 data]。",

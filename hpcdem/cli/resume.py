@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from hpcdem.cli.common import HELP, PATH
-from hpcdem.cli.run import Options, time_limit
+from hpcdem.cli.run import Options, keeping, time_limit
 from hpcdem.core.errors import EXIT_OK, HpcdemError, UsageError
 from hpcdem.runtime import run_folder
 
@@ -24,7 +24,13 @@ from hpcdem.runtime import run_folder
 @click.option(
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
-@click.option("--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all].")
+@click.option(
+    "--before",
+    type=click.FloatRange(0),
+    metavar="T",
+    help="From the last checkpoint at or before T seconds of the model.",
+)
+@keeping
 @click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
               "the last one, or off [30:00].")  # fmt: skip
 @click.option("--figure/--no-figure", default=True, help="Draw the last state at the end [yes].")
@@ -43,7 +49,7 @@ def resumed_options(given: dict[str, Any]) -> Options:
     except HpcdemError as damaged:
         click.echo(f"warning: {damaged}; the script in the newest checkpoint is taken", err=True)
         record = None
-    if record is not None and record.state == "done":
+    if record is not None and record.state == "done" and given["before"] is None:
         click.echo(f"{folder}: the run is done, step {record.step}; there is nothing to go on with")
         raise SystemExit(EXIT_OK)
     if record is not None and record.language == "python":

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +18,7 @@ from hpcdem.cli.common import HELP, PATH
 from hpcdem.core import chinese
 from hpcdem.core.errors import EXIT_OK, HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.runtime import launch
-from hpcdem.runtime.run_folder import Job, claim
+from hpcdem.runtime.run_folder import Job, Retention, claim
 from hpcdem.runtime.stop_requests import AUTOSAVE
 from hpcdem.session import Session
 from hpcdem.session import enter as enter_session
@@ -42,7 +44,11 @@ class Options:
     figure: bool = True
     balance: bool = True
     draw: bool = False
+    before: float | None = None
     keep: int = 0
+    keep_steps: int | None = None
+    keep_every: float | None = None
+    keep_at: tuple[float, ...] = ()
     autosave: float | None = AUTOSAVE
     check_reproducible: int | None = None
     against: Path | None = None
@@ -50,16 +56,27 @@ class Options:
     saved_in: Path | None = None
     """Take the script out of the newest checkpoint of this folder (cli/resume.py)."""
 
+    @property
+    def since(self) -> float:
+        """The time of the model [s] from which no checkpoint is taken up any more."""
+        return math.inf if self.before is None else self.before
+
+    @property
+    def retention(self) -> Retention:
+        """Which checkpoints stay."""
+        return Retention(self.keep, self.keep_steps or 0, self.keep_every or 0.0, self.keep_at)
+
 
 def run(session: Session, options: Options) -> None:
     """Collective: read and carry out a script, then draw its last state. The same text on any number of ranks."""
     from hpcdem.lang import detect
 
     name = str(options.script)
+    refuse_idle(options)
     if options.saved_in is None:
         source = read_script(session.comm, options.script)
     else:
-        source = saved_script(session.comm, options.saved_in)
+        source = saved_script(session.comm, options.saved_in, options.since)
     session.reproduction = reproduction(session, options)
     kind = detect.kind(source, name)
     if kind == "python":
@@ -90,7 +107,7 @@ def run_zdem(session: Session, options: Options, source: bytes) -> None:
             claim(script.directory / statement.get("outdir"), session.comm, session.job)
     sim = session.simulation(log=log)
     try:
-        if not (options.resume and go_on(sim, script, log)):
+        if not (options.resume and go_on(sim, script, log, options.since)):
             log.script_started(name, plan.expected_steps(script.statements) or 0)
             execute.Interpreter(script).run(sim)
     except BaseException as error:
@@ -163,7 +180,7 @@ def run_pcdc(session: Session, options: Options, source: bytes) -> None:
         enter_session(session)
         script = interpreter.read(text, name)
         interpreter.load_laws(script)
-        past = fdem.checkpoints.take_up(project) if options.resume else None
+        past = fdem.checkpoints.take_up(project, options.since) if options.resume else None
         log.script_started(name, 0)
         sys.argv = [name, *options.arguments]
         sys.path.insert(0, str(options.script.resolve().parent))
@@ -187,14 +204,27 @@ def own_traceback(error: BaseException, file: str) -> str:
     return "".join(traceback.format_exception(type(error), error, trace or error.__traceback__)).rstrip()
 
 
-def go_on(sim: Simulation, script: Script, log: Log) -> bool:
-    """Collective: finish a script from its newest checkpoint that is whole; False if there is none."""
+def refuse_idle(options: Options) -> None:
+    """UsageError for options that have nothing to act on."""
+    if options.before is not None and not options.resume:
+        raise UsageError("--before T chooses the checkpoint that --resume goes on from; give --resume as well")
+    if not options.keep and options.autosave is None:
+        given = {"--keep-steps": options.keep_steps, "--keep-every": options.keep_every, "--keep-at": options.keep_at}
+        for option in (name for name, value in given.items() if value):
+            raise UsageError(
+                f"{option} spares checkpoints that would be removed; none is with --autosave off and without --keep K"
+            )
+
+
+def go_on(sim: Simulation, script: Script, log: Log, before: float = math.inf) -> bool:
+    """Collective: finish a script from its newest checkpoint that is whole, or the last one not after `before` [s];
+    False if there is none."""
     from hpcdem.lang.zdem import execute
     from hpcdem.physics.dem import saved_state
 
     named = {index: script.directory / s.get("outdir") for index, s in enumerate(script.statements) if s.get("outdir")}
     execute.Interpreter(script).load_laws(sim)
-    found = saved_state.restore_newest(sim, [sim.outdir, *named.values()])
+    found = saved_state.restore_newest(sim, [sim.outdir, *named.values()], before)
     if found is None:
         return False
     sim.progress = found["progress"]
@@ -304,14 +334,16 @@ def other_options(command: click.Command) -> click.Command:
     return command
 
 
-def saved_script(comm: SerialComm, folder: Path) -> bytes:
+def saved_script(comm: SerialComm, folder: Path, before: float = math.inf) -> bytes:
     """Collective: the text of the script that the newest checkpoint of a folder holds."""
     from hpcdem.io import checkpoint
     from hpcdem.io.agreed import on_first
-    from hpcdem.runtime.checkpoints import newest_first
+    from hpcdem.runtime.checkpoints import newest_first, none_before
 
     def text() -> bytes:
-        found, damaged = newest_first([folder])
+        found, damaged = newest_first([folder], before)
+        if not found and before < math.inf:
+            raise none_before(before, [folder])
         if not found:
             raise UsageError("; ".join([f"{folder}: no checkpoint to go on from", *damaged]))
         state = checkpoint.read_state(found[0])
@@ -330,6 +362,36 @@ def time_limit(context: click.Context, option: click.Parameter, value: str | Non
         return None if value is None else parse_limit(value, option.opts[0])
     except UsageError as error:
         raise click.UsageError(str(error)) from None
+
+
+def seconds(context: click.Context, option: click.Parameter, value: str | None) -> tuple[float, ...]:
+    """Times of T[,T...], in order."""
+    try:
+        times = tuple(sorted(float(word) for word in value.split(","))) if value else ()
+    except ValueError:
+        times = (math.nan,)
+    if not all(0.0 <= time < math.inf for time in times):
+        raise click.BadParameter(f"{value!r}: numbers of seconds with commas between them, as 10,25.5", context, option)
+    return times
+
+
+def keeping(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options that say which checkpoints stay."""
+    of_old = "Of older checkpoints keep the last at or before "
+    options = [
+        click.option(
+            "--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all]."
+        ),
+        click.option("--keep-steps", type=click.IntRange(1), metavar="N", help=f"{of_old}each multiple of N steps."),
+        click.option(
+            "--keep-every", type=click.FloatRange(0, min_open=True), metavar="T",
+            help=f"{of_old}each multiple of T seconds of the model.",
+        ),
+        click.option("--keep-at", callback=seconds, metavar="T,...", help=f"{of_old}these times of the model, in s."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
 
 
 class RunCommand(click.Command):
@@ -379,7 +441,11 @@ class RunCommand(click.Command):
     "--time-limit", callback=time_limit, metavar="HH:MM:SS", help="Save and stop before this much time is up."
 )
 @click.option("--resume", is_flag=True, help="Go on from the newest checkpoint of this script.")
-@click.option("--keep", type=click.IntRange(0), default=0, metavar="K", help="Keep the last K checkpoints [all].")
+@click.option(
+    "--before", type=click.FloatRange(0), metavar="T", help="With --resume: from the last checkpoint at or before T "
+    "seconds of the model."
+)  # fmt: skip
+@keeping
 @click.option("--autosave", callback=time_limit, default="30:00", metavar="MM:SS", help="A checkpoint so long after "
               "the last one, or off [30:00].")  # fmt: skip
 @click.option("--check", is_flag=True, help="Read the whole script, say what it would do, run nothing.")

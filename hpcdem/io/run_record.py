@@ -76,6 +76,12 @@ def is_earlier_frame(path: Path, record: Record | None) -> bool:
     return is_older(path, record) or (record.state != "running" and step > record.step)
 
 
+def step_of_frame(name: str) -> int | None:
+    """The step in the name of a frame; None of other files."""
+    found = _FRAME.fullmatch(name)
+    return int(found[1]) if found is not None else None
+
+
 def left_behind(folder: Path) -> dict[str, list[int]]:
     """The checkpoints and frames in a folder."""
     names = sorted(path.name for path in folder.iterdir() if path.suffix == ".sav" or _FRAME.fullmatch(path.name))

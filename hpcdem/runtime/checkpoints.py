@@ -2,17 +2,49 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
-from hpcdem.core.errors import HpcdemError
+from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io import checkpoint
+from hpcdem.io.agreed import on_first
 from hpcdem.runtime import run_folder
 
 
-def newest_first(folders: list[Path]) -> tuple[list[Path], list[str]]:
+def newest_first(folders: list[Path], before: float = math.inf) -> tuple[list[Path], list[str]]:
     """The checkpoints of the runs that wrote last into some folders, the newest first, and what is wrong with those of
-    which not even the state can be read. Tables are not looked at. Not collective."""
+    which not even the state can be read; before: only those of this time of the model [s] and earlier ones. Tables are
+    not looked at. Not collective."""
+    ranked, damaged = _ranked(folders)
+    latest = before + run_folder.ROUNDING * abs(before)
+    return [path for _, time, path in ranked if time <= latest], damaged
+
+
+def go_back_to(path: Path, folders: list[Path], comm: Any) -> None:
+    """The run goes on from this checkpoint: later ones in the folders, and frames that came after it, do not count
+    any more. Collective."""
+
+    def work() -> None:
+        ranked = [(place, found) for place, _, found in _ranked(folders)[0]]
+        chosen = next(place for place, found in ranked if found == path)
+        later = {found for place, found in ranked if place > chosen}
+        for folder in dict.fromkeys([path.parent, *(found.parent for found in later)]):
+            run_folder.set_aside(folder, later, chosen[1] if folder == path.parent else -1)
+
+    on_first(comm, work)
+
+
+def none_before(before: float, folders: list[Path]) -> UsageError:
+    """There is no checkpoint to go back to."""
+    return UsageError(
+        f"--before {before:g}: no whole checkpoint in {' or '.join(map(str, folders))} is of that time of the model or "
+        "an earlier one (hpcdem info FILE.sav tells the time of each)"
+    )
+
+
+def _ranked(folders: list[Path]) -> tuple[list[tuple[tuple[int, int, int], float, Path]], list[str]]:
+    """Place in the script, step and time of change; time of the model [s]; path: the newest first."""
     ranked, damaged = [], []
     for folder in dict.fromkeys(path.resolve() for path in folders):
         try:
@@ -26,12 +58,13 @@ def newest_first(folders: list[Path]) -> tuple[list[Path], list[str]]:
             try:
                 state = checkpoint.read_state(path)
                 place = _position(state), int(state["clock"]["step"]), path.stat().st_mtime_ns
+                time = float(state["clock"]["time"])
             except (HpcdemError, OSError, KeyError, TypeError, ValueError, AttributeError) as error:
                 text = str(error) if isinstance(error, HpcdemError) else f"{path} is damaged: {error!r}"
                 damaged.append(text)
             else:
-                ranked.append((place, path))
-    return [path for _, path in sorted(ranked, reverse=True)], damaged
+                ranked.append((place, time, path))
+    return sorted(ranked, reverse=True), damaged
 
 
 def _position(state: dict[str, Any]) -> int:

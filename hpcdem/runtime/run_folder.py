@@ -9,11 +9,15 @@ Functions that take a communicator are collective; rank 0 alone touches the disk
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import socket
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +25,14 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of
-from hpcdem.io.run_record import RECORD, Record, is_older, left_behind, read
+from hpcdem.io.run_record import RECORD, Record, is_older, left_behind, read, step_of_frame
 
 PRESENT = "now"
 """Folder below the results: the present state of a model to which commands are typed (commands/present.py)."""
 _NUMBERED = re.compile(r"(auto_)?(\d{10,})\.sav")
+
+ROUNDING = 1e-9
+"""Of times, which are sums of steps, relative to them."""
 
 _held: dict[Path, FolderLock] = {}
 """Locks of this process. One program may make several simulations that write into one folder."""
@@ -111,9 +118,34 @@ def checkpoint_name(step: int, automatic: bool = False) -> str:
     return f"{'auto_' if automatic else ''}{step:010d}.sav"
 
 
-def retire(folder: Path, comm: Any, step: int, keep: int) -> None:
-    """After the checkpoint of `step`: remove all but the last `keep` numbered ones of this run (0: none is removed),
-    all but the last two automatic ones, and automatic ones from before the last numbered one. Not collective.
+@dataclass(frozen=True)
+class Retention:
+    """Which checkpoints stay: the last numbered ones (0: all), the last two automatic ones; and of all that are older
+    the last at or before each multiple of `steps` steps and of `period` [s], and at or before each of `times` [s] (0,
+    (): none). Times are the model's."""
+
+    last: int = 0
+    steps: int = 0
+    period: float = 0.0
+    times: tuple[float, ...] = ()
+
+    def spares(self, path: Path, following: Path) -> bool:
+        """Whether an old checkpoint stays; following: the next one that is there."""
+        if self.steps and _step_of(following) > math.ceil(_step_of(path) / self.steps) * self.steps:
+            return True
+        if not self.period and not self.times:
+            return False
+        time, later = _time_of(path), _time_of(following)
+        marks = list(self.times)
+        if self.period:
+            marks.append(math.ceil(time / self.period * (1.0 - ROUNDING)) * self.period)
+        return any(time <= mark * (1.0 + ROUNDING) < later for mark in marks)
+
+
+def retire(folder: Path, comm: Any, step: int, keep: Retention) -> None:
+    """After the checkpoint of `step`: remove those of this run that are too many, numbered ones before the last
+    `keep.last`, automatic ones before the last two and from before the last numbered one, but for those that `keep`
+    spares. Not collective.
 
     Files of other runs, and of later steps, stay. What cannot be removed stays as well.
     """
@@ -130,11 +162,39 @@ def retire(folder: Path, comm: Any, step: int, keep: int) -> None:
         regular = [(at, path) for at, path, automatic in mine if not automatic]
         extra = [(at, path) for at, path, automatic in mine if automatic]
         last = regular[-1][0] if regular else -1
-        gone = [path for at, path in extra if at <= last] + [path for at, path in extra if at > last][:-2]
-        for path in gone + ([path for _, path in regular[:-keep]] if keep > 0 else []):
+        old = [path for at, path in extra if at <= last] + [path for at, path in extra if at > last][:-2]
+        old += [path for _, path in regular[: -keep.last]] if keep.last else []
+        following = {path: after for (_, path, _), (_, after, _) in pairwise(mine)}
+        for path in [path for path in old if not keep.spares(path, following[path])]:
             path.unlink()
     except (HpcdemError, OSError):
         pass
+
+
+def set_aside(folder: Path, later: Collection[Path], step: int) -> None:
+    """The run goes on from a checkpoint of `step`, which is not its newest: note in run.json that these later ones, and
+    frames of later steps, are of a run before this one. Not collective."""
+    record = read(folder)
+    if record is None:
+        return
+    for name, signature in left_behind(folder).items():
+        frame = step_of_frame(name)
+        if folder / name in later or (frame is not None and frame > step):
+            record.older[name] = signature
+    _write(folder, record)
+
+
+def _step_of(path: Path) -> int:
+    """Of a numbered checkpoint."""
+    return int(path.stem.removeprefix("auto_"))
+
+
+@cache
+def _time_of(path: Path) -> float:
+    """Model time [s] of a checkpoint of this run; looked up once."""
+    from hpcdem.io import checkpoint  # not before the environment of HDF5 is settled
+
+    return float(checkpoint.read_state(path)["clock"]["time"])
 
 
 def release_all() -> None:

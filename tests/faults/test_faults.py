@@ -7,6 +7,7 @@ the same to the last byte.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import time
@@ -345,6 +346,28 @@ def test_checkpoints_are_rotated(launch, script, undisturbed):
     data = script.parent / "data"
     assert len(checkpoints(data)) == 2 and checkpoints(data)[-1] == "0000015000.sav"
     assert (data / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_old_checkpoints_are_spared_by_the_time_of_the_model(launch, script, undisturbed):
+    """0.04 s a step, a checkpoint each 1000: at or before 100, 200, ... s lie 80, 200, 280, 400 s, ..."""
+    done = launch(1, script, "--keep", "1", "--keep-every", "100", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0, done.stderr
+    data = script.parent / "data"
+    assert [int(name[:10]) for name in checkpoints(data)] == [2000, 5000, 7000, 10000, 12000, 15000]
+    assert (data / LAST_FRAME).read_bytes() == undisturbed
+
+
+def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(launch, script, undisturbed, stopped):
+    """81 s are step 2025. Later checkpoints of the run that was given up are passed over from then on."""
+    assert launch(1, script, "--before", "81", cwd=script.parent).stderr.count("give --resume as well") == 1
+    none = launch(1, script, "--resume", "--before", "39.9", "--no-figure", cwd=script.parent)
+    assert none.returncode == 2 and "--before 39.9: no whole checkpoint in" in none.stderr
+    cut = launch(1, "resume", "--before", "81", "--time-limit", "0.001", "--no-figure", cwd=script.parent)
+    assert cut.returncode == 85 and "going on from" in cut.stdout and "0000002000.sav" in cut.stdout, cut.stderr
+    done = launch(1, "resume", "--no-figure", cwd=script.parent)
+    assert done.returncode == 0, done.stderr
+    step = int(re.search(r"going on from .*, step (\d+)", done.stdout)[1])
+    assert 2000 <= step < 3000 and (stopped / LAST_FRAME).read_bytes() == undisturbed
 
 
 def test_a_checkpoint_that_nobody_asked_for(launch, script, undisturbed):

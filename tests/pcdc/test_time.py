@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from hpcdem.commands.fdem import checkpoints
-from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint
+from hpcdem.core.errors import HpcdemError, StoppedWithCheckpoint, UsageError
 from hpcdem.physics.fdem import convergence, diagnostics
 from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.runtime.run_folder import Retention
 from hpcdem.runtime.stop_requests import STOP
 from tests.pcdc.fake import Bench, Noted
 from tests.pcdc.test_running import Asked
@@ -193,3 +194,33 @@ def test_a_stop_in_the_middle_changes_nothing(tmp_path, monkeypatch, after):
     assert again.blocks.clock == straight.blocks.clock and straight.blocks.clock.step > 200
     for name in ("position_y", "velocity_x"):
         assert np.array_equal(diagnostics.values(again.blocks, name), diagnostics.values(straight.blocks, name))
+
+
+def test_a_script_goes_back_to_a_time(tmp_path, monkeypatch):
+    """Checkpoints each ten steps, of which each second one is spared; the last one before a time is taken up, and what
+    came later counts no more."""
+    straight, first, again = Rock(tmp_path / "a", ""), Rock(tmp_path / "b", ""), Rock(tmp_path / "b", "")
+    script = f"{BLOCK}pcdc model step 55\n"
+    straight(script)
+    usual = convergence.advance
+
+    def saving(sim, steps):
+        if sim.clock.step and sim.clock.step % 10 == 0:
+            checkpoints.write_checkpoint(first.project)
+        return usual(sim, 1)
+
+    first.project.keep = Retention(1, steps=20)
+    with monkeypatch.context() as patch:
+        patch.setattr(convergence, "advance", saving)
+        first(script)
+    assert [int(path.stem) for path in sorted(first.project.outdir.glob("*.sav"))] == [20, 40, 50]
+    with pytest.raises(UsageError, match="--before 1e-09: no whole checkpoint"):
+        checkpoints.take_up(Rock(tmp_path / "b", "").project, 1e-9)
+    past = checkpoints.take_up(again.project, 45.0 * straight.blocks.clock.dt)
+    assert again.project.step == 40
+    again.interpreter.run(again.interpreter.read(script, "script.sc"), past)
+    assert again.blocks.clock == straight.blocks.clock
+    assert np.array_equal(*(diagnostics.values(rock.blocks, "position_y") for rock in (again, straight)))
+    later = Rock(tmp_path / "b", "")
+    checkpoints.take_up(later.project)
+    assert later.project.step == 40

@@ -16,8 +16,9 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.lock import FolderLock, Taken, holder_of
 from hpcdem.runtime import run_folder
-from hpcdem.runtime.run_folder import Job
+from hpcdem.runtime.run_folder import Job, Retention
 
+STEPS = range(100, 1401, 100)
 COMM = SerialComm()
 JOB = Job("push.py", "zdem")
 HOLD = """
@@ -165,19 +166,72 @@ def test_the_last_few_are_kept(tmp_path):
     touch(tmp_path, "0000009000.sav")
     enter(tmp_path)
     touch(tmp_path, *(f"{step:010d}.sav" for step in (1000, 2000, 3000, 4000)), "mine.sav", "0000000500.sav.tmp")
-    run_folder.retire(tmp_path, COMM, 4000, keep=2)
+    run_folder.retire(tmp_path, COMM, 4000, Retention(2))
     assert names(tmp_path) == ["0000003000.sav", "0000004000.sav", "0000009000.sav", "mine.sav"]
-    run_folder.retire(tmp_path, COMM, 4000, keep=0)
+    run_folder.retire(tmp_path, COMM, 4000, Retention())
     assert len(names(tmp_path)) == 4
+
+
+@pytest.mark.parametrize(
+    ("keep", "stay"),
+    [
+        (Retention(1), [1400]),
+        (Retention(2), [1300, 1400]),
+        (Retention(1, steps=500), [500, 1000, 1400]),
+        (Retention(1, steps=350), [300, 700, 1000, 1400]),
+        (Retention(1, period=0.2), [*range(200, 801, 200), *range(900, 1401, 100)]),  # 0.2 s are 100 steps from 800 on
+        (Retention(1, period=0.7), [700, 1100, 1400]),
+        (Retention(1, times=(0.25, 0.9)), [200, 800, 1400]),
+        (Retention(1, times=(99.0,)), [1400]),
+        (Retention(1, 500, 0.7, (0.25,)), [200, 500, 700, 1000, 1100, 1400]),
+    ],
+)
+def test_old_ones_are_spared_by_step_and_by_time(tmp_path, monkeypatch, keep, stay):
+    """A checkpoint each 100 steps, 1 ms a step, from step 800 on 2 ms. What stays does not depend on what is removed
+    first: after each one in turn, or all at once."""
+    time = {step: sum(1e-3 for _ in range(step)) + sum(1e-3 for _ in range(max(step - 800, 0))) for step in STEPS}
+    monkeypatch.setattr(run_folder, "_time_of", lambda path: time[int(path.stem)])
+    all_at_once = tmp_path / "once"
+    for folder in (tmp_path, all_at_once):
+        folder.mkdir(exist_ok=True)
+        enter(folder)
+        for step in STEPS:
+            touch(folder, f"{step:010d}.sav")
+            if folder == tmp_path or step == STEPS[-1]:
+                run_folder.retire(folder, COMM, step, keep)
+        assert [int(name.split(".")[0]) for name in names(folder)] == stay
+
+
+def test_automatic_ones_are_spared_as_well(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_folder, "_time_of", lambda path: 1e-3 * int(path.stem.removeprefix("auto_")))
+    enter(tmp_path)
+    touch(tmp_path, *(f"auto_{step:010d}.sav" for step in (100, 250, 400, 500)), "0000000300.sav")
+    run_folder.retire(tmp_path, COMM, 500, Retention(times=(0.26,)))
+    assert names(tmp_path) == ["0000000300.sav", *(f"auto_{step:010d}.sav" for step in (250, 400, 500))]
+    run_folder.retire(tmp_path, COMM, 500, Retention(1, period=0.3))
+    assert names(tmp_path) == ["0000000300.sav", *(f"auto_{step:010d}.sav" for step in (400, 500))]
+
+
+def test_going_back_sets_aside_what_came_later(tmp_path):
+    """Later checkpoints and frames count no more, unless they are written again."""
+    enter(tmp_path)
+    touch(tmp_path, *(f"{step:010d}.sav" for step in (100, 200, 300)))
+    touch(tmp_path, *(f"all_{step:010d}.dat" for step in (150, 200, 250)))
+    run_folder.set_aside(tmp_path, [tmp_path / "0000000300.sav"], 200)
+    record = run_folder.read(tmp_path)
+    assert record is not None and sorted(record.older) == ["0000000300.sav", "all_0000000250.dat"]
+    assert run_folder.is_older(tmp_path / "0000000300.sav", record)
+    (tmp_path / "0000000300.sav").write_bytes(b"again")
+    assert not run_folder.is_older(tmp_path / "0000000300.sav", record)
 
 
 def test_two_automatic_ones_are_kept_until_a_numbered_one_follows(tmp_path):
     enter(tmp_path)
     touch(tmp_path, *(f"auto_{step:010d}.sav" for step in (100, 200, 300)))
-    run_folder.retire(tmp_path, COMM, 300, keep=0)
+    run_folder.retire(tmp_path, COMM, 300, Retention())
     assert names(tmp_path) == ["auto_0000000200.sav", "auto_0000000300.sav"]
     touch(tmp_path, "0000000250.sav")
-    run_folder.retire(tmp_path, COMM, 300, keep=0)
+    run_folder.retire(tmp_path, COMM, 300, Retention())
     assert names(tmp_path) == ["0000000250.sav", "auto_0000000300.sav"]
 
 
@@ -185,7 +239,7 @@ def test_what_cannot_be_removed_stays(tmp_path):
     enter(tmp_path)
     (tmp_path / "0000000001.sav").mkdir()
     touch(tmp_path, "0000000002.sav")
-    run_folder.retire(tmp_path, COMM, 2, keep=1)
+    run_folder.retire(tmp_path, COMM, 2, Retention(1))
     assert (tmp_path / "0000000002.sav").exists()
 
 

@@ -73,11 +73,12 @@ def restore(project: Project, path: str) -> dict[str, Any]:
     return names
 
 
-def take_up(project: Project) -> list[Any] | None:
+def take_up(project: Project, before: float = math.inf) -> list[Any] | None:
     """Take the state of the newest whole checkpoint in the folder of the results, which a run of the same script wrote;
-    returns its journal (lang.pcdc.journal), None if there is no checkpoint. Collective. A damaged file is named in the
+    returns its journal (lang.pcdc.journal), None if there is no checkpoint. before: that of this time of the model [s]
+    or the last one before it, UsageError if there is none. Collective. A damaged file is named in the
     log and the one before it is tried. UsageError if the script cannot be brought back to where it was written."""
-    found = _newest(project)
+    found = _newest(project, before)
     if found is None:
         return None
     path, run = found
@@ -92,10 +93,10 @@ def take_up(project: Project) -> list[Any] | None:
     return journal
 
 
-def restore_newest(project: Project) -> bool:
+def restore_newest(project: Project, before: float = math.inf) -> bool:
     """The same for a Python program, which is not run again; False if there is no checkpoint. CommandError for that of
     a script. Then `steps.resume` finishes the command in which it was written. Collective."""
-    found = _newest(project)
+    found = _newest(project, before)
     if found is None:
         return False
     path, run = found
@@ -105,10 +106,10 @@ def restore_newest(project: Project) -> bool:
     return True
 
 
-def _newest(project: Project) -> tuple[Path, Any] | None:
+def _newest(project: Project, before: float) -> tuple[Path, Any] | None:
     """Take the state of the newest whole checkpoint; its path, and what it says of the run that wrote it."""
     folder, comm, log = project.outdir, project.comm, project.log
-    found, damaged = checkpoints.newest_first([folder]) if comm.rank == 0 else ([], [])
+    found, damaged = checkpoints.newest_first([folder], before) if comm.rank == 0 else ([], [])
     for error in damaged if log is not None else []:
         log.warn(f"{error}; it is passed over")
     for path in comm.bcast(found):
@@ -123,7 +124,11 @@ def _newest(project: Project) -> tuple[Path, Any] | None:
             continue
         if log is not None:
             log.info(f"going on from {path}, step {project.step}")
+        if before < math.inf:
+            checkpoints.go_back_to(path, [folder], comm)
         return path, extra.get("run")
+    if before < math.inf:
+        raise checkpoints.none_before(before, [folder])
     if log is not None:
         log.info(f"no checkpoint in {folder}: starting at the beginning")
     return None

@@ -51,7 +51,7 @@ class Project:
         self.directory = Path(directory)
         self.outdir = Path(outdir)
         self.job: Any = None
-        self.keep = 0
+        self.keep = run_folder.Retention()
         self.line = 0
         self.folder_made = False
         self.names: Callable[[], dict[str, Any]] = dict

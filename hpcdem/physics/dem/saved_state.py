@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -47,7 +48,7 @@ from hpcdem.physics.dem.simulation import ListState, Simulation
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.particle_physics import PHYSICS
 from hpcdem.physics.user_files import UnknownLaw
-from hpcdem.runtime.checkpoints import newest_first
+from hpcdem.runtime.checkpoints import go_back_to, newest_first, none_before
 
 
 def save(sim: Simulation, path: Path | str) -> None:
@@ -202,14 +203,15 @@ def restore(sim: Simulation, path: Path | str) -> dict[str, Any]:
     return {name: state[name] for name in ("script", "position", "progress")}
 
 
-def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | None:
-    """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. Collective.
+def restore_newest(sim: Simulation, folders: list[Path], before: float = math.inf) -> dict[str, Any] | None:
+    """Take the newest whole checkpoint among the .sav files of some folders; None if there is none. before: that of
+    this time of the model [s] or the last one before it, UsageError if there is none. Collective.
 
     The newest is the one that is farthest in the script, then that of the latest step: clocks may go wrong. What an
     earlier run left in a folder does not count. Returns what `restore` returns, and "path". A damaged file is named in
     the log and the one before it is tried.
     """
-    found, damaged = newest_first(folders) if sim.comm.rank == 0 else ([], [])
+    found, damaged = newest_first(folders, before) if sim.comm.rank == 0 else ([], [])
     for error in damaged if sim.log is not None else []:
         sim.log.warn(f"{error}; it is passed over")
     for path in sim.comm.bcast(found):
@@ -224,7 +226,11 @@ def restore_newest(sim: Simulation, folders: list[Path]) -> dict[str, Any] | Non
         if sim.log is not None:
             sim.log.info(f"going on from {path}, step {sim.clock.step}")
         sim.resumed = True
+        if before < math.inf:
+            go_back_to(path, folders, sim.comm)
         return {**state, "path": path}
+    if before < math.inf:
+        raise none_before(before, folders)
     if sim.log is not None:
         sim.log.info(f"no checkpoint in {' or '.join(map(str, folders))}: starting at the beginning")
     return None

@@ -37,6 +37,7 @@ from hpcdem.physics.dem.settings import Settings
 from hpcdem.physics.dem.user_laws import PairLaw
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.model import Model
+from hpcdem.runtime.run_folder import Retention
 
 NARROW, WIDE = 0.3, 0.6
 """Skin over the largest radius, at rest and in fast motion."""
@@ -119,7 +120,7 @@ class Simulation(Model):
         self.job: Any = None  # runtime.run_folder.Job: what was started
         self.resumed = False  # goes on from a checkpoint that lies where it writes
         self.restored: tuple[Path, int] | None = None  # the checkpoint that the script named, and its step
-        self.keep = 0  # numbered checkpoints that are kept, 0: all
+        self.keep = Retention()
         self.watchers: list[Watcher] = []
         self.number = 0  # of the simulations of a program, in the order in which they were made
         self.coupled = False  # to blocks, which step them both (physics/coupling)
