@@ -232,6 +232,13 @@ def _clumps() -> WarmUp:
     return warm_up.with_clumps, (rigid,)
 
 
+def _restitution() -> WarmUp:
+    from hpcdem.commands.dem import warm_up
+    from hpcdem.physics.dem.kernels import dashpots
+
+    return warm_up.with_restitution, (dashpots,)
+
+
 def _blocks() -> WarmUp:
     from hpcdem.commands.fdem import warm_up
 
@@ -366,6 +373,7 @@ KINDS = {
     "": Kernels(_particles),
     "energy": Kernels(_energy, after=("",)),
     "clumps": Kernels(_clumps, after=("",)),
+    "restitution": Kernels(_restitution, after=("",)),
     "blocks": Kernels(_blocks),
     "coupled": Kernels(_coupled, after=("energy",)),
     "bolts": Kernels(_bolts),
@@ -389,7 +397,7 @@ KINDS = {
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
 others are loaded, or compiled, by the first model that needs them."""
-OF_PARTICLES = ("energy", "clumps")
+OF_PARTICLES = ("energy", "clumps", "restitution")
 """Those that come when a model of particles asks for them."""
 OF_BLOCKS = tuple(kind for kind in KINDS if kind not in ("shared", "", "blocks", "coupled", *OF_PARTICLES))
 """Those that come when a model of blocks asks for them."""

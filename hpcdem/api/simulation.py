@@ -402,8 +402,8 @@ class Simulation(BlockCommands):
 
     @_command
     def set(self, **options: Any) -> None:
-        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, seed, gentry, thickness, wallside, units,
-        outdir, and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
+        """SET: dt, frac, gravity=(gx, gy), disk="on" | "off" | "hex", lsm, restitution, seed, gentry, thickness,
+        wallside, units, outdir, and the steps between outputs: print, ps, vtk, save, stepbar, energy."""
         for name, value in options.items():
             if name == "outdir":
                 self._write_into(value)

@@ -93,7 +93,7 @@ class Maker:
         self.balls = 0
         self.walls: dict[int, float] = {}
         self.saves = 0
-        self.accounts = self.pressed = False
+        self.accounts = self.pressed = self.rebounds = False
 
     # ---- drawing
 
@@ -213,9 +213,11 @@ class Maker:
             self.perhaps(20, f"seed {self.whole(0, 99)}"), self.perhaps(15, "wallside", self.pick("left", "both")),
             self.perhaps(15, f"gentry {self.pick('3', '0.5', '40')}"), self.perhaps(15, f"stepbar {self.whole(7, 90)}"),
             self.perhaps(10, "thickness 3.0"), self.perhaps(10, "units", self.pick("SI", "mm-MPa-s")),
+            self.perhaps(15, "restitution 0.7") if self.disk != "on" else "",  # there are no clumps then
         ]  # fmt: skip
         if any(more):
             self.add("SET", *more)
+        self.rebounds = any(word.startswith("restitution") for word in more)
         self.intervals()
         self.enclosure()
         for ident, what in ((1, "kinetic"), (2, "step"), (3, "energy")):
@@ -229,9 +231,9 @@ class Maker:
         return 0.005 * self.dt * self.stiffness / self.share**2
 
     def intervals(self) -> None:
-        """Outputs, not too many of them. The account of energy does not go with pressures."""
+        """Outputs, not too many of them. The account of energy does not go with pressures, nor with dashpots."""
         for name, percent in (("print", 40), ("save", 20), ("vtk", 15), ("ps", 15), ("energy", 20)):
-            if self.chance(percent) and not (name == "energy" and self.pressed):
+            if self.chance(percent) and not (name == "energy" and (self.pressed or self.rebounds)):
                 self.add("SET", name, str(self.pick(50, 70, 130, 0)))
                 self.accounts |= name == "energy"
 

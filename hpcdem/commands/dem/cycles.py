@@ -264,6 +264,7 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
     or if lattice-solid damping reverses a velocity."""
     critical, dt = diagnostics.critical_dt(sim), sim.clock.dt
     damping = sim.settings.lsm * dt / diagnostics.lightest(sim)
+    braking = 0.0 if sim.dashpots is None else 2.0 * dt * sim.dashpots.fastest(sim)
     near = dt > NEAR * critical or (math.isinf(critical) and sim.bonds_left() > 0)
     highest = diagnostics.highest_frequency(sim) if near else 0.0
     if sim.log is None:
@@ -291,6 +292,16 @@ def _warn_about_the_time_step(sim: Simulation) -> None:
         )
     if damping > 1.0:
         sim.log.warn_once("damping", f"SET damp lsm: eta dt / m is {damping:.3g} for the lightest particle, above 1")
+    if braking > 1.0:
+        sim.log.warn_once(
+            "dashpots", f"SET restitution: the dashpots of the contacts there are would reverse velocities in "
+            f"{1.0 / braking:.3g} steps; rebounds are not those asked for, take a smaller time step"
+        )  # fmt: skip
+    if sim.dashpots is not None and (sim.settings.lsm > 0.0 or (sim.materials.rows["damp"] > 0.0).any()):
+        sim.log.warn_once(
+            "restitution", "SET restitution: PROP damp and SET damp lsm take energy of rebounds besides; they are "
+            "lower than asked for"
+        )  # fmt: skip
 
 
 @dataclass

@@ -45,6 +45,10 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         if value < 0.0:
             raise CommandError(f"SET damp lsm must not be negative, got {value:g}")
         s.lsm = float(value)
+    elif name == "restitution":
+        if not 0.0 < value <= 1.0:
+            raise CommandError(f"SET restitution must be above 0 and not above 1, got {value:g}")
+        s.restitution = float(value)
     elif name == "seed":
         if value < 0:
             raise CommandError(f"SET seed must not be negative, got {value}")

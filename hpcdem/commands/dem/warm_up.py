@@ -58,6 +58,15 @@ def with_clumps(threads: int = 1) -> None:
     diagnostics.critical_dt(sim)
 
 
+def with_restitution(threads: int = 1) -> None:
+    """The same for the dashpots of SET restitution."""
+    sim = _model(threads)
+    settings.set_option(sim, "restitution", 0.5)
+    cycles.prepare(sim)
+    sim.step()
+    sim.dashpots.fastest(sim)
+
+
 def _model(threads: int) -> Simulation:
     """Particles of all kinds between walls, after a step."""
     sim = Simulation(SerialComm(), threads=threads, outdir=Path("."))

@@ -402,6 +402,8 @@ _SETTINGS = (
     ),
     Option("frac", "time step over sqrt(smallest mass / largest pair stiffness)", kind=POSITIVE, source="S"),
     Option("damp", "lattice-solid damping, force -v times this", kind=LSM, unit="N s/m", default="lsm 0", source="S"),
+    Option("restitution", "share of the speed at which discs that are not bonded part again, from each other and from "
+           "walls; 1: nothing is lost", kind=RATIO, default="1", source="X"),
     _interval("stepbar", "a line of progress every so many steps"),
     _interval("save", "a restart file .sav every so many steps"),
     _interval("print", "a frame .dat and .vtkhdf every so many steps"),

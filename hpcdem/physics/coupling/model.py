@@ -57,6 +57,8 @@ class Coupled(SurfaceLoad):
             raise CommandError(f"friction must be a number that is not negative, got {friction}")
         if self.name in blocks.surface_loads or particles.coupled:
             raise CommandError("these blocks or particles are coupled already")
+        if particles.settings.restitution < 1.0:
+            raise CommandError("SET restitution does not go with contacts with blocks, which have laws of their own")
         self.particles, self.blocks = particles, blocks
         self.comm = particles.comm
         self.friction = math.inf if friction is None else float(friction)

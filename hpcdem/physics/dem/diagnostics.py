@@ -53,7 +53,14 @@ def wall_rows(sim: Simulation) -> tuple[np.ndarray, np.ndarray]:
 
 def wall_forces(sim: Simulation) -> np.ndarray:
     """Force on each wall (n_walls, 2) [N], exactly summed. Collective."""
-    return _sum_by_wall(sim, *wall_rows(sim))
+    out, iout = wall_rows(sim)
+    if sim.dashpots is not None:
+        of_slots, lists = sim.dashpots.on_walls(sim), sim.lists
+        more = np.zeros((len(of_slots), out.shape[1]))
+        more[:, FORCE_X], more[:, FORCE_Y] = of_slots.T
+        rows = np.column_stack([np.zeros(len(of_slots), np.int64), lists.slot_wall])
+        out, iout = np.concatenate([out, more]), np.concatenate([iout, rows])
+    return _sum_by_wall(sim, out, iout)
 
 
 def _sum_by_wall(sim: Simulation, out: np.ndarray, iout: np.ndarray) -> np.ndarray:

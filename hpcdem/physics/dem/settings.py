@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Settings:
     """SI units. Intervals are in steps, 0 is off. `dt` and `frac`: the one given last counts, the other is 0. gentry:
     attempts of GEN per particle asked for, 0 while not set. thickness: of the model, for pressures and stresses.
-    units: that the user says to work in (core.units.SYSTEMS), "" none."""
+    units: that the user says to work in (core.units.SYSTEMS), "" none. restitution: 1 without dashpots."""
 
     dt: float = 0.0
     frac: float = 0.0
@@ -28,3 +28,4 @@ class Settings:
     gentry: float = 0.0
     thickness: float = 1.0
     units: str = ""
+    restitution: float = 1.0

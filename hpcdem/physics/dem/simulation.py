@@ -151,6 +151,7 @@ class Simulation(Model):
         self.rows: list[tuple[int, int]] = []
         self._named: set[int] = set()
         self.energy: Any = None
+        self.dashpots: Any = None  # restitution.Dashpots, while SET restitution is below 1
         self.pair_law: PairLaw | None = None  # of the user; materials say which discs have it
         self.stamp = 1  # evaluations of forces, for the memory of that law
         self.history_wishes: dict[int, tuple[int, str]] = {}
@@ -236,6 +237,8 @@ class Simulation(Model):
         if len(lists.slot_row):
             self._wall_table[:, 0:2], self._wall_table[:, 2:4] = self.walls.p1, self.walls.p2
             self._wall_forces(lists.n_blocks, *self._wall_args)
+        if self.dashpots is not None:
+            self.dashpots.push(self)
         if len(self._pushed):
             lists.force[self._pushed, :2] += self._push
         if self.clumps:
@@ -699,6 +702,12 @@ class Simulation(Model):
             lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,
         )  # fmt: skip
         self._tables_stale = False
+        self.dashpots = None
+        if s.restitution < 1.0:
+            self.prepare_kernels("restitution")
+            from hpcdem.physics.dem.restitution import Dashpots  # brings kernels of their own
+
+            self.dashpots = Dashpots(self)
         for physics in self.physics:
             physics.prepare(self)
 

@@ -1,0 +1,62 @@
+"""Dashpots of contacts: the same bits on any number of ranks and threads, and across a restart."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tests.property.workers import Resident
+from tests.short_push import assert_same_files, contents
+from tests.ways import WAYS, ways
+
+SHOWER = """\
+START
+BOX left 0 right 60 bottom 0 height 20 kn 1e7 ks 1e7 fric 0.3
+WALL id 5 nodes (1, 20) (1, 0) kn 1e7 ks 1e7 xv 2.0
+GEN num 700 rad discrete 0.3 0.4 0.5 x (2 58) y (0 18) group sand
+PROP density 2500 kn 1e7 ks 8e6 fric 0.4 yv -9.0
+SET DT 2e-4 GRAVITY 0 -9.8 print 600 save 400 restitution 0.45
+CYC 700
+PROP ebmod 1e7 gbmod 1e7 tstrength 1e4 sstrength 1e4 RANGE x (0 30)
+FIX x RANGE x (40 45)
+SET restitution 0.8
+CYC 500
+STOP
+"""
+
+
+def run(resident: Resident, folder: Path, ranks: int, *options: str) -> None:
+    folder.mkdir(exist_ok=True)
+    (folder / "shower.py").write_text(SHOWER)
+    done = resident(ranks, "shower.py", "--no-figure", *options, cwd=folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def alone(resident: Resident, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shower") / "one"
+    run(resident, folder, 1)
+    return folder
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("way", ways(quick=("2 ranks", "2 threads")))
+def test_ranks_and_threads_do_not_change_a_bit(resident: Resident, alone: Path, tmp_path: Path, way: str) -> None:
+    ranks, options = WAYS[way]
+    run(resident, tmp_path, ranks, *options)
+    assert_same_files(alone / "data", tmp_path / "data")
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("step", [400, pytest.param(800, marks=pytest.mark.slow)])
+def test_a_restart_does_not_change_a_bit(resident: Resident, alone: Path, tmp_path: Path, step: int) -> None:
+    shutil.copytree(alone, tmp_path / "run")
+    data = tmp_path / "run" / "data"
+    for path in data.glob("*.sav"):
+        if int(path.stem) > step:
+            path.unlink()
+    run(resident, tmp_path / "run", 2, "--resume")
+    assert_same_files(alone / "data", data)
+    assert len(contents(data / "0000000800.sav")["pairs/fs"]) > 50
