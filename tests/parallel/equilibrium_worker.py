@@ -136,23 +136,23 @@ def pumped(sim: Blocks, solver: str, out: str, propped: bool = False) -> None:
         flow.stage("pump", SHUT, 0.0, math.inf, math.inf)
     sim.gravity(5.0, 0.0)
     middle, again = Path(out).with_suffix(".sav"), Blocks(sim.comm)
-    for end in (1.0,) if propped else (0.6, 1.0):  # joints that broke are joints again, see pressed.py
-        go_on(sim, end, solver)
-        if end < 1.0:
-            saved_state.save(sim, middle)
-    if not propped:
-        saved_state.restore(again, middle)
-        go_on(again, 1.0, solver)
+    go_on(sim, 0.6, solver)
+    if propped:  # all that is thicker is a pack now, which pushes
+        proppant.prescribe(None, CONCENTRATION, 0.1)
+        proppant.adjust({"proppant_concentration_limit": 0.15, "proppant_modulus": 4e5})
+    saved_state.save(sim, middle)
+    saved_state.restore(again, middle)
+    for one in (sim, again):  # joints that broke are joints again, see pressed.py
+        go_on(one, 1.0, solver)
     found = {name: diagnostics.values(sim, name) for name in NAMES}
     for name in FLUID:
         found[name] = flow.values("flow-node", name)
-        if not propped:
-            found[f"again_{name}"] = Flow.of(again).values("flow-node", name)
+        found[f"again_{name}"] = Flow.of(again).values("flow-node", name)
     found["joints"] = np.array(diagnostics.joint_counts(sim))
     found["account"] = np.array(list(flow.account().values())[:4])
     found["wells"] = np.array([flow.well_value(one.name, name) for one in flow.wells for name in QUANTITIES])
     if propped:
-        found |= {name: flow.values("flow-node", name) for name in ("concentration", "proppant")}
+        found |= {name: flow.values("flow-node", name) for name in ("concentration", "proppant", "pack_pressure")}
         found["sand"] = np.array(list(proppant.account().values())[:5])
     if sim.comm.rank == 0:
         np.savez(out, **found)

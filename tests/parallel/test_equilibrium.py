@@ -66,9 +66,10 @@ def test_fluid_opens_the_joint(runs):
     assert pressure > 1e5 and (rate, stage) == (0.0, 2.0) and injected == pytest.approx(5e-5 * 0.83, rel=1e-12)
 
 
-def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs):
+@pytest.mark.parametrize("kind", ["pumped", "propped"])
+def test_a_file_in_mid_injection_goes_on_with_the_same_bits(runs, kind):
     """Written by as many ranks as go on from it; on more of them: test_the_same_bits."""
-    found = runs(1, "direct-pumped")
+    found = runs(1, f"direct-{kind}")
     for name in ("pressure", "saturation", "fluid"):
         assert np.array_equal(found[f"again_{name}"], found[name])
 
@@ -78,6 +79,7 @@ def test_slurry_opens_it_too(runs):
     stored, packed, came, left, removed = found["sand"]
     assert abs(came - stored - left - removed) < 1e-12 * came and came > 0.15 * water["account"][1]
     assert found["concentration"].max() > 0.19 and found["pressure"].max() > 1.01 * water["pressure"].max()
+    assert found["pack_pressure"].max() > 0.25 * 4e5 and packed > 0.0
 
 
 def test_cold_strains_the_joints(runs):
@@ -120,7 +122,7 @@ def test_the_same_bits(runs, name, ranks):
 
 ELASTIC = ("stress_xx", "stress_yy", "stress_xy", "displacement_x", "displacement_y", "opening")
 PUMPED = ("stress_yy", "displacement_y", "opening", "pressure", "saturation", "fluid", "joints", "account")
-PROPPED = (*PUMPED, "concentration", "proppant", "sand")
+PROPPED = (*PUMPED, "concentration", "proppant", "pack_pressure", "sand")
 COOLED = ("stress_xx", "displacement_x", "temperature", "account")
 PLASTIC = ("stress_xx", "stress_yy", "displacement_x", "displacement_y", "plastic_shear_strain", "plastic_work")
 

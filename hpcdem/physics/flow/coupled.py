@@ -106,11 +106,6 @@ class Coupled:
             raise CommandError("the hydraulic part is switched off: model option hydraulic on comes first")
         if not self.moves:
             return
-        if self.flow.slurry is not None and self.flow.slurry.values["proppant_modulus"] > 0.0:
-            raise CommandError(
-                "implicit steps of flow know no pack of proppant that bears: proppant-modulus 0, mechanical off, or "
-                "steps of the blocks"
-            )
         if sim.options.dynamic:
             raise CommandError(
                 "implicit steps keep blocks in static equilibrium: model option dynamic off comes first, or mechanical "
@@ -207,9 +202,14 @@ class Coupled:
             raise CommandError("implicit steps of flow hold nodes or leave them free: other velocities are for steps")
         return found
 
+    def _of_fluid(self) -> int:
+        """Unknowns of the fluid: one of each flow node, and one of its pack if some bear."""
+        slurry, n = self.flow.slurry, len(self.flow.network.nodes)
+        return n * (2 if self.moves and slurry is not None and slurry.packs(lambda mine: mine) is not None else 1)
+
     def _unknowns(self) -> Unknowns:
-        """Those of the blocks, then the variable of each flow node."""
-        of, n, blocks, dim = self.of_blocks, len(self.flow.network.nodes), len(self.x), self.sim.dim
+        """Those of the blocks, then the variable of each flow node, and of its pack."""
+        of, n, blocks, dim = self.of_blocks, self._of_fluid(), len(self.x), self.sim.dim
         number = np.full((blocks + n, dim), -1, np.int64)
         number[:blocks] = of.number
         number[blocks:, 0] = of.count + np.arange(n)
@@ -229,7 +229,11 @@ class Coupled:
         else:
             there = False
         if there:
-            made = Petsc(sim.comm, unknowns, np.concatenate([self.nodes.owner, self.nodes.owner[self.fluid.lead]]))
+            made = Petsc(
+                sim.comm,
+                unknowns,
+                np.concatenate([self.nodes.owner, np.tile(self.nodes.owner[self.fluid.lead], self.fluid.layers)]),
+            )
         elif self._condenses():
             made = Condensed(sim.comm, unknowns, self._of_joints())
         else:
@@ -248,7 +252,7 @@ class Coupled:
         lower = np.union1d(np.flatnonzero(sim.joint_exists() & (sim.joint_row > 0)), network.channels)
         faces = np.concatenate([lower, sim.partner[lower]])
         ends = sim.node.reshape(-1)[mesh.face_corners(faces).reshape(-1)]
-        return np.concatenate([ends, len(self.nodes.lead) + np.arange(len(network.nodes))])
+        return np.concatenate([ends, len(self.nodes.lead) + np.arange(self._of_fluid())])
 
     # ---- time steps ----------------------------------------------------------------------------------------------
 
@@ -374,9 +378,9 @@ class Coupled:
             self.count.factors += 1
             iterations += 1
             part, best = 1.0, (math.inf, 1.0)
-            blocks = len(x)
+            to_x, to_u = way[: len(x)], way[len(x) : len(x) + len(u), 0]
             for _ in range(HALVINGS):
-                trial = self._lacking(step, x + part * way[:blocks], u + part * way[blocks:, 0])
+                trial = self._lacking(step, x + part * to_x, u + part * to_u)
                 if trial[0] < lack or (iterations == 1 and lack > ENOUGH and trial[0] < math.inf):
                     break
                 best = min(best, (trial[0], part))
@@ -385,10 +389,10 @@ class Coupled:
                 if lack <= ENOUGH:
                     break
                 part = best[1]
-                trial = self._lacking(step, x + part * way[:blocks], u + part * way[blocks:, 0])
+                trial = self._lacking(step, x + part * to_x, u + part * to_u)
                 if not trial[0] < math.inf:
                     break
-            x, u = x + part * way[:blocks], u + part * way[blocks:, 0]
+            x, u = x + part * to_x, u + part * to_u
             stalled = lack <= ENOUGH and trial[0] > 0.5 * lack
             lack, force, fluid = trial
             if stalled:
@@ -425,14 +429,14 @@ class Coupled:
     def _evaluated(self, step: Step, x: np.ndarray, u: np.ndarray) -> tuple[float, np.ndarray, Balance]:
         with self.sim.timers.around("flow"):
             now = self.fluid.balance(step, u, x)
-        right = np.zeros((len(x) + self.fluid.n, self.sim.dim))
-        right[len(x) :, 0] = -now.residual
+        right = np.zeros((len(x) + self.fluid.layers * self.fluid.n, self.sim.dim))
+        right[len(x) : len(x) + self.fluid.n, 0] = -now.residual
         sizes = float((now.sizes + now.rounding).sum())
         lack = float(np.abs(now.residual).sum()) / sizes if sizes > 0.0 else 0.0
         if not math.isfinite(lack):
             return math.inf, right, now
         if self.moves:
-            self.fluid.show(now.state)
+            self.fluid.show(now.state, now.volume)
             force, ratio, _ = equilibrium.unbalanced(self.sim, self.nodes, self.of_blocks, x)
             right[: len(x)] = force
             lack += ratio

@@ -9,7 +9,8 @@ with flows q, volumes V and leak-off of the explicit steps (kernels.py), all at 
 law follow the opening of joints, pressures push on their faces; Newton's method takes all four derivatives, so fluid of
 any bulk modulus in channels of any width converges. At u = 0 the derivative has a jump (semi-smooth Newton method, Qi &
 Sun 1993). Seepage faces, and rates that take more than there is, are complementarities: max(u, R) = 0 and
-min(u + 1, R) = 0.
+min(u + 1, R) = 0. Packs of proppant that bear have one more unknown at each node, the pressure w on their walls, with
+the equation w = w(V): the state fulfils it at any time, and the matrix stays sparse.
 
 The nodes of a well are one room (wells.py): one variable y, that of its first node, says what all of them hold, y < 0:
 the saturation 1 + y, y > 0: the head y p0 above the lowest of them, p = max(y p0 - (E - E_lowest), 0). Its equation is
@@ -41,6 +42,9 @@ LEAST_PRESSURE = 1e4
 ROUNDING = 1e-8
 """Part of the fluid of a node, and of what would flow if pressure and height did not balance, that counts as flowing:
 where nothing flows any more the rest is rounding."""
+PLACES = 4e7 * 2.0**-52
+"""Part of the largest coordinate by which a channel that widens counts as one that takes fluid up: blocks come to rest
+within four times their rounding, of which 10^-7 is enough balance (coupled.py)."""
 
 
 @dataclass
@@ -48,10 +52,11 @@ class Balance:
     """A state of the fluid at trial positions and variables.
 
     residual (n,): R [m2], with conditions; plain: without; sizes: sum of the sizes of what it is made of; rounding:
-    what else counts as such, where pressure and height nearly balance; fluid, volume (n,) [m2]; state (n,
-    kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity; pumped: by
-    well the fluid that came in [m2], None: what its nodes lack; table (l, kernels.CHANNEL), q [m2/s], lost [m2] (l,):
-    of the links of channels, see kernels.py. In space m3 for m2.
+    what else counts as such, where pressure and height nearly balance, and blocks hardly move; fluid, volume (n,) [m2];
+    state (n, kernels.STATE); held (n,) bool: nodes whose variable is known, by a condition or by a complementarity;
+    pumped: by well the fluid that came in [m2], None: what its nodes lack; table (l, kernels.CHANNEL), q [m2/s], lost
+    [m2] (l,): of the links of channels, see kernels.py; packs (2, n): what packs of proppant push with [Pa], and its
+    derivative by the volume. In space m3 for m2.
     """
 
     residual: np.ndarray
@@ -66,6 +71,7 @@ class Balance:
     table: np.ndarray
     q: np.ndarray
     lost: np.ndarray
+    packs: np.ndarray | None = None
 
 
 @dataclass
@@ -98,6 +104,7 @@ class Fluid:
     p0: float
     u: np.ndarray = field(init=False)
     thicken: Callable[[np.ndarray, np.ndarray], None] | None = field(init=False, default=None)
+    packs: Callable[[np.ndarray], np.ndarray] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         flow, blocks = self.flow, self.flow.blocks
@@ -132,7 +139,20 @@ class Fluid:
                 self.wells.append((well, rows))
                 self.first[rows] = rows[0]
         self.tied = self.first != np.arange(self.n)
+        self._find_packs()
+        self.volume = self._gathered(flow.nodes[:, kernels.V])
         self.u = self._variables(np.where(p > 0.0, p / self.p0, s - 1.0))
+
+    def _find_packs(self) -> None:
+        """Packs that bear, with the grains that are in them now."""
+        slurry = self.flow.slurry
+        moves = self.flow.blocks.options.mechanical
+        self.packs = slurry.packs(self._gathered) if slurry is not None and moves else None
+
+    @property
+    def layers(self) -> int:
+        """Unknowns of each flow node."""
+        return 1 if self.packs is None else 2
 
     def _variables(self, u: np.ndarray) -> np.ndarray:
         """From those of each node by itself: of a well that of its lowest node."""
@@ -183,6 +203,7 @@ class Fluid:
         flow = self.flow
         slurry = flow.slurry
         self.thicken = None if slurry is None else slurry.everywhere(self._gathered)
+        self._find_packs()
         conditions = flow.conditions_at(flow.time + dt if passes else flow.time)
         does, value = conditions[self.condition].T
         energy = self.state_of(self.u, x)[:, kernels.E]
@@ -197,9 +218,11 @@ class Fluid:
             asked.append(one)
         return Step(flow.time, flow.time + dt, self.fluid, conditions, known, asked), u
 
-    def show(self, state: np.ndarray) -> None:
-        """Loads are those of this state from now on."""
+    def show(self, state: np.ndarray, volume: np.ndarray | None = None) -> None:
+        """Loads are those of this state, and of packs in rooms of this volume (n,), None: as they are, from now on."""
         self.flow.state[:] = state[self.held_rows]
+        if self.packs is not None and self.flow.slurry is not None:
+            self.flow.slurry.show(self.packs(self.volume if volume is None else volume)[0, self.held_rows])
 
     def balance(self, step: Step, u: np.ndarray, x: np.ndarray) -> Balance:
         """What the nodes lack at these variables (n,) and positions of the blocks' nodes (nn, dim)."""
@@ -236,7 +259,13 @@ class Fluid:
         ]
         head = (np.abs(state[:, kernels.P]) + np.abs(state[:, kernels.E]))[self.ends].sum(axis=1)
         level = np.bincount(self.end, (np.abs(table[:, kernels.CONDUCT]) * head)[self.both], self.n) * dt
-        return Balance(residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost)
+        if self.flow.blocks.options.mechanical:
+            wall = (table[:, kernels.HALF] / table[:, kernels.APERTURE])[self.both]
+            level += PLACES / ROUNDING * float(np.abs(x).max()) * np.bincount(self.end, wall, self.n)
+        packs = None if self.packs is None else self.packs(volume)
+        return Balance(
+            residual, plain, sizes, ROUNDING * level, fluid, volume, state, held, pumped, table, q, lost, packs
+        )
 
     def _well_lacks(
         self, rows: np.ndarray, asked: Asked, u: np.ndarray, of: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -309,14 +338,35 @@ class Fluid:
 
     def pieces(self, step: Step, now: Balance, u: np.ndarray, x: np.ndarray, first: int) -> list[Pieces]:
         """Derivatives for Newton's method, as pieces of a matrix (see linear.py) whose "nodes" from `first` on are flow
-        nodes: of channels, on rank 0, of faces of this rank, and of nodes, on rank 0."""
+        nodes, then their packs if some bear: of channels, on rank 0, of faces of this rank, and of nodes, on rank 0."""
         rank = self.flow.blocks.comm.rank
         mine = slice(None) if rank == 0 else slice(0, 0)
         own = [Pieces(one.key[mine], one.node[mine], one.stiffness[mine]) for one in self._own_pieces(now, u, first)]
-        return [
+        made = [
             self._channel_pieces(step, now, u, x, first, mine), *own,
-            self._face_pieces(self._rises(u, now)[0], x, first),
+            self._face_pieces(self._rises(u, now)[0], x, first + self.first),
         ]  # fmt: skip
+        if now.packs is not None:
+            packs = first + self.n + np.arange(self.n)
+            made += [*self._pack_pieces(now, x, packs, mine), self._face_pieces(np.ones(self.n), x, packs)]
+        return made
+
+    def _pack_pieces(self, now: Balance, x: np.ndarray, packs: np.ndarray, mine: slice) -> list[Pieces]:
+        """Of w - w(V) by w itself, and by the corners of the channels around each node. packs (n,): their "nodes"."""
+        assert now.packs is not None
+        dim, ends = self.dim, self.ends[mine]
+        own = np.zeros((len(packs[mine]), dim, dim))
+        own[:, 0, 0] = 1.0
+        table = now.table[mine]
+        by_x = self._opens(x, now.table[:: LINKS[dim], kernels.APERTURE])[self.of][mine]
+        by_x *= (table[:, kernels.HALF] / table[:, kernels.APERTURE])[:, None]
+        width = by_x.shape[1]
+        out = np.zeros((len(ends), width + 2 * dim, width + 2 * dim))
+        for end in range(2):
+            out[:, width + dim * end, :width] = -now.packs[1, ends[:, end], None] * by_x
+        nodes = np.column_stack([self.at[self.of][mine], packs[ends]])
+        key = np.arange(self.n)[mine]
+        return [Pieces(self.channels[self.of][mine], nodes, out), Pieces(key, packs[mine][:, None], own)]
 
     def _rises(self, u: np.ndarray, now: Balance) -> tuple[np.ndarray, np.ndarray]:
         """Derivatives of pressure and saturation (n,) by the variable that counts for each node."""
@@ -386,8 +436,9 @@ class Fluid:
         nodes = np.column_stack([self.at[self.of][mine], of_fluid]) if first_row else of_fluid
         return Pieces(self.channels[self.of][mine], nodes, out)
 
-    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, first: int) -> Pieces:
-        """Of the forces on faces by the variables at their ends: kernels.loads. p_u (n,): derivatives of pressures."""
+    def _face_pieces(self, p_u: np.ndarray, x: np.ndarray, variable: np.ndarray) -> Pieces:
+        """Of the forces on faces by variables at their ends: kernels.loads. p_u (n,): derivatives of pressures by them;
+        variable (n,): their "nodes"."""
         k = len(self.face_key)
         p_u = p_u[self.face_node]
         at, dim = x[self.face_at], self.dim
@@ -401,7 +452,7 @@ class Fluid:
             for by in range(dim):
                 weight = (2.0 if end == by else 1.0) * p_u[:, by]
                 out[:, dim * end : dim * end + dim, dim * (dim + by)] = weight[:, None] * normal
-        return Pieces(self.face_key, np.column_stack([self.face_at, first + self.first[self.face_node]]), out)
+        return Pieces(self.face_key, np.column_stack([self.face_at, variable[self.face_node]]), out)
 
     # ---- the end of a step ---------------------------------------------------------------------------------------
 
@@ -425,7 +476,8 @@ class Fluid:
         nodes[:, kernels.GIVEN] += given[mine]
         nodes[:, kernels.LEAKED] += gone[mine]
         nodes[:, kernels.INFLOW] = given[mine] / step.dt
-        self.show(now.state)
+        self.show(now.state, now.volume)
+        self.volume = now.volume
         if flow.carried is not None:
             each = LINKS[self.dim]
             of = each * np.searchsorted(self.channels, flow.channels_here)

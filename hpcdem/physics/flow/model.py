@@ -96,6 +96,13 @@ class Slurry(Protocol):
     def everywhere(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray, np.ndarray], None]:
         """The same for all channels of the model; gathered: values of all flow nodes from those of this rank."""
 
+    def packs(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray] | None:
+        """None if no pack bears; else what all packs push with in rooms of nodes (n,) [m2], and its derivative: rows
+        (2, n)."""
+
+    def show(self, pushes: np.ndarray) -> None:
+        """Packs of the nodes held here push with so much [Pa]. Not collective."""
+
     def filled(self) -> None:
         """A command has given fluid to nodes, or taken it."""
 

@@ -247,6 +247,24 @@ class Proppant(SurfaceLoad):
             state[:, k] = values
         return lambda ends, table: self._thicken(ends, state, table)
 
+    def packs(self, gathered: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray] | None:
+        """None if no pack bears; else, of rooms (n,) [m2] of all flow nodes, what packs push with (137) [Pa] and its
+        derivative, rows (2, n). Grains stay where they are."""
+        modulus = self.values["proppant_modulus"]
+        if not modulus > 0.0 or not self.on or self.blocks.options.one_way:
+            return None
+        full = self.values["proppant_concentration_limit"] / np.maximum(gathered(self.nodes[:, kernels.N]), 1e-300)
+
+        def pushed(room: np.ndarray) -> np.ndarray:
+            strain = 1.0 - full * room
+            return modulus * np.stack([np.maximum(strain, 0.0), np.where(strain > 0.0, -full, 0.0)])
+
+        return pushed
+
+    def show(self, pushes: np.ndarray) -> None:
+        """Packs of the nodes held here, copies too, push with so much [Pa]. Not collective."""
+        self.state[:, kernels.PUSHES] = pushes
+
     def thicken(self, ends: np.ndarray, table: np.ndarray) -> None:
         """What proppant does to the channels of this rank. Not collective."""
         if self._held is self.flow.held:  # else rows are about to be found
