@@ -425,16 +425,13 @@ class Simulation(BlockCommands):
         wall: int,
         xmove: float | None = None,
         ymove: float | None = None,
-        *,
-        save: float | None = None,
-        print: float | None = None,
-        ps: float | None = None,
-        vtk: float | None = None,
+        **every: float,
     ) -> None:
-        """IMPLE: step until the wall has gone this far [m]; outputs at these ways of the wall [m]."""
+        """IMPLE: step until the wall has gone this far [m]; every: distance that it goes between two outputs [m] of a
+        kind: save, print, ps, vtk."""
         self._refuse_only_blocks()
         engine = self.engine
-        dem.cycles.imple(engine, wall, xmove, ymove, save, print, ps, vtk)
+        dem.cycles.imple(engine, wall, xmove, ymove, **every)
 
     def every(self, steps: int, function: Callable[[Simulation], object]) -> Call:
         """Call ``function(sim)`` after each step whose number is a multiple of `steps`, before anything is written.

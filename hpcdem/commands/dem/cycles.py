@@ -12,6 +12,7 @@ import numpy as np
 
 from hpcdem.commands.dem.physics import check_time_step
 from hpcdem.core.errors import CommandError, PhysicsError, StoppedWithCheckpoint
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.engine import output
 from hpcdem.physics.dem import diagnostics
 from hpcdem.physics.dem.budget import Budget
@@ -26,7 +27,6 @@ NEAR = 0.5
 """Time step over the estimate of the critical one from which the true limit is computed."""
 MOST_STEPS = 2**53
 """Steps are counted exactly up to here, in frames and histories too."""
-KINDS = ("print", "vtk", "ps", "save")
 LATE = "contacts that began late"
 
 
@@ -34,7 +34,7 @@ def cycle(sim: Simulation, n: int) -> None:
     """CYC: n steps. Output at steps that are multiples of the SET intervals, and an `_ini` frame before the first."""
     if n < 0:
         raise CommandError(f"CYC needs a number of steps that is not negative, got {n}")
-    intervals = {kind: getattr(sim.settings, kind) for kind in KINDS}
+    intervals = {kind: getattr(sim.settings, kind) for kind in OUTPUTS}
     _begin(sim, "CYC", n, 0, intervals, final_frame=False)
 
 
@@ -43,16 +43,15 @@ def imple(
     wall: int,
     xmove: float | None = None,
     ymove: float | None = None,
-    save: float | None = None,
-    print: float | None = None,
-    ps: float | None = None,
-    vtk: float | None = None,
+    **every: float | None,
 ) -> None:
-    """IMPLE: step until the wall has gone xmove or ymove [m]; intervals are ways of the wall [m] from the start of the
-    command.
+    """IMPLE: step until the wall has gone xmove or ymove [m]; every: of kinds of OUTPUTS, the distance that it goes
+    between two of them [m], from the start of the command.
 
     Kinds of output that are left out are off during the command; a frame is always written at its end.
     """
+    if unknown := every.keys() - OUTPUTS:
+        raise CommandError(f"IMPLE has no option {min(unknown)}; expected {', '.join(OUTPUTS)}")
     if (xmove is None) == (ymove is None):
         raise CommandError("IMPLE needs either xmove or ymove")
     axis, name = (0, "xv") if xmove is not None else (1, "yv")
@@ -66,11 +65,10 @@ def imple(
         )
     prepare(sim)
     per_step = abs(speed) * sim.clock.dt
-    given = {"save": save, "print": print, "ps": ps, "vtk": vtk}
-    for kind, distance in given.items():
+    for kind, distance in every.items():
         if distance is not None and distance < 0.0:
             raise CommandError(f"{kind} must not be negative, got {distance:g}")
-    intervals = {k: max(_nearest(d / per_step), 1) if d else 0 for k, d in given.items()}
+    intervals = {k: max(_nearest(d / per_step), 1) if d else 0 for k, d in {**dict.fromkeys(OUTPUTS), **every}.items()}
     _begin(sim, "IMPLE", _nearest(abs(way) / per_step), sim.clock.step, intervals, final_frame=True)
 
 
@@ -347,10 +345,9 @@ class Due:
             tasks.append(Task(every, 0, partial(output.write_history, sim, ident)))
         last = -1 if progress["last"] is None else progress["last"]
         tasks.append(Task(self._bar, progress["first"], self._report, also=last))
-        shot = output.Snapshot
-        for kind, write in (("print", shot.write_print), ("vtk", shot.write_vtk), ("ps", shot.write_ps)):
-            if intervals[kind] > 0:
-                tasks.append(Task(intervals[kind], origin, write))
+        for kind in OUTPUTS:
+            if kind != "save" and intervals.get(kind, 0) > 0:  # older checkpoints have fewer kinds
+                tasks.append(Task(intervals[kind], origin, getattr(output.Snapshot, f"write_{kind}")))
         if sim.drawing is not None and sim.draws:
             every, what = sim.drawing
             tasks.append(Task(every, origin, lambda moment: moment.write_drawing(what)))

@@ -8,10 +8,11 @@ from typing import Any
 
 from hpcdem.commands import units
 from hpcdem.core.errors import CommandError
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.physics.dem.kernels.mass import SPHERES
 from hpcdem.physics.dem.simulation import Simulation
 
-INTERVALS = ("stepbar", "save", "print", "ps", "vtk", "energy")
+INTERVALS = ("stepbar", "energy", *OUTPUTS)
 POSITIVE = ("dt", "frac", "gentry", "thickness")
 CHOICES = {"disk": tuple(SPHERES), "wallside": ("left", "both")}
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hpcdem.core.errors import HpcdemError, ScriptError
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.lang.zdem import plan
 from hpcdem.lang.zdem.estimate import estimate, kind_of
 from hpcdem.lang.zdem.execute import refuse_lost_files
@@ -21,18 +22,6 @@ from hpcdem.lang.zdem.rules import recorded
 from hpcdem.lang.zdem.statement import Statement, find
 from hpcdem.runtime import launch, speed
 from hpcdem.runtime.progress import rate
-
-BYTES_PER_PARTICLE: Mapping[str, int] = {"print": 2900, "ps": 40, "vtk": 190, "save": 260}
-"""Size of one output per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
-"print" is the .dat and the .vtkhdf together."""
-
-PATTERNS = {
-    "print": ("all_<step>.dat", "all_<step>.vtkhdf"),
-    "ps": ("all_<step>.ps",),
-    "vtk": ("all_<step>.vtk", "wall_<step>.vtk"),
-    "save": ("<step>.sav",),
-}
-"""Names of the files of each kind; <step> has ten digits, a frame before the first step of a command ends in _ini."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +86,7 @@ def examine(script: Script, outdir: Path | None = None) -> Report:
         work=_sum(_product(run.steps, guess.before[run.index]) for run in runs),
         certain=guess.certain,
         folder=_folder(statements, outdir),
-        outputs={kind: _outputs(kind, runs, guess.before) for kind in plan.OUTPUTS},
+        outputs={kind: _outputs(kind, runs, guess.before) for kind in OUTPUTS},
         named=tuple(_named(statements, runs, outdir)),
         rate=per_core,
         measured=measured,
@@ -129,7 +118,7 @@ def _restored(script: Script) -> dict[str, Any] | None:
 def _outputs(kind: str, runs: Sequence[Run], populations: Mapping[int, int | None]) -> Outputs:
     files = [run.files(kind) for run in runs]
     sizes = [_product(n, populations[run.index]) for n, run in zip(files, runs)]
-    return Outputs(_sum(files), _product(_sum(sizes), BYTES_PER_PARTICLE[kind]), any(run.rough(kind) for run in runs))
+    return Outputs(_sum(files), _product(_sum(sizes), OUTPUTS[kind].size), any(run.rough(kind) for run in runs))
 
 
 def _named(statements: Sequence[Statement], runs: Sequence[Run], outdir: Path | None) -> list[tuple[str, str]]:
@@ -228,7 +217,7 @@ def print_report(report: Report, console=None) -> None:
         if outputs.files != 0 or outputs.rough:
             about = "about " if outputs.rough and outputs.files is not None else ""
             size = f"about {_size(outputs.size)}" if outputs.size else ""
-            for name in PATTERNS[kind]:
+            for name in OUTPUTS[kind].files:
                 files.add_row(escape(f"{report.folder}/{name}"), f"{about}{_count(outputs.files)}", size)
                 size = "(both)" if size else ""
     for name, what in report.named:

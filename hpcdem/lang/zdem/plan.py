@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 
 from hpcdem.core.fields import BOX_IDS
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.io.dat import is_frame
 from hpcdem.lang.zdem.lexer import LARGEST_WHOLE
 from hpcdem.lang.zdem.statement import Statement, find
 
-OUTPUTS = ("print", "ps", "vtk", "save")
 Velocity = tuple[float | None, float | None]
 
 

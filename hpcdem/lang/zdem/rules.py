@@ -17,7 +17,8 @@ BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")
 BOND_MODEL_2 = ("n_bond", "s_bond")
 BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber")
 
-RECORDED = ("kinetic", "step", "energy", "gstress", "gstrain", "xstress", "ystress", "xstrain", "ystrain")
+_OF_HIST = {option.name: option for command in t.COMMANDS if command.name == "HIST" for option in command.options}
+RECORDED = tuple(name for name in _OF_HIST if name not in ("id", "interval", "wall"))
 """What HIST follows."""
 
 
@@ -138,7 +139,7 @@ def recorded(s: Statement) -> str:
     """What a HIST line follows, in the words of `commands.history.hist`: ``kinetic``, ``gstrain group a|b``,
     ``ystress wall 3``."""
     name = next(name for name in RECORDED if name in s.arguments)
-    if name in ("kinetic", "step", "energy"):
+    if s.arguments[name] is True:
         return name
     of = s.get(name) or s.get("wall")
     return f"{name} {'group' if name[0] == 'g' else 'wall'} {'|'.join(map(str, of))}"

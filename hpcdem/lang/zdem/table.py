@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.zdem.nearest import hint
 
@@ -386,10 +387,6 @@ def _interval(name: str, doc: str, source: str = "R") -> Option:
     return Option(name, doc, kind=INT, unit="steps", default="off", source=source)
 
 
-def _every(name: str, doc: str, source: str = "R") -> Option:
-    return Option(name, doc, kind=NOT_NEGATIVE, unit="m", default="off", source=source)
-
-
 _SETTINGS = (
     Option("dt", "time step; of DT and frac the one given last counts", kind=POSITIVE, unit="s"),
     Option("gravity", "gravity in x and y", kind=POINT, unit="m/s2", default="0 0"),
@@ -405,10 +402,7 @@ _SETTINGS = (
     Option("restitution", "share of the speed at which discs that are not bonded part again, from each other and from "
            "walls; 1: nothing is lost", kind=RATIO, default="1", source="X"),
     _interval("stepbar", "a line of progress every so many steps"),
-    _interval("save", "a restart file .sav every so many steps"),
-    _interval("print", "a frame .dat and .vtkhdf every so many steps"),
-    _interval("ps", "a vector picture every so many steps"),
-    _interval("vtk", "a .vtk file every so many steps"),
+    *(_interval(name, f"{one.what} every so many steps", one.sources[0]) for name, one in OUTPUTS.items()),
     _interval("energy", "a row of energy.csv every so many steps, and the energy budget at the end", source="X"),
     Option("thickness", "of the model, in the force of PROP xp, yp and the stresses of HIST", kind=POSITIVE, unit="m",
            default="1", source="X"),
@@ -630,10 +624,8 @@ COMMANDS = (
             _id("number of the wall"),
             Option("xmove", "distance in x", kind=DISTANCE, unit="m"),
             Option("ymove", "distance in y", kind=DISTANCE, unit="m", source="X"),
-            _every("print", "a frame each time the wall has moved so far"),
-            _every("ps", "a vector picture each time the wall has moved so far"),
-            _every("save", "a restart file each time the wall has moved so far"),
-            _every("vtk", "a .vtk file each time the wall has moved so far", source="S"),
+            *(Option(name, f"{one.what} each time the wall has moved so far", kind=NOT_NEGATIVE, unit="m",
+                     default="off", source=one.sources[1]) for name, one in OUTPUTS.items()),
         ),
         example=("IMPLE wall id 1 xmove 10000.0 save 2000.0 print 1000.0 ps 1000.0 vtk 1000.0",),
     ),
@@ -658,6 +650,10 @@ COMMANDS = (
             Option("kinetic", "record the kinetic energy", source="S"),
             Option("step", "record the number of the step", source="S"),
             Option("energy", "record the kinetic and elastic energy", source="X"),
+            Option("time", "record the time", source="X"),
+            Option("unbalanced", "record the unbalanced force over the mean contact force", source="X"),
+            Option("contacts", "record the number of contacts that touch", source="X"),
+            Option("bonds", "record the number of bonds", source="X"),
             Option("gstress", "record the axial stress [Pa] on an end wall made of the particles of a group: force of "
                    "all others on it, over its width and SET thickness; the axis is across the row", kind=OF_GROUP,
                    source="P"),
