@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from hpcdem.commands.fdem.project import Project
 from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import CHOICES
 from hpcdem.physics.fdem import convergence
 from hpcdem.physics.fdem import saved_state as of_blocks
@@ -133,7 +134,7 @@ def stepping(project: Project, name: str, steps: int | None) -> Iterator[None]:
     both.heed_time_step(partial(_by_frac, both))
     both.prepare()
     if sim.progress is None:  # else the command goes on from a checkpoint
-        intervals = {kind: int(getattr(sim.settings, kind)) for kind in cycles.KINDS}
+        intervals = {kind: int(getattr(sim.settings, kind)) for kind in OUTPUTS}
         cycles.start(sim, f"model {name}", steps, 0, intervals, initial_frame=sim.edited)
         sim.edited = False
     elif sim.energy is not None and not sim.energy.running:
