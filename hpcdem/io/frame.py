@@ -6,6 +6,8 @@ gids), so that files do not depend on the rank count. Walls are few and known to
 
 from __future__ import annotations
 
+import math
+from collections import OrderedDict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -14,15 +16,25 @@ import numpy as np
 
 
 class Columns(Mapping[str, np.ndarray]):
-    """Columns by name, each read once, when it is first asked for."""
+    """Columns by name, each read when it is first asked for, and kept.
 
-    def __init__(self, readers: Mapping[str, Callable[[], np.ndarray]]) -> None:
-        self._readers, self._read = dict(readers), dict[str, np.ndarray]()
+    readers: from rows to their values; most: bytes that are kept, beyond which columns that nobody has asked for lately
+    are read again when they are wanted."""
+
+    def __init__(self, readers: Mapping[str, Callable[[slice], np.ndarray]], most: float = math.inf) -> None:
+        self._readers, self._read, self._most = dict(readers), OrderedDict[str, np.ndarray](), most
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self._read:
-            self._read[name] = self._readers[name]()
+            self._read[name] = self._readers[name](slice(None))
+        self._read.move_to_end(name)
+        while self.size > self._most and len(self._read) > 1:
+            self._read.popitem(last=False)
         return self._read[name]
+
+    def part(self, name: str, rows: slice) -> np.ndarray:
+        """Some rows of a column, read for this once if the column is not there."""
+        return self._read[name][rows] if name in self._read else self._readers[name](rows)
 
     def __contains__(self, name: object) -> bool:
         return name in self._readers
@@ -41,6 +53,11 @@ class Columns(Mapping[str, np.ndarray]):
     def size(self) -> int:
         """Bytes that have been read."""
         return sum(values.nbytes for values in self._read.values())
+
+
+def part(columns: Mapping[str, np.ndarray], name: str, rows: slice) -> np.ndarray:
+    """Some rows of one of these columns; of a file only they are read."""
+    return columns.part(name, rows) if isinstance(columns, Columns) else columns[name][rows]
 
 
 @dataclass

@@ -309,11 +309,13 @@ def reading(path: str | os.PathLike) -> Iterator[Any]:
 def columns(path: str | os.PathLike, places: Mapping[str, tuple[str, Any]]) -> Columns:
     """Columns of a file by name, read when they are asked for. places: dataset and rows of each."""
 
-    def reader(place: str, rows: Any) -> Callable[[], np.ndarray]:
-        def read() -> np.ndarray:
+    def reader(place: str, whole: Any) -> Callable[[slice], np.ndarray]:
+        def read(rows: slice) -> np.ndarray:
             with reading(path) as file:
                 try:
-                    return file[place][rows]
+                    first, *others = whole if isinstance(whole, tuple) else (whole,)
+                    every = range(*first.indices(len(file[place])))[rows]
+                    return file[place][(slice(every.start, every.stop), *others)]
                 except (KeyError, OSError, ValueError, RuntimeError) as problem:
                     raise HpcdemError(f"cannot read {os.fspath(path)}: {place}: {problem}") from None
 

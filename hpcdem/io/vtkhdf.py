@@ -182,7 +182,7 @@ def read_vtkhdf(path: str | os.PathLike, tables: Collection[str] | None = None, 
             "bonds": (n_bonds, _of_links(links, n + n_contacts, n_bonds, head.attrs["bonds_columns"])),
             "wall_contacts": (
                 max((len(values) for values in head["wall_contacts"].values()), default=0),
-                {name: (f"hpcdem/wall_contacts/{name}", ...) for name in head["wall_contacts"]},
+                {name: (f"hpcdem/wall_contacts/{name}", slice(None)) for name in head["wall_contacts"]},
             ),
         }
         for name, (size, columns) in places.items():
@@ -203,7 +203,7 @@ def _of_particles(group: Any) -> dict[str, tuple[str, Any]]:
         if name in _VECTORS:
             columns |= {part: (place, (slice(None), k)) for k, part in enumerate(_VECTORS[name])}
         else:
-            columns[name] = (place, ...)
+            columns[name] = (place, slice(None))
     return columns
 
 

@@ -21,8 +21,8 @@ from hpcdem.runtime import run_folder
 
 MOMENTS = 3
 """Frames that are kept in memory: one on show, and its neighbours."""
-OBJECTS = 1_500_000
-"""So many objects of them together, if there is more than one."""
+OBJECTS = 500_000
+"""One is read besides others if these have no more objects together."""
 POINTS = 2000
 """Points of a history that the page gets at most."""
 SIGNALS = {"stop": signal.SIGUSR1, "save": signal.SIGUSR2}
@@ -101,18 +101,26 @@ class Sources:
 
     def moment(self, file: FrameFile) -> tuple[tuple[str, int, int], Moment]:
         """What a frame holds, and by what it is known: a file that was written again is another. HpcdemError."""
+        key = self._key(file)
+        with self.lock:
+            if key not in self.moments:
+                while self.moments and (len(self.moments) >= MOMENTS or self._objects() > OBJECTS):
+                    self.moments.popitem(last=False)
+                self.moments[key] = read_moment(file.path)
+            self.moments.move_to_end(key)
+            return key, self.moments[key]
+
+    def kept(self, file: FrameFile) -> bool:
+        """Whether a frame is in memory."""
+        return self._key(file) in self.moments
+
+    @staticmethod
+    def _key(file: FrameFile) -> tuple[str, int, int]:
         try:
             status = os.stat(file.path)
         except OSError:
             raise HpcdemError(f"cannot read {file.path}: there is no such file") from None
-        key = str(file.path), status.st_mtime_ns, status.st_size
-        with self.lock:
-            if key not in self.moments:
-                self.moments[key] = read_moment(file.path)
-                while len(self.moments) > MOMENTS or (len(self.moments) > 1 and self._objects() > OBJECTS):
-                    self.moments.popitem(last=False)
-            self.moments.move_to_end(key)
-            return key, self.moments[key]
+        return str(file.path), status.st_mtime_ns, status.st_size
 
     def _objects(self) -> int:
         return sum(objects.count for moment in self.moments.values() for objects in moment.objects.values())

@@ -26,7 +26,7 @@ from hpcdem.page.maker import packed
 from hpcdem.page.server import Answer, Call, PageServer, as_json
 from hpcdem.page.sources import Sources
 from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
-from hpcdem.post.view.moment import Moment, unit_of
+from hpcdem.post.view.moment import Moment, read_moment, unit_of
 from hpcdem.post.view.scene import (
     Painted,
     Scene,
@@ -54,6 +54,8 @@ LARGEST = 4096
 """Pixels along a side of a picture."""
 KEPT = 24
 """Layers that are kept put together."""
+BYTES = 20e6
+"""Of layers of other frames that are kept."""
 MOVED = ("elements", "joints")
 """What is drawn deformed; joints in space lie on faces of elements."""
 FINE = 2
@@ -92,15 +94,24 @@ class Viewer:
         """What POST answers."""
         return {
             "state": lambda wanted: as_json(self.sources.state()),
-            "about": lambda wanted: as_json(self.about(wanted)),
-            "fields": lambda wanted: as_json(self.fields(wanted)),
+            "about": self._in_turn(self.about),
+            "fields": self._in_turn(self.fields),
             "picture": self.picture,
-            "pick": lambda wanted: as_json(self.pick(wanted)),
+            "pick": self._in_turn(self.pick),
             "history": lambda wanted: as_json(self.sources.history(wanted.get("name"))),
             "tell": lambda wanted: as_json({"said": self.sources.tell(wanted.get("what"))}),
             "view": lambda wanted: as_json(self._view(wanted).model_dump()),
             "file": self.file,
         }
+
+    def _in_turn(self, answer: Callable[[dict[str, Any]], dict[str, Any]]) -> Call:
+        """One after the other: what is kept of a frame is for one at a time."""
+
+        def call(wanted: dict[str, Any]) -> Answer:
+            with self.turn:
+                return as_json(answer(wanted))
+
+        return call
 
     def warm_up(self) -> None:
         """Have the kernels compiled, or loaded, before the first picture is asked for."""
@@ -165,13 +176,12 @@ class Viewer:
 
     def pick(self, wanted: dict[str, Any]) -> dict[str, Any]:
         """What the pixel at column and row shows: layer, number, and all values of the object."""
-        with self.turn:
-            shown, picture = self._painted(wanted | {"fine": False})
-            column, row = (wanted.get(name) for name in ("column", "row"))
-            h, w = picture.layer.shape
-            if not (isinstance(column, int) and isinstance(row, int) and 0 <= column < w and 0 <= row < h):
-                raise HpcdemError("there is no such pixel")
-            place, which = int(picture.layer[row, column]), int(picture.row[row, column])
+        shown, picture = self._painted(wanted | {"fine": False})
+        column, row = (wanted.get(name) for name in ("column", "row"))
+        h, w = picture.layer.shape
+        if not (isinstance(column, int) and isinstance(row, int) and 0 <= column < w and 0 <= row < h):
+            raise HpcdemError("there is no such pixel")
+        place, which = int(picture.layer[row, column]), int(picture.row[row, column])
         if place < 0:
             return {"object": None}
         layer = shown.layers[place].layer
@@ -181,7 +191,7 @@ class Viewer:
         for name in (*objects.fields, *objects.vectors):
             if name in waiting or not objects.filled(name):
                 continue
-            value = objects.fields[name][which] if name in objects.fields else objects.vectors[name][which]
+            value = objects.value(name, which)
             names = objects.names.get(name)
             if names:
                 told: Any = names[int(value)] if 0 <= int(value) < len(names) else None
@@ -190,8 +200,8 @@ class Viewer:
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
             values.append([name, told, unit_of(name, shown.moment.dim)])
-        number = objects.fields[objects.number][which] if objects.number in objects.fields else which
-        place_of = {axis: float(v) for axis, v in zip("xyz", objects.centres()[which])}
+        number = objects.value(objects.number, which) if objects.number in objects.fields else which
+        place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
         return {
             "object": layer.object, "label": layer.label, "number": int(number), **place_of, "values": values,
         }  # fmt: skip
@@ -207,7 +217,7 @@ class Viewer:
         if kind in exports.FILMS:
             source = self.sources.source(wanted.get("source"))
             return Answer(exports.film(source.frames, view, kind, wanted), exports.FORMATS[kind])
-        _, moment = self._moment(wanted)
+        moment = read_moment(self.sources.frame(wanted.get("source", 0), wanted.get("frame", -1)).path)
         return Answer(exports.file(moment, view, kind, wanted), exports.FORMATS[kind])
 
     # ---- putting together ------------------------------------------------------------------------------------------
@@ -220,7 +230,11 @@ class Viewer:
         return view_of(given, "view")
 
     def _moment(self, wanted: dict[str, Any]) -> tuple[tuple[str, int, int], Moment]:
-        return self.sources.moment(self.sources.frame(wanted.get("source", 0), wanted.get("frame", -1)))
+        file = self.sources.frame(wanted.get("source", 0), wanted.get("frame", -1))
+        if not self.sources.kept(file) and _size(self.layers) > BYTES:
+            self.last = None  # large frames take turns in memory
+            self.layers.clear()
+        return self.sources.moment(file)
 
     def _painted(self, wanted: dict[str, Any]) -> tuple[Scene, Any]:
         """Scene and picture of a request; those of the one before if it was the same."""
@@ -253,12 +267,12 @@ class Viewer:
             about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, cut,
                      seen if layer.vectors else None)  # fmt: skip
             if about not in self.layers:
+                while self.layers and (len(self.layers) >= KEPT or _older(self.layers, key)):
+                    self.layers.popitem(last=False)
                 if shifted is None and layer.object in MOVED:
                     shifted = shift_of(moment, view.deformed)
                 moved = shifted if layer.object in MOVED else None
                 self.layers[about] = painted(moment, layer, seen, moved, plane=plane)
-                while len(self.layers) > KEPT or _older(self.layers, key):
-                    self.layers.popitem(last=False)
             self.layers.move_to_end(about)
             found = self.layers[about]
             if found.layer.label != layer.label:
@@ -278,8 +292,11 @@ def _box(moment: Moment) -> list[list[float]] | None:
 
 def _older(layers: OrderedDict[tuple, Painted], key: tuple) -> bool:
     """Whether the oldest layer is of another frame than this one, and layers of this one are many bytes."""
-    size = sum(part.nbytes for layer in layers.values() for part in (*layer.shape, layer.kind))
-    return size > 50e6 and next(iter(layers))[0] != key
+    return _size(layers) > BYTES and next(iter(layers))[0] != key
+
+
+def _size(layers: OrderedDict[tuple, Painted]) -> int:
+    return sum(part.nbytes for layer in layers.values() for part in (*layer.shape, layer.kind, layer.rows))
 
 
 def _legend(shown: Scene) -> list[dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from hpcdem.cli.draw import work
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import COLOURS
 from hpcdem.halo.comm import SerialComm
+from hpcdem.io.frame import Columns
 from hpcdem.io.vtkhdf import read_vtkhdf
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.physics.fdem.diagnostics import QUANTITIES
@@ -78,6 +80,34 @@ def test_columns_that_are_read_later_are_the_same(tmp_path: Path):
         assert len(table) == len(other.tables[name])
         for column, values in table.columns.items():
             np.testing.assert_array_equal(values, other.tables[name].columns[column])
+
+
+def test_what_is_asked_of_one_object_is_read_of_it_alone(rock: Moment, sand: Moment):
+    """And is what its column says, also where it is computed."""
+    for moment in (rock, sand):
+        for name, objects in moment.objects.items():
+            early = {field: objects.value(field, objects.count - 1) for field in (*objects.fields, *objects.vectors)}
+            middle = objects.centre(objects.count - 1)
+            np.testing.assert_allclose(middle, objects.centres()[-1], rtol=1e-14)
+            for field, value in early.items():
+                assert not (isinstance(objects.fields, Columns) and field in objects.fields
+                            and objects.fields.was_read(field)), (name, field)  # fmt: skip
+                whole = objects.fields[field] if field in objects.fields else objects.vectors[field]
+                np.testing.assert_array_equal(value, whole[-1])
+
+
+def test_columns_that_nobody_asks_for_are_let_go():
+    read = []
+
+    def reader(name: str) -> Callable[[slice], np.ndarray]:
+        return lambda rows: (read.append(name), np.arange(10.0))[1][rows]
+
+    columns = Columns({name: reader(name) for name in "abc"}, 160.0)
+    for name in "abaca":
+        assert len(columns[name]) == 10
+    assert read == ["a", "b", "c"] and columns.size == 160
+    assert columns.was_read("a") and not columns.was_read("b")
+    assert columns.part("b", slice(3, 5)).tolist() == [3.0, 4.0] and not columns.was_read("b")
 
 
 def test_objects_and_fields_of_blocks(rock: Moment):

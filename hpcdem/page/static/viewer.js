@@ -10,7 +10,7 @@ const { say } = words;
 const $ = (id) => document.getElementById(id);
 const FILES = ["png", "svg", "pdf", "dxf", "csv", "html", "gif", "mp4", "mv"];
 const REST = 180;  // ms without a wish after which the fine picture is asked for
-const LOOK = 1200;  // ms between two looks at the folder
+const LOOK = 800;  // ms between two looks at the folder
 
 let about = null;  // objects, colours, first view
 let state = { sources: [], run: null, histories: [] };

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import PER_METRE
-from hpcdem.io.frame import Columns, Frame
+from hpcdem.io.frame import Columns, Frame, Table, part
 from hpcdem.io.frames import read_frame
 from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
@@ -38,11 +38,19 @@ UNITS = {
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
 
+KEPT = 40e6
+"""Bytes of columns of a kind of object that are kept: those of the colours on show, and a few more."""
+CHUNK = 1 << 16
+"""Rows that are looked at at a time."""
 PARTS = {
     "x", "y", "z", "xx", "yy", "xy", "zz", "xz", "yz", "max", "middle", "min", "mean", "mises", "largest", "first",
     "last", "shear",
 }  # fmt: skip
 """Ends of the names of fields that change no unit."""
+
+
+_Reader = Callable[[slice], np.ndarray]
+"""Values of some rows."""
 
 
 def unit_of(name: str, dim: int = 2) -> str:
@@ -95,6 +103,20 @@ class Objects:
         quads = cells[:, 3] >= 0
         return (total + np.where(quads[:, None], points[last], 0.0)) / np.where(quads, 4.0, 3.0)[:, None]
 
+    def centre(self, row: int) -> np.ndarray:
+        """(2,), in space (3,) [m]: of one object."""
+        shape = self.read()
+        if self.kind == DISCS:
+            return shape[0][row]
+        if self.kind in (LINES, RODS):
+            return shape[0][row].mean(axis=0)
+        corners = shape[1][row]
+        return shape[0][corners[corners >= 0]].mean(axis=0)
+
+    def value(self, name: str, row: int) -> Any:
+        """Of a field or vector of one object."""
+        return part(self.fields if name in self.fields else self.vectors, name, slice(row, row + 1))[0]
+
     def values(self, name: str, label: str) -> np.ndarray:
         """(n,) a field, or the length of a vector. HpcdemError that names what there is."""
         if name in self.fields:
@@ -113,7 +135,9 @@ class Objects:
 
     def filled(self, name: str) -> bool:
         """Whether it has a value somewhere."""
-        return name in self.vectors or there(self.fields[name])
+        if name in self.vectors:
+            return True
+        return any(there(part(self.fields, name, slice(first, first + CHUNK))) for first in range(0, self.count, CHUNK))
 
     def known(self) -> list[str]:
         """Names of fields and vectors that have a value somewhere."""
@@ -163,11 +187,14 @@ class Moment:
             if not objects.count or name in INSIDE:
                 continue
             shape = objects.read()
-            at = shape[0] if shifted is None or name != "elements" else shape[0] + shifted
-            at = at.reshape(-1, 2) if turn is None else at.reshape(-1, 3) @ turn[:2].T
-            around = shape[1][:, None] if objects.kind == DISCS else 0.0
-            low = np.fmin(low, np.nanmin(np.where(np.isfinite(at), at, np.nan) - around, axis=0))
-            high = np.fmax(high, np.nanmax(np.where(np.isfinite(at), at, np.nan) + around, axis=0))
+            for first in range(0, len(shape[0]), CHUNK):
+                some = slice(first, first + CHUNK)
+                at = shape[0][some] if shifted is None or name != "elements" else shape[0][some] + shifted[some]
+                at = at.reshape(-1, 2) if turn is None else at.reshape(-1, 3) @ turn[:2].T
+                at = np.where(np.isfinite(at), at, np.nan)
+                around = shape[1][some, None] if objects.kind == DISCS else 0.0
+                low = np.fmin(low, np.fmin.reduce(at - around, axis=0))
+                high = np.fmax(high, np.fmax.reduce(at + around, axis=0))
         if not (np.isfinite(low).all() and np.isfinite(high).all()):
             return 0.0, 1.0, 0.0, 1.0
         return float(low[0]), float(high[0]), float(low[1]), float(high[1])
@@ -190,7 +217,7 @@ def read_moment(path: str | os.PathLike) -> Moment:
 
 def of_particles(frame: Frame) -> Moment:
     """A whole frame of particles."""
-    tables = {name: table.columns for name, table in frame.tables.items()}
+    tables: dict[str, Mapping[str, np.ndarray]] = {name: table.columns for name, table in frame.tables.items()}
     p = tables["particles"]
     memory: dict[str, Any] = {}
 
@@ -200,20 +227,24 @@ def of_particles(frame: Frame) -> Moment:
         return memory[name]
 
     def centres() -> np.ndarray:
-        return once("centres", lambda: np.stack([p["x"], p["y"]], axis=1))
+        return once("centres", lambda: pair(p, "x", "y")(slice(None)))
 
-    def pair(table: Mapping[str, np.ndarray], a: str, b: str) -> Callable[[], np.ndarray]:
-        return lambda: np.stack([table[a], table[b]], axis=1)
+    def pair(table: Mapping[str, np.ndarray], a: str, b: str) -> _Reader:
+        return lambda rows: np.stack([part(table, a, rows), part(table, b, rows)], axis=1)
 
-    def stress(name: str) -> np.ndarray:
-        return once("stress", lambda: _stresses(frame))[name]
+    def stress(name: str, rows: slice) -> np.ndarray:
+        return once("stress", lambda: _stresses(frame))[name][rows]
 
-    count = len(p["gid"]) if "gid" in p else 0
-    more: dict[str, Callable[[], np.ndarray]] = {name: partial(p.__getitem__, name) for name in p}
+    def kinetic_energy(rows: slice) -> np.ndarray:
+        mass, vx, vy = (part(p, name, rows) for name in ("mass", "vx", "vy"))
+        return 0.5 * mass * (vx**2 + vy**2)
+
+    count = frame.tables["particles"].total
+    more: dict[str, _Reader] = {name: partial(part, p, name) for name in p}
     if "angle" in p:
-        more["rotation"] = lambda: p["angle"]
+        more["rotation"] = partial(part, p, "angle")
     if "mass" in p and "vx" in p:
-        more["kinetic_energy"] = lambda: 0.5 * p["mass"] * (p["vx"] ** 2 + p["vy"] ** 2)
+        more["kinetic_energy"] = kinetic_energy
     if "fx" in tables["contacts"]:
         more |= {name: partial(stress, name) for name in STRESSES}
     vectors = {
@@ -221,7 +252,7 @@ def of_particles(frame: Frame) -> Moment:
     }
     objects = {
         "particles": Objects(
-            DISCS, count, lambda: (centres(), p["radius"]), Columns(more), Columns(vectors),
+            DISCS, count, lambda: (centres(), p["radius"]), Columns(more, KEPT), Columns(vectors, KEPT),
             {"group": frame.group_names}, "gid", STRESSES,
         )
     }  # fmt: skip
@@ -233,18 +264,19 @@ def of_particles(frame: Frame) -> Moment:
         objects["walls"] = Objects(LINES, len(ends), lambda: (ends,), flat, across, number="id")
     for name in ("contacts", "bonds"):
         table = tables[name]
-        if not len(frame.tables[name]):
+        if not frame.tables[name].total:
             continue
 
         def ends_of(table: Mapping[str, np.ndarray] = table) -> np.ndarray:
-            rows = np.searchsorted(p["gid"], np.stack([table["id1"], table["id2"]], axis=1))
-            return centres()[np.minimum(rows, count - 1)]
+            ids, every = part(p, "gid", slice(None)), pair(table, "id1", "id2")(slice(None))
+            return centres()[np.minimum(np.searchsorted(ids, every), count - 1)]
 
         def lines(name: str = name, make: Callable[[], np.ndarray] = ends_of) -> tuple[np.ndarray]:
             return (once(name, make),)
 
         pulls = {"force": pair(table, "fx", "fy")} if "fx" in table else {}
-        objects[name] = Objects(LINES, len(frame.tables[name]), lines, table, Columns(pulls), number="")
+        columns = Columns({column: partial(part, table, column) for column in table}, KEPT)
+        objects[name] = Objects(LINES, frame.tables[name].total, lines, columns, Columns(pulls, KEPT), number="")
     return Moment(frame.step, frame.time, objects)
 
 
@@ -252,10 +284,17 @@ STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress", "stress_deviator")
 """Of particles, from the forces on them, compression positive: components, mean (s1 + s2) / 2, (s1 - s2) / 2."""
 
 
+def _unread(columns: Any) -> Any:
+    """The same, of which nothing stays that is read."""
+    return Columns({name: partial(part, columns, name) for name in columns})
+
+
 def _stresses(frame: Frame) -> dict[str, np.ndarray]:
     """The stress of each particle [Pa], see hpcdem.post.stress."""
     from hpcdem.post.stress import moments, principal, volume_rule
 
+    tables = {name: Table(_unread(table.columns), table.offset, table.total) for name, table in frame.tables.items()}
+    frame = replace(frame, tables=tables)
     of_volume = moments(frame)[0] / volume_rule(frame)[0][:, None]
     xx, yy, xy = of_volume[:, 0], of_volume[:, 3], 0.5 * (of_volume[:, 1] + of_volume[:, 2])
     mean, deviator, _ = principal(xx, xy, yy)
@@ -269,75 +308,81 @@ def of_blocks(state: MeshState) -> Moment:
     """A frame of blocks."""
     cells, count, dim = state.cells, len(state.joints), state.points.shape[1]
 
-    def mean(name: str) -> np.ndarray:
-        """(ne, ...) of what the corners of each element have."""
-        values = state.of_points[name]
-        total = values[cells[:, 0]] + values[cells[:, 1]] + values[cells[:, 2]]
-        quads = np.flatnonzero(cells[:, 3] >= 0)
-        total[quads] = 0.75 * (total[quads] + values[cells[quads, 3]])
+    def mean(name: str, rows: slice) -> np.ndarray:
+        """(n, ...) of what the corners of each of these elements have, which lie one after the other."""
+        some = cells[rows]
+        first = int(some[0, 0]) if len(some) else 0
+        values = part(state.of_points, name, slice(first, int(some[-1].max()) + 1 if len(some) else 0))
+        total = values[some[:, 0] - first] + values[some[:, 1] - first] + values[some[:, 2] - first]
+        quads = np.flatnonzero(some[:, 3] >= 0)
+        total[quads] = 0.75 * (total[quads] + values[some[quads, 3] - first])
         return total / 3.0
 
     of_corners = [name for name in state.of_points if name not in ("number", "node")]
     flat = [name for name in of_corners if name not in VECTORS]
-    fields = {name: partial(state.of_elements.__getitem__, name) for name in state.of_elements if name != "cell"}
+    fields: dict[str, _Reader] = {
+        name: partial(part, state.of_elements, name) for name in state.of_elements if name != "cell"
+    }
     fields |= {name: partial(mean, name) for name in flat}
-    fields |= {name: partial(make, state.of_elements) for name, make in _of_stress(state.of_elements, dim).items()}
+    fields |= _of_stress(state.of_elements, dim)
     vectors = {name: partial(mean, name) for name in of_corners if name in VECTORS}
-    beside = Columns({"partner": lambda: neighbours(state)})
+    beside = Columns({"partner": lambda rows: neighbours(state)[rows]})
     objects = {
         "elements": Objects(
             SOLIDS if dim == 3 else POLYGONS, len(cells),
             lambda: (state.points, cells, beside["partner"]) if dim == 3 else (state.points, cells),
-            Columns(fields), Columns(vectors), state.group_names,
+            Columns(fields, KEPT), Columns(vectors, KEPT), state.group_names,
         )
     }  # fmt: skip
 
-    def joint(name: str, rows: Any) -> np.ndarray:
-        return state.of_joints[name][rows]
+    def channel(name: str, which: np.ndarray, rows: slice) -> np.ndarray:
+        some = which[rows]
+        first = int(some[0]) if len(some) else 0
+        return part(state.of_joints, name, slice(first, int(some[-1]) + 1 if len(some) else 0))[some - first]
 
-    def of_joints(rows: Any, names: list[str]) -> Columns:
-        return Columns({name: partial(joint, name, rows) for name in names})
+    def of_joints(names: list[str]) -> Columns:
+        return Columns({name: partial(part, state.of_joints, name) for name in names}, KEPT)
 
     wet = [name for name in OF_CHANNELS if name in state.of_joints]
     rest = [name for name in state.of_joints if name not in (*wet, "cell") and not name.startswith("group_")]
     if count and dim == 3:
-        objects["joints"] = Objects(
-            FACES, count, lambda: (state.points, _faces(state)), of_joints(slice(None), rest + wet)
-        )
+        objects["joints"] = Objects(FACES, count, lambda: (state.points, _faces(state)), of_joints(rest + wet))
     elif count:
-        objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(slice(None), rest))
+        objects["joints"] = Objects(LINES, count, lambda: (state.points[state.joints],), of_joints(rest))
     if "aperture" in wet and dim == 2 and fluid.there(state):
         rows = np.flatnonzero(np.isfinite(state.of_joints["aperture"]))
         both = [*wet, *(name for name in ("number", "length") if name in rest)]
         objects["channels"] = Objects(
-            LINES, len(rows), lambda: (state.points[state.joints[rows]],), of_joints(rows, both)
-        )
+            LINES, len(rows), lambda: (state.points[state.joints[rows]],),
+            Columns({name: partial(channel, name, rows) for name in both}, KEPT),
+        )  # fmt: skip
     for name, tables in state.supports.items():
         objects[name] = _supports(name, tables)
     displacement = (lambda: state.of_points["displacement"]) if "displacement" in state.of_points else None
     return Moment(state.step, state.time, objects, displacement, dim)
 
 
-def _of_stress(
-    given: Mapping[str, np.ndarray], dim: int
-) -> dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]]:
+def _of_stress(given: Mapping[str, np.ndarray], dim: int) -> dict[str, _Reader]:
     """What is computed of the stresses of elements (tension positive), where they are all there: mean, von Mises, and
     in space the middle principal stress."""
     shears = ("xy", "xz", "yz") if dim == 3 else ("xy",)
     if not {f"stress_{c}" for c in ("xx", "yy", "zz", *shears)} <= given.keys():
         return {}
 
-    def mean(of: Mapping[str, np.ndarray]) -> np.ndarray:
-        return (of["stress_xx"] + of["stress_yy"] + of["stress_zz"]) / 3.0
+    def stress(component: str, rows: slice) -> np.ndarray:
+        return part(given, f"stress_{component}", rows)
 
-    def mises(of: Mapping[str, np.ndarray]) -> np.ndarray:
-        middle = mean(of)
-        total = 0.5 * sum((of[f"stress_{c}"] - middle) ** 2 for c in ("xx", "yy", "zz"))
-        return np.sqrt(3.0 * (total + sum(of[f"stress_{c}"] ** 2 for c in shears)))
+    def mean(rows: slice) -> np.ndarray:
+        return (stress("xx", rows) + stress("yy", rows) + stress("zz", rows)) / 3.0
 
-    found: dict[str, Callable[[Mapping[str, np.ndarray]], np.ndarray]] = {"stress_mean": mean, "stress_mises": mises}
+    def mises(rows: slice) -> np.ndarray:
+        middle = mean(rows)
+        total = 0.5 * sum((stress(c, rows) - middle) ** 2 for c in ("xx", "yy", "zz"))
+        return np.sqrt(3.0 * (total + sum(stress(c, rows) ** 2 for c in shears)))
+
+    found: dict[str, _Reader] = {"stress_mean": mean, "stress_mises": mises}
     if dim == 3:
-        found["stress_middle"] = lambda of: 3.0 * mean(of) - of["stress_max"] - of["stress_min"]
+        found["stress_middle"] = lambda rows: 3.0 * mean(rows) - stress("max", rows) - stress("min", rows)
     return found
 
 

@@ -295,9 +295,9 @@ def painted(
     rows = result.rows
     whole = objects.read()
     if objects.kind == DISCS:
-        result.shape = whole[0][rows], layer.size * whole[1][rows]
+        result.shape = _of(whole[0], rows), layer.size * _of(whole[1], rows)
     elif objects.kind == LINES:
-        result.shape = (whole[0][rows],)
+        result.shape = (_of(whole[0], rows),)
     elif objects.kind == RODS:
         from hpcdem.post.view import space
 
@@ -312,10 +312,15 @@ def painted(
                 points, whole[1][rows, :3], plane
             )  # fmt: skip
         else:
-            result.shape = points, whole[1] if len(rows) == len(whole[1]) else whole[1][rows]
+            result.shape = points, _of(whole[1], rows)
     if layer.vectors:
         result.arrows = _arrows(objects, result, seen)
     return result
+
+
+def _of(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """values[rows], themselves where these are all."""
+    return values if len(rows) == len(values) else values[rows]
 
 
 def spans(moment: Moment, view: ModelView) -> dict[str, tuple[float, float]]:
@@ -348,12 +353,12 @@ def _span(values: np.ndarray, layer: Layer) -> tuple[float, float]:
 
 def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     layer = result.layer
-    values = np.asarray(objects.values(layer.field, layer.object))[result.rows]
+    values = _of(np.asarray(objects.values(layer.field, layer.object)), result.rows)
     names = objects.names.get(layer.field)
     if names and layer.limits is None:
         _by_name(result, values, names)
         return
-    values = values.astype(float)
+    values = values.astype(float, copy=False)
     low, high = layer.limits or _span(values, layer)
     if layer.log and not low < np.inf and len(values):
         raise HpcdemError(f"log: no value of {layer.field} is above 0")
@@ -363,11 +368,14 @@ def _by_field(result: Painted, objects: Objects, dim: int) -> None:
     result.values = values
     with np.errstate(invalid="ignore", divide="ignore"):
         place, ends = (np.log10(values), np.log10((low, high))) if layer.log else (values, np.array((low, high)))
-        part = (place - ends[0]) / max(float(ends[1] - ends[0]), 1e-300)
-        step = np.clip(np.nan_to_num(part, nan=0.0, posinf=1.0, neginf=0.0) * STEPS, 0, STEPS - 1).astype(np.int64)
-    result.kind = np.where(np.isfinite(place) | (np.isposinf(values)), step, STEPS)
+        part = place - ends[0]
+        part /= max(float(ends[1] - ends[0]), 1e-300)
+        np.nan_to_num(part, copy=False, nan=0.0, posinf=1.0, neginf=0.0)
+        part *= STEPS
+        result.kind = np.clip(part, 0, STEPS - 1, out=part).astype(np.int64)
+    result.kind[~(np.isfinite(place) | np.isposinf(values))] = STEPS
     if layer.log:
-        result.kind = np.where(values > 0.0, result.kind, STEPS)
+        result.kind[~(values > 0.0)] = STEPS
     result.shades = np.concatenate([shades_of(layer.colours), rgb([NOTHING])])
 
 

@@ -117,7 +117,7 @@ def _in_space(scene: Scene, turn: np.ndarray, place: tuple, target: tuple, fine:
 def _layer(painted: Painted, number: int, place: tuple, colours: np.ndarray, layer: np.ndarray, row: np.ndarray,
            fine: int) -> None:  # fmt: skip
     shades = np.clip(np.rint(255.0 * painted.shades), 0, 255).astype(np.uint8)
-    kind, rows = painted.kind.astype(np.int64), painted.rows.astype(np.int64)
+    kind, rows = (np.ascontiguousarray(one, np.int64) for one in (painted.kind, painted.rows))
     look = painted.layer
     target, which, opacity = (colours, layer, row), np.int8(number), float(look.opacity)
     if painted.kind_of_shape == DISCS:

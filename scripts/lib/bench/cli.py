@@ -206,10 +206,10 @@ def memory(
 @click.option(
     "--kind", "kinds", type=click.Choice(view.KINDS), multiple=True, default=view.KINDS, help="Several times."
 )
-@click.option("--frames", type=click.IntRange(2), default=6, metavar="N", help="Frames in the folder [6].")
+@click.option("--frames", type=click.IntRange(2), default=200, metavar="N", help="Frames in the folder [200].")
 @JSON
 def view_(objects: tuple[float, ...], kinds: tuple[str, ...], frames: int, json_file: str | None) -> None:
-    """First picture, pictures per second, clicks and memory of `hpcdem view` at 1280 x 720."""
+    """First picture, pictures per second, clicks, new frames and memory of `hpcdem view` at 1280 x 720."""
     lines = tables.Lines(json_file)
     for kind in kinds:
         for size in objects:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
 import tempfile
 import time
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +22,23 @@ from bench.tables import Lines
 KINDS = ("discs", "triangles")
 WIDTH, HEIGHT = 1280, 720
 PICTURES = 30
+DIFFERENT = 3
+"""Frames that are made up; the others of a folder are further names of these."""
+LOOK = 0.8
+"""Seconds between two looks of the page at its folder."""
 
 
 def measure(kind: str, size: int, frames: int, lines: Lines) -> None:
     """Time to the first picture from the start of the program, pictures per second while the camera moves and while
-    frames go by, time of a click, and largest memory of the server."""
+    frames go by, time of a click, time until a new frame is shown, and largest memory of the server."""
     with tempfile.TemporaryDirectory() as folder:
-        made = (
-            make_frames(Path(folder), size, frames, "vtkhdf")
-            if kind == "discs"
-            else _blocks(Path(folder), size, frames)
-        )
-        for path in Path(folder).iterdir():  # into the cache of the system: frames are warm
+        make = make_frames if kind == "discs" else _blocks
+        made = make(Path(folder), size, min(DIFFERENT, frames), "vtkhdf")
+        paths = sorted(Path(folder).iterdir())
+        for path in paths:  # into the cache of the system: frames are warm
             path.read_bytes()
+        for k in range(len(paths), frames):
+            _named(paths, k)
         began = time.perf_counter()
         process = subprocess.Popen(
             [sys.executable, "-m", "hpcdem", "view", folder, "--no-browser"], stdout=subprocess.PIPE, text=True
@@ -40,7 +46,7 @@ def measure(kind: str, size: int, frames: int, lines: Lines) -> None:
         try:
             assert process.stdout is not None
             url = re.match(r"Page: (\S+)", process.stdout.readline())[1]  # type: ignore[index]
-            row = _asked(url, began, "vx" if kind == "discs" else "stress_yy")
+            row = _asked(url, began, "vx" if kind == "discs" else "stress_yy", lambda: _named(paths, frames))
             status = Path(f"/proc/{process.pid}/status").read_text()
             row["memory_mb"] = int(re.search(r"VmHWM:\s+(\d+)", status)[1]) / 1e3  # type: ignore[index]
         finally:
@@ -49,7 +55,13 @@ def measure(kind: str, size: int, frames: int, lines: Lines) -> None:
     lines.add({"code": "hpcdem view", "kind": kind, "objects": made, "frames": frames, **row})
 
 
-def _asked(url: str, began: float, field: str) -> dict[str, Any]:
+def _named(paths: list[Path], number: int) -> None:
+    """Frame `number` of the folder is one of these."""
+    stem = paths[0].name.partition("_")[0]
+    os.link(paths[number % len(paths)], paths[0].with_name(f"{stem}_{10**6 + number:010d}.vtkhdf"))
+
+
+def _asked(url: str, began: float, field: str, write: Callable[[], None]) -> dict[str, Any]:
     state = json.loads(_ask(url, "state", {}))
     count = len(state["sources"][0]["frames"])
     about = json.loads(_ask(url, "about", {}))
@@ -70,9 +82,15 @@ def _asked(url: str, began: float, field: str) -> dict[str, Any]:
     scrubbing = _pace(lambda k: _ask(url, "picture", wanted(0.0, k % count)))
     asked = time.perf_counter()
     _ask(url, "pick", wanted(0.0, (PICTURES - 1) % count) | {"column": WIDTH // 2, "row": HEIGHT // 2})
+    pick = time.perf_counter() - asked
+    written = time.perf_counter()
+    write()
+    time.sleep(LOOK)  # the page has just looked
+    assert len(json.loads(_ask(url, "state", {}))["sources"][0]["frames"]) == count + 1
+    _ask(url, "picture", wanted(0.0, count))
     return {
-        "first_s": first, "moving_per_s": moving, "scrubbing_per_s": scrubbing,
-        "pick_ms": 1e3 * (time.perf_counter() - asked),
+        "first_s": first, "moving_per_s": moving, "scrubbing_per_s": scrubbing, "pick_ms": 1e3 * pick,
+        "new_frame_s": time.perf_counter() - written,
     }  # fmt: skip
 
 
@@ -89,7 +107,7 @@ def _ask(url: str, name: str, content: dict[str, Any]) -> bytes:
         return response.read()
 
 
-def _blocks(folder: Path, size: int, frames: int) -> int:
+def _blocks(folder: Path, size: int, frames: int, suffix: str) -> int:
     """Triangles of squares, with a stress that differs from frame to frame."""
     from hpcdem.halo.comm import SerialComm
     from hpcdem.io.frame import Table
@@ -109,5 +127,5 @@ def _blocks(folder: Path, size: int, frames: int) -> int:
             Table({"number": np.arange(count), "corners": np.full(count, 3), "stress_yy": stress}, 0, count),
             Table(no_joints | {"state": np.zeros(0), "mode": np.zeros(0)}, 0, 0), {},
         )  # fmt: skip
-        write_mesh_frame(folder / f"rock_{k:010d}.vtkhdf", frame, SerialComm())  # type: ignore[arg-type]
+        write_mesh_frame(folder / f"rock_{k:010d}.{suffix}", frame, SerialComm())  # type: ignore[arg-type]
     return count
