@@ -7,9 +7,12 @@ import re
 from typing import NamedTuple
 
 OBJECTS = (
-    "elements", "particles", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners",
+    "elements", "particles", "clumps", "walls", "contacts", "bonds", "channels", "joints", "bolts", "liners",
+    "face-conditions", "flow-nodes", "node-conditions",
 )  # fmt: skip
 """What can be shown, in the order in which it lies over one another."""
+HIDDEN = ("clumps", "contacts", "bonds", "face-conditions", "flow-nodes", "node-conditions")
+"""Of these, what is shown only if somebody asks for it."""
 COLOURS = {
     "viridis": "viridis",
     "cividis": "cividis",

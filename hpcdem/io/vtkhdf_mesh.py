@@ -30,6 +30,9 @@ CORNERS = {2: ("first", "last"), 3: ("first", "second", "last")}
 _LINE, _TRIANGLE, _QUAD, _TETRA = 3, 5, 9, 10
 SUPPORTS = ("bolts", "liners")
 """Groups of a file with tables of their nodes and elements."""
+CONTACTS, NODE_CONDITIONS, FACE_CONDITIONS, FLOW_NODES = "contacts", "node-conditions", "face-conditions", "flow-nodes"
+"""Tables of what else there is, one group of a file each, see hpcdem.commands.fdem.beside."""
+TABLES = (CONTACTS, NODE_CONDITIONS, FACE_CONDITIONS, FLOW_NODES)
 Supports = Mapping[str, Mapping[str, Mapping[str, np.ndarray]]]
 
 
@@ -40,7 +43,7 @@ class MeshFrame:
     corners: number (element * 4 + k), x, y and further columns; elements: number, corners (how many) and further
     columns; joints: number, their `CORNERS` and further columns. group_names: by name of an integer
     column of the elements what its values stand for. supports: by name ("bolts", "liners") columns of their "nodes"
-    and "elements", equal on all ranks.
+    and "elements", equal on all ranks. tables: of `TABLES`, by name.
     """
 
     step: int
@@ -51,6 +54,7 @@ class MeshFrame:
     joints: Table
     group_names: Mapping[str, list[str]]
     supports: Supports = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
 
 
 @dataclass
@@ -60,7 +64,7 @@ class MeshState:
     points (n, 2), in space (n, 3): corners [m]; cells (ne, 4): rows of points, -1 in the fourth column of triangles;
     joints (nj, 2), in space (nj, 3): rows of points of their corners; of_points, of_elements, of_joints: columns by
     name, vectors as points;
-    group_names and supports as in `MeshFrame`.
+    group_names and supports as in `MeshFrame`; tables: columns of `TABLES`, vectors as points.
     """
 
     step: int
@@ -74,14 +78,18 @@ class MeshState:
     of_joints: Mapping[str, np.ndarray]
     group_names: Mapping[str, list[str]]
     supports: Supports = field(default_factory=dict)
+    tables: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
 
 
 def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
     """Collective: the frame with all rows on rank 0, None elsewhere."""
-    parts = comm.gather([table.columns for table in (frame.corners, frame.elements, frame.joints)])
+    further = frame.tables.values()
+    parts = comm.gather([table.columns for table in (frame.corners, frame.elements, frame.joints, *further)])
     if parts is None:
         return None
-    corners, elements, joints = ({c: np.concatenate([p[k][c] for p in parts]) for c in parts[0][k]} for k in range(3))
+    corners, elements, joints, *others = (
+        {c: np.concatenate([p[k][c] for p in parts]) for c in parts[0][k]} for k in range(len(parts[0]))
+    )
     number = corners["number"]
     points = np.stack([corners[c] for c in "xyz" if c in corners], axis=1)
     of_joints = CORNERS[points.shape[1]]
@@ -91,6 +99,7 @@ def whole(frame: MeshFrame, comm: Any) -> MeshState | None:
         _cells(elements["corners"]), ends, _flat({k: v for k, v in corners.items() if k not in ("x", "y", "z")}),
         {k: v for k, v in elements.items() if k != "corners"},
         {k: v for k, v in joints.items() if k not in of_joints}, frame.group_names, frame.supports,
+        dict(zip(frame.tables, map(_flat, others), strict=True)),
     )  # fmt: skip
 
 
@@ -144,6 +153,13 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
                 tables.append(
                     h5.columns(path, places) if lazily else {k: file[at][of] for k, (at, of) in places.items()}
                 )
+            others: dict[str, Mapping[str, np.ndarray]] = {}
+            for word in (word for word in TABLES if word in file):
+                of = {k: (slice(None), slice(0, dim)) if v.ndim == 2 else slice(None) for k, v in file[word].items()}
+                if lazily:
+                    others[word] = h5.columns(path, {k: (f"{word}/{k}", rows) for k, rows in of.items()})
+                else:
+                    others[word] = {k: file[word][k][rows] for k, rows in of.items()}
             names = {name: [one.decode() for one in values[...]] for name, values in file["hpcdem"].items()}
             supports = {
                 word: {kind: {name: values[...] for name, values in of.items()} for kind, of in file[word].items()}
@@ -153,7 +169,7 @@ def read_mesh_frame(path: str | os.PathLike, lazily: bool = False, solid: bool =
             of_points, of_elements, of_joints = tables
             return MeshState(
                 int(about["step"]), float(about["time"]), float(about["dt"]), points, _cells(sizes), ends, of_points,
-                of_elements, of_joints, names, supports,
+                of_elements, of_joints, names, supports, others,
             )  # fmt: skip
         except NotImplementedError:
             raise HpcdemError(f"{os.fspath(path)} is a frame in three dimensions: this is for two") from None
@@ -216,6 +232,10 @@ def write_mesh_frame(path: str | os.PathLike, frame: MeshFrame, comm: Any, later
                 out.group(f"{word}/{kind}")
                 for name, values in of.items():
                     out.whole(f"{word}/{kind}/{name}", values)
+        for word, further in frame.tables.items():
+            out.group(word)
+            for name, values in _packed(further.columns).items():
+                out.slabs(f"{word}/{name}", values, further.offset, further.total)
         for name, names in frame.group_names.items():
             encoded = [one.encode() for one in names]
             out.whole(f"hpcdem/{name}", np.array(encoded, dtype=f"S{max([1, *map(len, encoded)])}"))

@@ -26,7 +26,7 @@ from hpcdem.page.maker import packed
 from hpcdem.page.server import Answer, Call, PageServer, as_json
 from hpcdem.page.sources import Sources
 from hpcdem.post.view.model import Layer, ModelView, read_view, view_of, written
-from hpcdem.post.view.moment import Moment, read_moment, unit_of
+from hpcdem.post.view.moment import BALLS, RODS, SPOTS, Moment, read_moment, unit_of
 from hpcdem.post.view.scene import (
     Painted,
     Scene,
@@ -263,9 +263,9 @@ class Viewer:
         for layer in view.layers:
             if not layer.visible or layer.object not in moment.objects:
                 continue
-            # Arrows are as long as the picture is wide; all else of a layer does not know the camera.
-            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, cut,
-                     seen if layer.vectors else None)  # fmt: skip
+            # Arrows, rods and points are as large as the picture is wide; all else does not know the camera.
+            on_paper = layer.vectors or moment.of(layer.object).kind in (SPOTS, RODS, BALLS)
+            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, cut, seen if on_paper else None)
             if about not in self.layers:
                 while self.layers and (len(self.layers) >= KEPT or _older(self.layers, key)):
                     self.layers.popitem(last=False)

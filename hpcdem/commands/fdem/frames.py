@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hpcdem.commands.fdem import beside
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.values import frames_name
 from hpcdem.core.errors import CommandError
@@ -99,7 +100,10 @@ def _kept(moment: MeshFrame) -> MeshFrame:
     def own(table: Table) -> Table:
         return Table({name: np.array(values) for name, values in table.columns.items()}, table.offset, table.total)
 
-    return replace(moment, corners=own(moment.corners), elements=own(moment.elements), joints=own(moment.joints))
+    return replace(
+        moment, corners=own(moment.corners), elements=own(moment.elements), joints=own(moment.joints),
+        tables={name: own(table) for name, table in moment.tables.items()},
+    )  # fmt: skip
 
 
 def whole(project: Project) -> MeshState | None:
@@ -185,26 +189,27 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
 def frame(project: Project) -> MeshFrame:
     """What is written at this moment. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
-    corners = _corners(blocks)
-    elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
-    joints = _with_cracks(
-        blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
-    )
-    joints = _with_channels(blocks, joints)
-    elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
-    names: dict[str, list[str]] = {}
-    for set_name, groups in project.groups[ELEMENT].sets.items():
-        column = f"group_{set_name}"
-        code = np.full(len(mesh.cells), -1, np.int32)
-        for k, members in enumerate(groups.values()):
-            code[members] = k
-        elements[column] = code[elements["number"]]
-        names[column] = list(groups)
-    joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
-    of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
-    clock = blocks.clock
-    there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
-    return MeshFrame(
-        int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
-        {found.name: found.columns() for found in there},
-    )  # fmt: skip
+    with blocks.one_moment():
+        corners = _corners(blocks)
+        elements = diagnostics.owned_values(blocks, "element", _names(blocks, "element"))
+        joints = _with_cracks(
+            blocks, elements["number"], diagnostics.owned_values(blocks, "joint", _names(blocks, "joint"))
+        )
+        joints = _with_channels(blocks, joints)
+        elements["corners"] = np.where(mesh.cells[elements["number"], 3] >= 0, 4, 3)
+        names: dict[str, list[str]] = {}
+        for set_name, groups in project.groups[ELEMENT].sets.items():
+            column = f"group_{set_name}"
+            code = np.full(len(mesh.cells), -1, np.int32)
+            for k, members in enumerate(groups.values()):
+                code[members] = k
+            elements[column] = code[elements["number"]]
+            names[column] = list(groups)
+        joints |= dict(zip(vtkhdf_mesh.CORNERS[mesh.dim], mesh.face_corners(joints["number"]).T.copy(), strict=True))
+        of_corners, of_elements, of_joints = (to_slabs(comm, ("number",), c) for c in (corners, elements, joints))
+        clock = blocks.clock
+        there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
+        return MeshFrame(
+            int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
+            {found.name: found.columns() for found in there}, beside.tables(blocks),
+        )  # fmt: skip

@@ -15,13 +15,15 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.core.fields import PER_METRE
 from hpcdem.io.frame import Columns, Frame, Table, part
 from hpcdem.io.frames import read_frame
-from hpcdem.io.vtkhdf_mesh import MeshState, is_mesh_frame, read_mesh_frame
+from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, MeshState, is_mesh_frame, read_mesh_frame
 from hpcdem.post import fluid, liners
 
 DISCS, POLYGONS, LINES = "discs", "polygons", "lines"
 SOLIDS, FACES, RODS = "solids", "faces", "rods"
 """In space."""
-INSIDE = ("contacts", "bonds", "joints", "channels")
+SPOTS, BALLS = "spots", "balls"
+"""Points, in the plane and in space."""
+INSIDE = ("clumps", "contacts", "bonds", "joints", "channels", "face-conditions", "flow-nodes", "node-conditions")
 """Objects that lie between others."""
 OF_CHANNELS = (
     "aperture", "fluid_pressure", "saturation", "flow_rate", "fluid_velocity", "fluid_temperature",
@@ -32,9 +34,12 @@ UNITS = {
     "Pa": ("stress", "pressure", "ebmod", "gbmod", "tstrength", "sstrength"),
     "m": ("x", "y", "radius", "displacement", "opening", "slip", "length", "aperture", "overlap", "position",
           "distance"),
-    "m/s": ("velocity", "vx", "vy"), "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
+    "m/s": ("velocity", "vx", "vy", "incoming"), "m/s2": ("acceleration",), "N/m": ("contact_force", "nodal_force"),
+    "W/m2": ("heat_flux",), "W/(m2 K)": ("transfer_coefficient",),
+    "rad/s": ("spin",), "rad": ("angle", "rotation"), "s": ("time",),
     "N": ("force", "fx", "fy", "fn", "fs"), "N m": ("torque", "moment"), "K": ("temperature",), "kg": ("mass",),
-    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m3": ("volume",), "m2/s": ("flow_rate",),
+    "kg/m3": ("density",), "J/m": ("energy", "work"), "m2": ("area",), "m3": ("volume",),
+    "m2/s": ("flow_rate", "inflow"),
 }  # fmt: skip
 """Units by the word, or the end of the word, that says what a field is."""
 
@@ -70,11 +75,11 @@ def unit_of(name: str, dim: int = 2) -> str:
 @dataclass
 class Objects:
     """All objects of a kind. shape: discs (centres (n, 2), radii (n,)), polygons (points (k, 2), cells (n, 4), with -1
-    in the fourth column of triangles) or lines (ends (n, 2, 2)); in space tetrahedra (points (k, 3), cells (n, 4), the
-    face (4 n,) that each of their faces lies on, or -1), faces (points (k, 3), cells (n, 4) as polygons) or rods (ends
-    (n, 2, 3)), read when it is asked for; fields: (n,) by name; vectors: (n, 2), in space (n, 3), by name; names: of
-    the values of an integer field; number: the field by which the program numbers them; slow: fields that take a pass
-    over other tables."""
+    in the fourth column of triangles), lines (ends (n, 2, 2)) or spots (places (n, 2)); in space tetrahedra (points
+    (k, 3), cells (n, 4), the face (4 n,) that each of their faces lies on, or -1), faces (points (k, 3), cells (n, 4)
+    as polygons), rods (ends (n, 2, 3)) or balls (places (n, 3)), read when it is asked for; fields: (n,) by name;
+    vectors: (n, 2), in space (n, 3), by name; names: of the values of an integer field; number: the field by which the
+    program numbers them; slow: fields that take a pass over other tables."""
 
     kind: str
     count: int
@@ -88,25 +93,19 @@ class Objects:
     @property
     def dim(self) -> int:
         """Dimensions of space."""
-        return 3 if self.kind in (SOLIDS, FACES, RODS) else 2
+        return 3 if self.kind in (SOLIDS, FACES, RODS, BALLS) else 2
 
     def centres(self) -> np.ndarray:
         """(n, 2), in space (n, 3) [m]."""
         shape = self.read()
-        if self.kind == DISCS:
+        if self.kind in (DISCS, SPOTS, BALLS):
             return shape[0]
-        if self.kind in (LINES, RODS):
-            return shape[0].mean(axis=1)
-        points, cells = shape[:2]
-        last = np.where(cells[:, 3] >= 0, cells[:, 3], cells[:, 0])
-        total = points[cells[:, 0]] + points[cells[:, 1]] + points[cells[:, 2]]
-        quads = cells[:, 3] >= 0
-        return (total + np.where(quads[:, None], points[last], 0.0)) / np.where(quads, 4.0, 3.0)[:, None]
+        return shape[0].mean(axis=1) if self.kind in (LINES, RODS) else middles(*shape[:2])
 
     def centre(self, row: int) -> np.ndarray:
         """(2,), in space (3,) [m]: of one object."""
         shape = self.read()
-        if self.kind == DISCS:
+        if self.kind in (DISCS, SPOTS, BALLS):
             return shape[0][row]
         if self.kind in (LINES, RODS):
             return shape[0][row].mean(axis=0)
@@ -146,6 +145,14 @@ class Objects:
     def waiting(self) -> set[str]:
         """Slow fields that nobody has asked for yet."""
         return {name for name in self.slow if isinstance(self.fields, Columns) and not self.fields.was_read(name)}
+
+
+def middles(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(n, 2), in space (n, 3) means of the corners of cells (n, 4)."""
+    last = np.where(cells[:, 3] >= 0, cells[:, 3], cells[:, 0])
+    total = points[cells[:, 0]] + points[cells[:, 1]] + points[cells[:, 2]]
+    quads = cells[:, 3] >= 0
+    return (total + np.where(quads[:, None], points[last], 0.0)) / np.where(quads, 4.0, 3.0)[:, None]
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
@@ -256,6 +263,8 @@ def of_particles(frame: Frame) -> Moment:
             {"group": frame.group_names}, "gid", STRESSES,
         )
     }  # fmt: skip
+    if "clump" in p and len(some := np.flatnonzero(part(p, "clump", slice(None)) >= 0)):
+        objects["clumps"] = _clumps(p, some, lambda: (centres()[some], p["radius"][some]))
     if len(frame.walls.get("id", ())):
         ends = np.stack([np.asarray(frame.walls[k], float).reshape(-1, 2) for k in ("p1", "p2")], axis=1)
         flat = {name: np.asarray(values) for name, values in frame.walls.items() if np.asarray(values).ndim == 1}
@@ -278,6 +287,27 @@ def of_particles(frame: Frame) -> Moment:
         columns = Columns({column: partial(part, table, column) for column in table}, KEPT)
         objects[name] = Objects(LINES, frame.tables[name].total, lines, columns, Columns(pulls, KEPT), number="")
     return Moment(frame.step, frame.time, objects)
+
+
+def _clumps(
+    p: Mapping[str, np.ndarray], some: np.ndarray, read: Callable[[], tuple[np.ndarray, ...]]
+) -> Objects:  # fmt: skip
+    """The members of clumps, each known by its clump; members: how many there are of it."""
+
+    def members(rows: slice) -> np.ndarray:
+        _, of, count = np.unique(p["clump"][some], return_inverse=True, return_counts=True)
+        return count[of][rows]
+
+    def column(name: str, rows: slice) -> np.ndarray:
+        return part(p, name, slice(None))[some[rows]]
+
+    fields: dict[str, _Reader] = {name: partial(column, name) for name in p} | {"members": members}
+    vectors = {"velocity": ("vx", "vy")} if "vx" in p else {}
+    pairs = {
+        name: partial(lambda both, rows: np.stack([column(one, rows) for one in both], axis=1), both)
+        for name, both in vectors.items()
+    }
+    return Objects(DISCS, len(some), read, Columns(fields, KEPT), Columns(pairs, KEPT), number="clump")
 
 
 STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress", "stress_deviator")
@@ -358,6 +388,8 @@ def of_blocks(state: MeshState) -> Moment:
         )  # fmt: skip
     for name, tables in state.supports.items():
         objects[name] = _supports(name, tables)
+    for name, table in state.tables.items():
+        objects[name] = _further(state, name, table)
     displacement = (lambda: state.of_points["displacement"]) if "displacement" in state.of_points else None
     return Moment(state.step, state.time, objects, displacement, dim)
 
@@ -414,6 +446,33 @@ def _faces(state: MeshState) -> np.ndarray:
 
     three = tetrahedra.face_points(state.cells, faces_of_joints(state))
     return np.column_stack([three, np.full(len(three), -1)])
+
+
+def _further(state: MeshState, name: str, table: Mapping[str, np.ndarray]) -> Objects:
+    """Contacts as lines between the middles of both elements, conditions of faces on these, others as points."""
+    dim = state.points.shape[1]
+    places = ("position", *CORNERS[3])
+    vectors = {k: partial(part, table, k) for k in table if k not in places and part(table, k, slice(0, 1)).ndim == 2}
+    flat = {k: partial(part, table, k) for k in table if k not in (*places, *vectors)}
+    size = len(part(table, next(iter(flat)), slice(None)))
+
+    def between() -> tuple[np.ndarray, ...]:
+        ends = np.stack([table["element_1"], table["element_2"]], axis=1).reshape(-1)
+        rows = np.searchsorted(part(state.of_elements, "number", slice(None)), ends)
+        return (middles(state.points, state.cells[rows]).reshape(-1, 2, dim),)
+
+    def on_faces() -> tuple[np.ndarray, ...]:
+        corners = np.stack([table[k] for k in CORNERS[dim]], axis=1)
+        rows = np.searchsorted(part(state.of_points, "number", slice(None)), corners)
+        return (state.points[rows],) if dim == 2 else (state.points, np.column_stack([rows, np.full(len(rows), -1)]))
+
+    def at() -> tuple[np.ndarray, ...]:
+        return (table["position"],)
+
+    kinds = {CONTACTS: (LINES, RODS, between), FACE_CONDITIONS: (LINES, FACES, on_faces)}
+    plane, space, read = kinds.get(name, (SPOTS, BALLS, at))
+    number = "" if name == CONTACTS else "number"
+    return Objects(space if dim == 3 else plane, size, read, Columns(flat, KEPT), Columns(vectors, KEPT), number=number)
 
 
 VECTORS = ("displacement", "velocity")

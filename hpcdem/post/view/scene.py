@@ -9,24 +9,30 @@ from typing import Any
 import numpy as np
 
 from hpcdem.core.errors import HpcdemError, UsageError
-from hpcdem.core.looks import COLOURS, OBJECTS, eye_of, section_of
+from hpcdem.core.looks import COLOURS, HIDDEN, OBJECTS, eye_of, section_of
 from hpcdem.io import colours
 from hpcdem.io.axes import View
 from hpcdem.post import blocks
 from hpcdem.post.view.filter import chosen, refusal
 from hpcdem.post.view.model import Layer, ModelView
-from hpcdem.post.view.moment import DISCS, LINES, RODS, SOLIDS, Moment, Objects, lengths, unit_of
+from hpcdem.post.view.moment import BALLS, DISCS, LINES, RODS, SOLIDS, SPOTS, Moment, Objects, lengths, unit_of
 
 STEPS = 256
 """Colours of a field."""
 NOTHING = "#b8b8b8"
 """Of objects without a value."""
-INK = {"contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": "#7a5195", "channels": "#2f7fb5"}
-"""Of lines without a field."""
-WIDTH = {"walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2}
-"""Of lines [points], at size 1."""
+INK = {
+    "contacts": "#7a7a7a", "bonds": "#1e3cb4", "bolts": "#202020", "liners": "#7a5195", "channels": "#2f7fb5",
+    "face-conditions": "#e07b00", "flow-nodes": "#17607f", "node-conditions": "#a3195b",
+}  # fmt: skip
+"""Of lines and points without a field."""
+WIDTH = {
+    "walls": 1.2, "contacts": 0.4, "bonds": 0.6, "joints": 1.0, "channels": 1.6, "bolts": 1.6, "liners": 2.2,
+    "face-conditions": 2.6, "flow-nodes": 3.0, "node-conditions": 4.0,
+}  # fmt: skip
+"""Of lines, and of points as discs [points], at size 1."""
 POINT = 1.0 / 480.0
-"""Of rods: a point, over the width of the picture."""
+"""Of rods and points: a point, over the width of the picture."""
 THROUGH = 0.35
 """Opacity of elements around rods."""
 MOST_ARROWS = 3000
@@ -100,13 +106,12 @@ class Scene:
 
 
 def default_view(moment: Moment) -> ModelView:
-    """Everything that the frame has, as it is usually shown; contacts and bonds are there, and hidden. Rods shine
-    through the elements around them."""
-    hidden = ("contacts", "bonds")
-    inside = any(objects.kind == RODS for objects in moment.objects.values())
+    """Everything that the frame has, as it is usually shown; `HIDDEN` is there, and hidden. Rods shine through the
+    elements around them."""
+    inside = any(objects.kind == RODS and name not in HIDDEN for name, objects in moment.objects.items())
     return ModelView(
         layers=tuple(
-            Layer(object=name, visible=name not in hidden, opacity=THROUGH if inside and name == "elements" else 1.0)
+            Layer(object=name, visible=name not in HIDDEN, opacity=THROUGH if inside and name == "elements" else 1.0)
             for name in OBJECTS if name in moment.objects
         )
     )  # fmt: skip
@@ -298,10 +303,15 @@ def painted(
         result.shape = _of(whole[0], rows), layer.size * _of(whole[1], rows)
     elif objects.kind == LINES:
         result.shape = (_of(whole[0], rows),)
-    elif objects.kind == RODS:
-        from hpcdem.post.view import space
+    elif objects.kind in (SPOTS, RODS, BALLS):
+        radius = 0.5 * result.width * POINT * max(seen.width, seen.height)
+        if objects.kind == SPOTS:
+            result.kind_of_shape, result.shape = DISCS, (whole[0][rows], np.full(len(rows), radius))
+        else:
+            from hpcdem.post.view import space
 
-        result.shape = space.rods(whole[0][rows], 0.5 * result.width * POINT * max(seen.width, seen.height), plane)
+            made = space.rods if objects.kind == RODS else space.balls
+            result.kind_of_shape, result.shape = RODS, made(whole[0][rows], radius, plane)
     else:
         points = whole[0] if shifted is None else whole[0] + shifted
         if objects.dim == 3:
@@ -401,10 +411,14 @@ def _one_colour(result: Painted, colour: str) -> None:
 
 
 def _as_usual(result: Painted, objects: Objects) -> None:
-    """Particles and walls in the manual's colours, elements by their group, joints by the way they broke."""
+    """Particles and walls in the manual's colours, clumps each in its own, elements by their group, joints by the way
+    they broke."""
     name, rows = result.layer.object, result.rows
     if name in ("particles", "walls") and "color" in objects.fields:
         result.shades, result.kind = colours.RGB, colours.numbers(objects.fields["color"])[rows]
+    elif name == "clumps":
+        result.shades = rgb(CATEGORIES)
+        result.kind = np.asarray(objects.fields["clump"])[rows].astype(np.int64) % len(CATEGORIES)
     elif name == "elements":
         sets = {column: np.asarray(objects.fields[column]) for column in objects.names}
         best = max(sets, key=lambda column: len(np.unique(sets[column])), default=None)

@@ -100,6 +100,18 @@ def rods(ends: np.ndarray, radius: float, plane: tuple[np.ndarray, np.ndarray] |
     return found._replace(of=found.of // (2 * SIDES))
 
 
+OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+OF_OCTAHEDRON = np.array([[k, (k + 1) % 4, tip] for tip in (4, 5) for k in range(4)])
+
+
+def balls(at: np.ndarray, radius: float, plane: tuple[np.ndarray, np.ndarray] | None = None) -> Skin:
+    """Points (n, 3) [m] as octahedra, less what the plane takes away."""
+    points = (at[:, None] + radius * OCTAHEDRON).reshape(-1, 3)
+    three = (6 * np.arange(len(at))[:, None, None] + OF_OCTAHEDRON).reshape(-1, 3)
+    found = cut_faces(points, three, plane)
+    return found._replace(of=found.of // len(OF_OCTAHEDRON))
+
+
 def middles(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(m, 3) means of the corners of triangles and quads."""
     four = (cells[:, 3] >= 0)[:, None]

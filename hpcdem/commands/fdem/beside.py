@@ -1,0 +1,160 @@
+"""What frames of blocks hold besides elements and joints: contacts of elements, conditions of nodes and faces, flow
+nodes. A table of each, with a row for each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hpcdem.io.frame import Table
+from hpcdem.io.slabs import to_slabs
+from hpcdem.io.vtkhdf_mesh import CONTACTS, CORNERS, FACE_CONDITIONS, FLOW_NODES, NODE_CONDITIONS
+from hpcdem.physics.fdem import diagnostics, said
+from hpcdem.physics.fdem.definition import TRACTIONS
+from hpcdem.physics.fdem.groups import FLOW_NODE
+from hpcdem.physics.fdem.kernels import nodes, space
+from hpcdem.physics.fdem.simulation import Blocks
+from hpcdem.physics.fdem.user_functions import Placed
+from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
+
+
+def tables(blocks: Blocks) -> dict[str, Table]:
+    """By name, in ascending order of numbers; without those that have no rows. Collective."""
+    made = {
+        CONTACTS: _slabs(blocks, ("element_1", "element_2"), _contacts(blocks)),
+        NODE_CONDITIONS: _slabs(blocks, ("number",), _on_root(blocks, _node_conditions(blocks))),
+        FACE_CONDITIONS: _slabs(blocks, ("number",), _on_root(blocks, _face_conditions(blocks))),
+        FLOW_NODES: _slabs(blocks, ("number",), _flow_nodes(blocks)),
+    }
+    return {name: table for name, table in made.items() if table is not None and table.total}
+
+
+Columns = dict[str, np.ndarray]
+
+
+def _slabs(blocks: Blocks, keys: Sequence[str], columns: Columns | None) -> Table | None:
+    return None if columns is None else to_slabs(blocks.comm, keys, columns)
+
+
+def _on_root(blocks: Blocks, columns: Columns | None) -> Columns | None:
+    """Columns that all ranks know, to be handed in once."""
+    if columns is None or blocks.comm.rank == 0:
+        return columns
+    return {name: values[:0] for name, values in columns.items()}
+
+
+def _contacts(blocks: Blocks) -> Columns | None:
+    """Of two elements that touch, however many of their faces and parts do: force on the first [N/m, in space N], and
+    the mean of the places. Sums go in an order that no rank changes."""
+    if not blocks.options.collision:
+        return None
+    found = diagnostics.contacts(blocks)
+    axes = "xyz"[: blocks.dim]
+    finer = [found[name] for name in ("face", "body_2", "body_1") if name in found]
+    pair = found["element_1"], found["element_2"]
+    order = np.lexsort((*(found[axis] for axis in axes), *finer, *pair[::-1]))
+    one, other = (np.asarray(values, np.int64)[order] for values in pair)
+    first = np.flatnonzero(np.append(True, (one[1:] != one[:-1]) | (other[1:] != other[:-1]))[: len(one)])
+    columns = {"element_1": one[first], "element_2": other[first]}
+    count = np.diff(np.append(first, len(one)))
+    for axis in axes:
+        for name, column, by in ((f"position_{axis}", axis, count), (f"contact_force_{axis}", f"force_{axis}", 1)):
+            values = found[column][order]
+            columns[name] = (np.add.reduceat(values, first) if len(first) else np.empty(0)) / by
+    return columns
+
+
+def _places(blocks: Blocks, numbers: np.ndarray) -> Columns:
+    """Where nodes are now [m], on all ranks; NaN of those without an element. Collective."""
+    axes = "xyz"[: blocks.dim]
+    return {f"position_{axis}": diagnostics.values(blocks, f"position_{axis}", numbers) for axis in axes}
+
+
+def _node_conditions(blocks: Blocks) -> Columns | None:
+    """fixed: bits of the components of motion that are prescribed, 1 x, 2 y, 4 z; what of them, and forces."""
+    heat = Heat.there(blocks)
+    held = np.zeros(1, np.int32) if heat is None else heat.held
+    numbers = np.flatnonzero((blocks.point_row > 0) | (held > 0))
+    if not len(numbers):
+        return None
+    columns = {"number": numbers, **_places(blocks, numbers)}
+    there = np.isfinite(columns["position_x"])
+    columns, numbers = {name: values[there] for name, values in columns.items()}, numbers[there]
+    points, time, plane = blocks.the_mesh().points[numbers], blocks.told_time(), blocks.dim == 2
+    placed = Placed(blocks.conditions, blocks.point_row[numbers].astype(np.int64), points)
+    table = blocks.local.conditions_now(placed, time, time, 1.0)[placed.of]
+    does, at, force, constraint = (
+        (nodes.DOES_X, nodes.AT_X, nodes.FORCE_X, nodes.CONSTRAINT) if plane
+        else (space.DOES, space.AT, space.FORCE, space.CONSTRAINT)
+    )  # fmt: skip
+    step = (nodes.DOES_Y, nodes.AT_Y) if plane else (space.DOES + 1, space.AT + 1)
+    kind = table[:, constraint].astype(np.int8)
+    fixed = np.where(kind == nodes.FIXED, (1 << blocks.dim) - 1, 0).astype(np.int8)
+    for k, axis in enumerate("xyz"[: blocks.dim]):
+        how, value = table[:, does + k * (step[0] - does)], table[:, at + k * (step[1] - at)]
+        fixed |= np.where(how != nodes.FREE, 1 << k, 0).astype(np.int8)
+        for name, meant in (("velocity", nodes.VELOCITY), ("acceleration", nodes.ACCELERATION)):
+            columns[f"{name}_{axis}"] = np.where(how == meant, value, 0.0)
+        columns[f"nodal_force_{axis}"] = table[:, force + k].copy()
+    columns |= {"fixed": fixed, "constraint": kind}
+    if heat is not None:
+        now = [said.now(blocks.tables, value, heat.time) for value in heat.prescribed]
+        columns["temperature"] = np.where(heat.held[numbers] > 0, np.array(now)[heat.held[numbers]], np.nan)
+    return columns
+
+
+def _face_conditions(blocks: Blocks) -> Columns | None:
+    """Stresses that act on faces, and heat; quiet: whether waves leave through them."""
+    heat = Heat.there(blocks)
+    given = np.zeros(1, np.int32) if heat is None else heat.face
+    numbers = np.flatnonzero((blocks.load_row > 0) | (given > 0))
+    numbers = numbers[blocks.alive[numbers // 4]]
+    if not len(numbers):
+        return None
+    mesh, time = blocks.the_mesh(), blocks.told_time()
+    corners = mesh.face_corners(numbers)
+    columns: Columns = {"number": numbers, **dict(zip(CORNERS[mesh.dim], corners.T.copy(), strict=True))}
+    middle = mesh.points[mesh.cells[corners // 4, corners % 4]].mean(axis=1)
+    placed = Placed(blocks.loads, blocks.load_row[numbers].astype(np.int64), middle)
+    table = blocks.local.loads_now(placed, time)[placed.of]
+    for name, values in zip(TRACTIONS[blocks.dim], table.T, strict=True):
+        word = name if name.startswith("incoming") else "normal_stress" if name == "normal" else f"stress_{name}"
+        columns[word] = values.copy()
+    columns["quiet"] = blocks.quiet_faces()[numbers].astype(np.int8)
+    if heat is not None:
+        for name in ("flux", "transfer", "environment"):
+            now = [said.now(blocks.tables, _or_nan(getattr(one, name)), heat.time) for one in heat.faces]
+            columns[_OF_HEAT[name]] = np.array(now, float)[heat.face[numbers]]
+    return columns
+
+
+_OF_HEAT = {"flux": "heat_flux", "transfer": "transfer_coefficient", "environment": "environment_temperature"}
+
+
+def _or_nan(value: Any) -> Any:
+    return np.nan if value is None else value
+
+
+_OF_FLUID = {
+    "fluid_temperature": "temperature", "proppant_concentration": "concentration", "pack_pressure": "pack_pressure",
+}  # fmt: skip
+"""Columns with the names that channels have, and what other physics calls them."""
+
+
+def _flow_nodes(blocks: Blocks) -> Columns | None:
+    """condition: kernels.FREE, PRESSURE, SURFACE or RATE of the flow."""
+    flow = Flow.there(blocks)
+    if flow is None or not len(flow.network.channels):
+        return None
+    columns_of = {"number": "number"} | {column: name for column, name in _OF_FLUID.items() if name in flow.more}
+    columns_of |= {"fluid_pressure": "pressure", "saturation": "saturation", "inflow": "inflow"}
+    found = flow.owned_values(FLOW_NODE, [name for name in columns_of.values() if name != "number"])
+    columns = {column: found[name] for column, name in columns_of.items()}
+    at = np.searchsorted(flow.network.nodes, columns["number"])
+    columns |= {name: values[at] for name, values in _places(blocks, flow.network.nodes).items()}
+    does = np.array([one.does for one in flow.conditions], np.int8)
+    columns["condition"] = does[flow.condition[columns["number"]]]
+    return columns
