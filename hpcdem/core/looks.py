@@ -37,12 +37,13 @@ EYES = {
 
 
 class Section(NamedTuple):
-    """A plane that cuts a body: a point of it [m], its normal, and whether the part on the side of the normal is taken
-    away (else the part towards the eye)."""
+    """A plane that cuts a body: a point of it [m], its normal, whether the part on the side of the normal is taken away
+    (else the part towards the eye), and whether the cut alone is shown."""
 
     point: tuple[float, float, float]
     normal: tuple[float, float, float]
     sided: bool
+    alone: bool = False
 
 
 def eye_of(text: str) -> tuple[float, float, float]:
@@ -57,7 +58,11 @@ def eye_of(text: str) -> tuple[float, float, float]:
 
 def section_of(text: str) -> Section:
     """A plane: x=1.5 (also y, z), of which the part towards the eye is taken away; x<1.5 or x>1.5, which says what
-    stays; or a point and the normal into the part that is taken away, px,py,pz,nx,ny,nz. ValueError."""
+    stays; or a point and the normal into the part that is taken away, px,py,pz,nx,ny,nz. After the word slice the cut
+    alone is shown. ValueError."""
+    before, _, after = text.strip().partition(" ")
+    if before == "slice":
+        return section_of(after)._replace(alone=True)
     if found := re.fullmatch(r"\s*([xyz])\s*([=<>])\s*(\S+)\s*", text):
         values = _numbers(found[3])
         if len(values) == 1:
@@ -67,7 +72,10 @@ def section_of(text: str) -> Section:
             return Section(tuple(point), tuple(normal), found[2] != "=")  # type: ignore[arg-type]
     values = _numbers(text)
     if len(values) != 6 or not any(values[3:]):
-        raise ValueError("expected x=1.5, x<1.5 or x>1.5 (y and z too), or a point and a normal, px,py,pz,nx,ny,nz")
+        raise ValueError(
+            "expected x=1.5, x<1.5 or x>1.5 (y and z too), or a point and a normal, px,py,pz,nx,ny,nz; slice before it "
+            "shows the cut alone"
+        )
     return Section(tuple(values[:3]), tuple(values[3:]), True)  # type: ignore[arg-type]
 
 

@@ -128,6 +128,8 @@ def folder(sim: Simulation) -> Path:
         job = sim.job or run_folder.Job()
         locked = run_folder.enter(path, sim.comm, job, launch.version(), sim.resumed, sim.restored)
         sim.folder_made = True
+        if sim.log is not None:
+            sim.log.place = path
         if not locked and sim.log is not None:
             sim.log.warn_once(
                 "lock", f"the file system of {path} has no locks: nobody will notice if two runs write there at once"

@@ -20,6 +20,9 @@ from hpcdem.core.errors import HpcdemError
 from hpcdem.io.disk import explain
 
 RECORD = "run.json"
+PROGRESS = "progress.json"
+"""Beside it while the run goes on: `step`, `command`, the last `line` of the log, `speed` [steps/s], `part` of the
+command that is done and seconds `left`, `script_part` and `script_left` of the whole script; null: not known."""
 _FRAME = re.compile(r".+_(\d{10,})(_ini)?\.(vtkhdf|dat)")
 
 

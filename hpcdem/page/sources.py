@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -16,6 +17,7 @@ import numpy as np
 
 from hpcdem.core.errors import HpcdemError
 from hpcdem.io.frames import FrameFile, list_frames, mesh_frames_by_name
+from hpcdem.io.run_record import PROGRESS
 from hpcdem.post.view.moment import Moment, read_moment
 from hpcdem.runtime import run_folder
 
@@ -198,6 +200,15 @@ def _stamp(path: Path) -> str:
         return ""
 
 
+def _progress(folder: Path) -> dict[str, Any] | None:
+    """How far the run is, as it noted itself."""
+    try:
+        told = json.loads((folder / PROGRESS).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return told if isinstance(told, dict) else None
+
+
 def _run(folder: Path) -> dict[str, Any] | None:
     """What run.json says, and who holds the folder."""
     try:
@@ -211,6 +222,7 @@ def _run(folder: Path) -> dict[str, Any] | None:
     if state == "running" and holder is None:
         state = "killed"
     return {
+        "progress": _progress(folder) if holder is not None else None,
         "state": state, "running": holder is not None, "script": Path(record.script).name if record is not None else "",
         "step": record.step if record is not None else 0, "host": (holder or {}).get("host", ""),
     }  # fmt: skip

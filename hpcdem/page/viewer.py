@@ -13,7 +13,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,8 +36,12 @@ from hpcdem.post.view.scene import (
     seen_of,
     shades_of,
     shift_of,
+    sliced,
     turn_of,
 )
+
+if TYPE_CHECKING:
+    from hpcdem.post.view.screen import Picture
 
 KINDS = {
     "viewer.html": "text/html; charset=utf-8",
@@ -200,11 +204,26 @@ class Viewer:
             else:
                 told = int(value) if np.asarray(value).dtype.kind in "iub" else _number(float(value))
             values.append([name, told, unit_of(name, shown.moment.dim)])
+        told_of = {"point": None if picture.near is None else self._hit(shown, picture, int(column), int(row))}
         number = objects.value(objects.number, which) if objects.number in objects.fields else which
         place_of = {axis: float(v) for axis, v in zip("xyz", objects.centre(which))}
         return {
-            "object": layer.object, "label": layer.label, "number": int(number), **place_of, "values": values,
+            "object": layer.object, "label": layer.label, "number": int(number), **place_of, **told_of,
+            "values": values,
         }  # fmt: skip
+
+    @staticmethod
+    def _hit(shown: Scene, picture: Picture, column: int, row: int) -> list[float] | None:
+        """The place in space that a pixel shows [m]; None where light goes through."""
+        from hpcdem.post.view.screen import transform
+
+        assert shown.turn is not None and picture.near is not None
+        if not np.isfinite(picture.near[row, column]):
+            return None
+        h, w = picture.layer.shape
+        a, b, c, d = transform(shown.seen, w, h)
+        place = (column + 0.5 - b) / a, (row + 0.5 - d) / c, picture.near[row, column] / a
+        return (np.array(place) @ shown.turn).tolist()
 
     def file(self, wanted: dict[str, Any]) -> Answer:
         """A file of what is shown: picture, vectors, table, drawing, page, film, or the view itself."""
@@ -258,21 +277,28 @@ class Viewer:
         """As scene.scene, with layers that were put together before."""
         seen = seen_of(moment, view)
         shifted, plane = None, plane_of(moment, view)
-        cut = None if plane is None else tuple(np.concatenate(plane).tolist())
+        cut, alone = None if plane is None else tuple(np.concatenate(plane).tolist()), sliced(view)
         layers = []
         for layer in view.layers:
             if not layer.visible or layer.object not in moment.objects:
                 continue
             # Arrows, rods and points are as large as the picture is wide; all else does not know the camera.
             on_paper = layer.vectors or moment.of(layer.object).kind in (SPOTS, RODS, BALLS)
-            about = (key, layer.model_dump_json(exclude={"name"}), view.deformed, cut, seen if on_paper else None)
+            about = (
+                key,
+                layer.model_dump_json(exclude={"name"}),
+                view.deformed,
+                cut,
+                alone,
+                seen if on_paper else None,
+            )
             if about not in self.layers:
                 while self.layers and (len(self.layers) >= KEPT or _older(self.layers, key)):
                     self.layers.popitem(last=False)
                 if shifted is None and layer.object in MOVED:
                     shifted = shift_of(moment, view.deformed)
                 moved = shifted if layer.object in MOVED else None
-                self.layers[about] = painted(moment, layer, seen, moved, plane=plane)
+                self.layers[about] = painted(moment, layer, seen, moved, plane=plane, alone=alone)
             self.layers.move_to_end(about)
             found = self.layers[about]
             if found.layer.label != layer.label:

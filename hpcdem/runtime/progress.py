@@ -6,19 +6,24 @@ another rank knows has to be brought to rank 0 first.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TextIO
 
 from hpcdem.core.timers import Summary, Timers
+from hpcdem.io.run_record import PROGRESS
 from hpcdem.runtime.notebook import NotebookBar, in_notebook
 
 QUIET_SECONDS = 10.0
 """A log file gets at most one progress line in this time, unless the script sets the interval itself."""
+NOTE_SECONDS = 1.0
+"""Time between two notes in the folder of the results, and before the first one."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,11 @@ class Log:
         self._window: tuple[int, float] | None = None  # step and time of the last line
         self._last_line = -QUIET_SECONDS
         self.every_interval = False
+        self.place: Path | None = None
+        """Folder of the results, once there is one: where `at` tells how far the run is."""
+        self._text = ""
+        self._noted: tuple[str, int, int, float] | None = None
+        self._note_due = 0.0
 
     # -- lines -----------------------------------------------------------------------------------------------
 
@@ -122,6 +132,7 @@ class Log:
         return key in self._warned
 
     def _print(self, text: str) -> None:
+        self._text = text
         if self._bar is not None:
             self._bar.print(text)
         else:
@@ -173,11 +184,40 @@ class Log:
         if command.first_step is None or self._window is None:
             return True
         done = step - command.first_step
+        self.at(step, command.name, command.first_step - command.before, command.first_step + command.steps)
         if self._bar is not None:
             self._bar.update(command.before + done, self._script_done + done)
         due = self.every_interval or self._now() - self._last_line >= QUIET_SECONDS
         due = due or (done >= command.steps and not command.beside)
         return due and step > self._window[0]
+
+    def at(self, step: int, name: str, first: int, last: float) -> None:
+        """A command is at this step; it began at `first` and ends at `last` (inf: not known). For those who look at the
+        folder of the results, now and then (io/run_record.py: PROGRESS); a disk that refuses it does not matter."""
+        now = self._now()
+        if not self._speaks or self.place is None:
+            return
+        if self._noted is None or self._noted[:2] != (name, first):
+            self._noted, self._note_due = (name, first, step, now), now + NOTE_SECONDS
+        if now < self._note_due:
+            return
+        self._note_due = now + NOTE_SECONDS
+        *_, since, began = self._noted
+        speed, known = (step - since) / max(now - began, 1e-9), math.isfinite(last) and last > first
+        told = {
+            "step": step, "command": name, "line": self._text.strip().rpartition("\n")[2], "speed": speed,
+            "part": (step - first) / (last - first) if known else None,
+            "left": (last - step) / speed if known and speed > 0.0 else None,
+        }  # fmt: skip
+        if self._script_steps:
+            done = self._script_done + step - first
+            told |= {"script_part": done / self._script_steps, "script_left": max(self._script_left(done), 0.0)}
+        try:
+            beside = self.place / f"{PROGRESS}.tmp"
+            beside.write_text(json.dumps(told), encoding="utf-8")
+            beside.replace(self.place / PROGRESS)
+        except OSError:
+            pass
 
     def step(self, status: StepStatus) -> None:
         """The model after a step; printed if a line is due."""

@@ -25,7 +25,7 @@ from hpcdem.core.errors import HpcdemError, UsageError
 from hpcdem.io.agreed import atomic_path, on_first
 from hpcdem.io.disk import explain
 from hpcdem.io.lock import FolderLock, Taken, holder_of
-from hpcdem.io.run_record import RECORD, Record, is_older, left_behind, read, step_of_frame
+from hpcdem.io.run_record import PROGRESS, RECORD, Record, is_older, left_behind, read, step_of_frame
 
 PRESENT = "now"
 """Folder below the results: the present state of a model to which commands are typed (commands/present.py)."""
@@ -75,6 +75,7 @@ def enter(
         except OSError as failure:
             raise HpcdemError(explain(folder, failure, "make the folder")) from None
         works = _claim(folder, job)
+        (folder / PROGRESS).unlink(missing_ok=True)
         again = folder.resolve() in _entered  # several models of one program, or particles and blocks of one run
         before = read(folder) if resumed or again else None
         _entered.add(folder.resolve())
@@ -105,6 +106,7 @@ def leave(folder: Path, comm: Any, state: str, step: int) -> None:
     if comm.rank > 0:
         return
     try:
+        (folder / PROGRESS).unlink(missing_ok=True)
         record = read(folder)
         if record is not None:
             record.state, record.step = state, step

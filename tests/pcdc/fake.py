@@ -45,6 +45,9 @@ class Noted:
     def warn_once(self, key: str, text: str) -> None:
         self.warn(text)
 
+    def at(self, step: int, name: str, first: int, last: float) -> None:
+        """Where the run is."""
+
 
 class FakeBlocks:
     """`hpcdem.physics.fdem.simulation.Blocks` with the functions on it (see `_note`), as far as the commands use them.

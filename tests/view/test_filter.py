@@ -12,7 +12,8 @@ from hpcdem.post.view.filter import chosen
 
 X = np.array([-2.0, -1.0, 0.0, 1.0, np.nan])
 Y = np.array([1.0, 5.0, 3.0, 4.0, 2.0])
-FIELDS = {"x": X, "y": Y, "state": np.array([0, 1, 2, 3, 3])}
+FIELDS = {"x": X, "y": Y, "state": np.array([0, 1, 2, 3, 3]), "id": np.arange(6, 11),
+          "group_rock": np.array([0, -1, 1, -1, -1])}  # fmt: skip
 
 
 def groups(name: str, of: str) -> np.ndarray:
@@ -28,7 +29,11 @@ def groups(name: str, of: str) -> np.ndarray:
         ("-1 <= x <= 0", [1, 2]), ("x * x - 1 > 0.5", [0]), ("x / 2 + y != 4.5", [0, 2, 4]),
         ("abs(x) > 1.5", [0]), ("sqrt(y) >= 2", [1, 3]), ("hypot(x, y) < 3.1", [0, 2]), ("isnan(x)", [4]),
         ("min(x, y) == x", [0, 1, 2, 3]), ("max(x, 3) < y", [1, 3]), ("log10(y) <= 0", [0]), ("state == 3", [3, 4]),
-        ("group(roof)", [0, 1]), ("group(roof, rock) and x > -2", [1]), ("1 < 2", [0, 1, 2, 3, 4]), ("2 < 1", []),
+        ("group(roof)", [0, 1]), ("group(roof, rock) and x > -2", [1]),
+        ("group('roof')", [0, 1]), ("range x -1 1", [1, 2, 3]), ("RANGE y (3.0, 4.0)", [2, 3]), ("range id 7", [1]),
+        ("range id 7 8 x -9 9", [1, 2]), ("range group 'roof' set 'rock' x -1.5 9", [1]), ("range set 'rock'", [0, 2]),
+        ("range group roof and x < -1 or y == 4", [0]), ("range x -9 9 and (x > 0 or y == 5)", [1, 3]),
+        ("1 < 2", [0, 1, 2, 3, 4]), ("2 < 1", []),
     ],
 )  # fmt: skip
 def test_what_is_chosen(text, rows):
@@ -44,7 +49,10 @@ def test_what_is_chosen(text, rows):
         "exec('1') > 0", "globals() > x", "(y := 3) > x", "x > 1; y", "import os", "1e400 < x", f"{'9' * 399} < x",
         "(" * 150 + "x" + ")" * 150, "x > 1" + " or x > 1" * 100, "-" * 200 + "x > 0", "not " * 60 + "x > 0",
         "abs(" * 60 + "x" + ")" * 60 + " > 1", "", "x", "x + 1", "(x > 1) + 1 > 0", "x and y", "True", "x > True",
-        "nix > 1", "abs(x, y) > 1", "sin(x) > 0", "abs(x=1) > 0", "group('roof')", "group(floor)", "group()",
+        "nix > 1", "abs(x, y) > 1", "sin(x) > 0", "abs(x=1) > 0", "group('floor')", "group('roof' + 'x')",
+        "group(floor)",
+        "range", "range x 1", "range x __import__('os') 2", "range group", "range geometry 'a'", "range x 0 1 and",
+        "range x a.b 1", "range set 'a b'", "range x 0 1 0 1", "group()",
         "x is y", "x in y", "~x > 0", "x // 2 > 1", "x > 1j", "x > ...", "x > None", "*x > 1", "x\x00 > 1",
     ],
 )  # fmt: skip
@@ -56,7 +64,9 @@ def test_what_is_no_filter_is_refused_at_once(text):
 
 
 def test_what_is_said():
-    with pytest.raises(HpcdemError, match=r"filter 'nix > 1': there is no field nix; there is x, y, state"):
+    with pytest.raises(
+        HpcdemError, match=r"filter 'nix > 1': there is no field nix; there is x, y, state, id, group_rock"
+    ):
         chosen("nix > 1", 5, FIELDS, groups)
     with pytest.raises(HpcdemError, match=r"'x.real' is nothing that a filter can be made of"):
         chosen("x.real > 1", 5, FIELDS, groups)

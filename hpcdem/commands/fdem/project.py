@@ -240,6 +240,8 @@ class Project:
             job = self.job or run_folder.Job()
             locked = run_folder.enter(self.outdir, self.comm, job, launch.version(), self.resumed, self.restored)
             self.folder_made = True
+            if self.log is not None:
+                self.log.place = self.outdir
             if not locked and self.log is not None:
                 why = f"the file system of {self.outdir} has no locks"
                 self.log.warn_once("lock", f"{why}: nobody will notice if two runs write there at once")

@@ -587,7 +587,8 @@ class _Report:
     script that runs again and again, as in a loop, it speaks every QUIET_SECONDS only."""
 
     def __init__(self, project: Project, name: str, last: float) -> None:
-        self.project, self.last = project, last
+        self.project, self.name, self.last = project, name, last
+        self.first = project.step if project.progress is None else project.progress["first"]
         self.began = self.told = clocks.monotonic()
         self.began_step = self.told_step = project.step
         before = project.told.get(project.line)
@@ -600,6 +601,8 @@ class _Report:
     def tell(self, blocks: Blocks) -> None:
         """Collective: the line, if one is due."""
         now = clocks.monotonic()
+        if self.project.log is not None:
+            self.project.log.at(blocks.clock.step, self.name, self.first, self.last)
         if self.project.log is None or not self.project.comm.bcast(now - self.told >= QUIET_SECONDS):
             return
         done = blocks.clock.step - self.told_step

@@ -1,7 +1,8 @@
 """Choosing objects by an expression such as `stress_xx < -1e6 and hypot(x, y) < 2`.
 
 The text is taken apart by Python's own parser and computed here, piece by piece, from a list of what is allowed:
-comparisons, and, or, not, + - * /, a few functions, numbers and names of fields. Nothing in it is executed.
+comparisons, and, or, not, + - * /, a few functions, numbers and names of fields. Nothing in it is executed. It may
+begin with a RANGE of the languages: `range x 0 2 group 'roof' and stress_xx < 0`.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -26,7 +28,8 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Any]]] = {
 }  # fmt: skip
 """How many values each takes, and what it is."""
 GROUP = "group"
-"""`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group."""
+"""`group(NAME)`, or `group(NAME, SET)`: whether an object is in a group. Names may stand in quotes."""
+_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[^\s(),]+")
 _ARITHMETIC = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _COMPARISONS = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge, ast.Eq: operator.eq,
@@ -50,9 +53,52 @@ def parsed(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise HpcdemError(f"filter: {len(text)} characters, at most {LONGEST} are read")
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        return ast.parse(_without_range(text.strip()), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise refusal(text, "expected an expression such as stress_xx < -1e6 and x > 0") from None
+
+
+def _without_range(text: str) -> str:
+    """The same with the words of RANGE as an expression: all of them must hold."""
+    if not re.match(r"range\b", text, re.IGNORECASE):
+        return text
+    words = _WORDS.findall(text)[1:]
+    found: list[str] = []
+
+    def taken(what: str) -> str:
+        if not words:
+            raise refusal(text, f"expected {what} at the end of the range")
+        return words.pop(0)
+
+    def name() -> str:
+        return repr(taken("a name").strip("'\""))
+
+    while words:
+        word = taken("a word").lower()
+        if word == "and" and found:
+            rest = re.search(r"\band\b(.*)$", text, re.IGNORECASE | re.DOTALL)
+            assert rest is not None
+            return f"{' and '.join(found)} and ({rest[1].strip()})"
+        if word in ("x", "y", "z"):
+            low, high = taken("a number"), taken("a number")
+            found.append(f"{low} <= {word} <= {high}")
+        elif word == "id":
+            low = taken("a number")
+            high = words.pop(0) if words and words[0].isdigit() else low
+            found.append(f"{low} <= id <= {high}")
+        elif word == GROUP:
+            of = name()
+            if words[:1] == ["set"]:
+                words.pop(0)
+                of += f", {name()}"
+            found.append(f"{GROUP}({of})")
+        elif word == "set":
+            found.append(f"group_{taken('a name').strip(chr(39))} >= 0")
+        else:
+            raise refusal(text, f"'{word[:30]}' is no word of a range that a frame can answer: x, y, z, id, group, set")
+    if not found:
+        raise refusal(text, "expected x, y, z, id, group or set after range")
+    return " and ".join(found)
 
 
 def refusal(text: str, why: str) -> HpcdemError:
@@ -128,7 +174,11 @@ class _Evaluation:
 
     def _called(self, name: str, arguments: list[ast.expr], depth: int) -> Any:
         if name == GROUP:
-            words = [node.id for node in arguments if isinstance(node, ast.Name)]
+            words = [
+                node.id if isinstance(node, ast.Name) else str(node.value)
+                for node in arguments
+                if isinstance(node, ast.Name) or (isinstance(node, ast.Constant) and isinstance(node.value, str))
+            ]
             if len(words) != len(arguments) or len(words) not in (1, 2):
                 raise refusal(self.text, "group(NAME) or group(NAME, SET) takes names")
             return self.groups(words[0], words[1] if len(words) == 2 else "")

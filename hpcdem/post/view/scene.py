@@ -195,6 +195,11 @@ def plane_of(moment: Moment, view: ModelView) -> tuple[np.ndarray, np.ndarray] |
     return space.taken(section_of(view.section), eye_of(view.eye))
 
 
+def sliced(view: ModelView) -> bool:
+    """Whether of bodies in space only a cut is shown."""
+    return bool(view.section) and section_of(view.section).alone
+
+
 def scene(
     moment: Moment, view: ModelView, seen: View | None = None, only: Mapping[str, np.ndarray] | None = None
 ) -> Scene:
@@ -204,7 +209,7 @@ def scene(
     shifted = shift_of(moment, view.deformed)
     plane = plane_of(moment, view)
     layers = [
-        painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object), plane)
+        painted(moment, layer, seen, shifted, None if only is None else only.get(layer.object), plane, sliced(view))
         for layer in view.layers if layer.visible
     ]  # fmt: skip
     return Scene(moment, view, seen, layers, turn_of(moment, view))
@@ -242,6 +247,8 @@ class _Words(Mapping[str, np.ndarray]):
         objects = self.objects
         if name in objects.fields:
             return np.asarray(objects.fields[name])
+        if name == "id" and objects.number in objects.fields:
+            return np.asarray(objects.fields[objects.number])
         axes = "xyz"[: objects.dim]
         if name in tuple(axes):
             return objects.centres()[:, axes.index(name)]
@@ -277,9 +284,9 @@ def _members(objects: Objects, layer: Layer, group: str, set_name: str) -> np.nd
 
 def painted(
     moment: Moment, layer: Layer, seen: View, shifted: np.ndarray | None = None, only: np.ndarray | None = None,
-    plane: tuple[np.ndarray, np.ndarray] | None = None,
+    plane: tuple[np.ndarray, np.ndarray] | None = None, alone: bool = False,
 ) -> Painted:  # fmt: skip
-    """One layer of a picture."""
+    """One layer of a picture. alone: of bodies only what lies in the plane."""
     objects = moment.of(layer.object)
     rows = chosen_rows(moment, layer, only)
     result = Painted(
@@ -318,7 +325,7 @@ def painted(
             from hpcdem.post.view import space
 
             solid = objects.kind == SOLIDS
-            result.shape = space.skin(points, whole[1], whole[2], rows, plane) if solid else space.cut_faces(
+            result.shape = space.skin(points, whole[1], whole[2], rows, plane, alone) if solid else space.cut_faces(
                 points, whole[1][rows, :3], plane
             )  # fmt: skip
         else:

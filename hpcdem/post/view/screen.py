@@ -33,11 +33,13 @@ NEARER = 2.0
 @dataclass
 class Picture:
     """colours (h, w, 3) bytes, row 0 at the top; layer (h, w) i1: place of the layer in the scene that a pixel shows,
-    -1 for none; row (h, w) i4: which of its objects."""
+    -1 for none; row (h, w) i4: which of its objects; near (h, w): in space how near to the eye it is [pixels], -inf
+    where nothing is, or only what lets light through; None of a picture that is a mean."""
 
     colours: np.ndarray
     layer: np.ndarray
     row: np.ndarray
+    near: np.ndarray | None = None
 
 
 def paint(
@@ -50,8 +52,9 @@ def paint(
     colours[:] = DARK_GROUND if dark else GROUND
     layer, row = np.full((h, w), NOTHING, np.int8), np.full((h, w), NOTHING, np.int32)
     place = transform(scene.seen, w, h)
+    near = None
     if scene.turn is not None:
-        _in_space(scene, scene.turn, place, (colours, layer, row), fine, max(1, round(pen * fine)))
+        near = _in_space(scene, scene.turn, place, (colours, layer, row), fine, max(1, round(pen * fine)))
     else:
         for number, painted in enumerate(scene.layers):
             _layer(painted, number, place, colours, layer, row, fine)
@@ -63,7 +66,8 @@ def paint(
         colours = (mean // fine**2).astype(np.uint8)
         middle = slice(fine // 2, None, fine)
         layer, row = np.ascontiguousarray(layer[middle, middle]), np.ascontiguousarray(row[middle, middle])
-    return Picture(colours, layer, row)
+        near = None
+    return Picture(colours, layer, row, near)
 
 
 def transform(seen: View, width: int, height: int) -> tuple[float, float, float, float]:
@@ -72,8 +76,9 @@ def transform(seen: View, width: int, height: int) -> tuple[float, float, float,
     return a, -a * seen.left, c, -c * seen.top
 
 
-def _in_space(scene: Scene, turn: np.ndarray, place: tuple, target: tuple, fine: int, pen: int) -> None:
-    """Faces by their depth: first those that nothing shines through, then the others from the far to the near."""
+def _in_space(scene: Scene, turn: np.ndarray, place: tuple, target: tuple, fine: int, pen: int) -> np.ndarray:
+    """Faces by their depth: first those that nothing shines through, then the others from the far to the near. How near
+    each pixel is."""
     from hpcdem.post.view import space
 
     a, b, c, d = place
@@ -112,6 +117,7 @@ def _in_space(scene: Scene, turn: np.ndarray, place: tuple, target: tuple, fine:
         at, far, i, j = at[there], far[there], i[there], j[there]
         free = a * at[:, 2] > near[i, j] - STEP
         _arrows(at[free, :2], far[free, :2], place, fine, target)
+    return near
 
 
 def _layer(painted: Painted, number: int, place: tuple, colours: np.ndarray, layer: np.ndarray, row: np.ndarray,

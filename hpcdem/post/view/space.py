@@ -51,12 +51,12 @@ def taken(section: Section, eye: tuple[float, float, float]) -> tuple[np.ndarray
 
 def skin(
     points: np.ndarray, cells: np.ndarray, partner: np.ndarray, rows: np.ndarray,
-    plane: tuple[np.ndarray, np.ndarray] | None = None,
+    plane: tuple[np.ndarray, np.ndarray] | None = None, alone: bool = False,
 ) -> Skin:  # fmt: skip
     """The surface of some tetrahedra: their faces on no other of them.
 
     points (k, 3); cells (n, 4); partner (4 n,): the face that each lies on, -1: none; rows: which tetrahedra,
-    ascending; plane: a point and the normal into what is taken away, see `taken`.
+    ascending; plane: a point and the normal into what is taken away, see `taken`; alone: only what lies in it.
     """
     from hpcdem.physics.fdem import tetrahedra
 
@@ -73,6 +73,8 @@ def skin(
     if plane is not None:
         far = (points - plane[0]) @ plane[1]
         points, made, owner, cut = _clipped(points, cells, far, rows, three, owner)
+    if alone:
+        made, owner, cut = made[cut], owner[cut], cut[cut]
     return _bare(points, made, np.searchsorted(rows, owner), cut)
 
 
