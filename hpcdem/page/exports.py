@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
+import colorsys
 import html
 import io
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,36 +76,56 @@ def table(moment: Moment, view: ModelView, label: Any) -> bytes:
 
 def drawing(moment: Moment, view: ModelView) -> bytes:
     """DXF (R12) with a layer per layer: circles, filled polygons, lines, in the nearest of its 255 colours."""
-    try:
-        from ezdxf import colors
-        from ezdxf.addons import r12writer
-    except ImportError:
-        raise HpcdemError("DXF needs the package ezdxf, which is not installed: pip install 'hpcdem[mesh]'") from None
-    known = np.array([colors.aci2rgb(k) for k in range(1, 256)], float) / 255.0
-    text = io.StringIO()
-    with r12writer(text) as out:
-        for painted in scene(moment, view).layers:
-            near = 1 + np.array([((known - shade) ** 2).sum(axis=1).argmin() for shade in painted.shades], int)
-            _dxf_layer(out, painted, near)
-    return text.getvalue().encode()
+    known = _dxf_colours()
+    lines = ["0", "SECTION", "2", "ENTITIES"]
+    for painted in scene(moment, view).layers:
+        near = 1 + np.array([((known - shade) ** 2).sum(axis=1).argmin() for shade in painted.shades], int)
+        lines += _dxf_layer(painted, near)
+    return "\n".join([*lines, "0", "ENDSEC", "0", "EOF", ""]).encode()
 
 
-def _dxf_layer(out: Any, painted: Painted, near: np.ndarray) -> None:
+def _dxf_colours() -> np.ndarray:
+    """(255, 3) fractions of red, green and blue of the colours 1 to 255: six pure ones, white and greys, then 24 hues
+    in five depths, each pure and pale, and greys."""
+    pure = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1), (1, 1, 1)]
+    hues = []
+    for hue in range(24):
+        full = np.array(colorsys.hsv_to_rgb(hue / 24.0, 1.0, 1.0))
+        for depth in (1.0, 165.0 / 255.0, 0.5, 0.3, 0.15):
+            hues += [depth * full, depth * 0.5 * (full + 1.0)]
+    greys = [np.full(3, v / 255.0) for v in (128, 192, 0, 101, 102, 153, 204, 255)]
+    return np.array([*pure, *greys[:2], *hues, *greys[2:]])
+
+
+def _dxf_layer(painted: Painted, near: np.ndarray) -> list[str]:
+    """Its entities, as lines of codes and values."""
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in painted.layer.label).upper() or "LAYER"
+    lines: list[str] = []
+
+    def entity(kind: str, colour: int, places: Iterable[np.ndarray], *more: str) -> None:
+        lines.extend(("0", kind, "8", name, "62", str(colour)))
+        for n, place in enumerate(places):
+            for axis, value in enumerate((*place, 0.0)[:3]):
+                lines.extend((f"{axis + 1}{n}", f"{value:.12g}"))
+        lines.extend(more)
+
+    def face(corners: np.ndarray, colour: int) -> None:
+        entity("3DFACE", colour, [*corners, corners[-1]][:4])
+
     if painted.kind_of_shape in (SOLIDS, FACES, RODS):  # what is seen, where it is in space
         points, cells, of, _ = painted.shape
         for corners, kind in zip(cells, painted.kind[of]):
-            out.add_3dface(points[corners[corners >= 0]], layer=name, color=int(near[kind]))
-        return
+            face(points[corners[corners >= 0]], near[kind])
+        return lines
     for k, kind in enumerate(painted.kind):
-        look = {"layer": name, "color": int(near[kind])}
         if painted.kind_of_shape == DISCS:
-            out.add_circle(painted.shape[0][k], radius=painted.shape[1][k], **look)
+            entity("CIRCLE", near[kind], painted.shape[0][k : k + 1], "40", f"{painted.shape[1][k]:.12g}")
         elif painted.kind_of_shape == POLYGONS:
             points, cells = painted.shape
-            out.add_3dface(points[cells[k][cells[k] >= 0]], **look)
+            face(points[cells[k][cells[k] >= 0]], near[kind])
         else:
-            out.add_line(*painted.shape[0][k], **look)
+            entity("LINE", near[kind], painted.shape[0][k])
+    return lines
 
 
 def page(moment: Moment, view: ModelView) -> bytes:

@@ -184,16 +184,18 @@ class Log:
         if command.first_step is None or self._window is None:
             return True
         done = step - command.first_step
-        self.at(step, command.name, command.first_step - command.before, command.first_step + command.steps)
+        began, ends = command.first_step - command.before, command.first_step + command.steps
+        self.at(step, command.name, began, ends, command.before)
         if self._bar is not None:
             self._bar.update(command.before + done, self._script_done + done)
         due = self.every_interval or self._now() - self._last_line >= QUIET_SECONDS
         due = due or (done >= command.steps and not command.beside)
         return due and step > self._window[0]
 
-    def at(self, step: int, name: str, first: int, last: float) -> None:
-        """A command is at this step; it began at `first` and ends at `last` (inf: not known). For those who look at the
-        folder of the results, now and then (io/run_record.py: PROGRESS); a disk that refuses it does not matter."""
+    def at(self, step: int, name: str, first: int, last: float, before: int = 0) -> None:
+        """A command is at this step; it began at `first` and ends at `last` (inf: not known); before: steps of it that
+        an earlier run did. For those who look at the folder of the results, now and then (io/run_record.py: PROGRESS);
+        a disk that refuses it does not matter."""
         now = self._now()
         if not self._speaks or self.place is None:
             return
@@ -210,7 +212,7 @@ class Log:
             "left": (last - step) / speed if known and speed > 0.0 else None,
         }  # fmt: skip
         if self._script_steps:
-            done = self._script_done + step - first
+            done = self._script_done + step - first - before
             told |= {"script_part": done / self._script_steps, "script_left": max(self._script_left(done), 0.0)}
         try:
             beside = self.place / f"{PROGRESS}.tmp"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 import urllib.error
 from collections.abc import Callable, Iterator
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
+from hpcdem.page import exports
 from hpcdem.post.view.model import read_view
 from tests.conftest import Launcher
 from tests.page.viewing import Tab, Viewing
@@ -254,6 +256,9 @@ def test_files(page: Tab, tmp_path: Path, browser: Any):
 def test_a_drawing_is_read_by_ezdxf(page: Tab, tmp_path: Path):
     ezdxf = pytest.importorskip("ezdxf")
     drawing = ezdxf.readfile(page.saved("dxf", tmp_path)).modelspace()
+    colours = [ezdxf.colors.aci2rgb(k) for k in range(1, 256)]
+    others = np.arange(1, 256) != 249  # of which ezdxf has its own opinion
+    np.testing.assert_allclose(255.0 * exports._dxf_colours()[others], np.array(colours)[others], atol=1.0)
     faces = [entity for entity in drawing if entity.dxftype() == "3DFACE"]
     assert len(faces) == 10 and {face.dxf.layer for face in faces} == {"ELEMENTS"}
     assert tuple(faces[9].dxf.vtx2)[:2] == pytest.approx((3.9, 3.3))
@@ -270,6 +275,37 @@ def test_a_view_is_opened(page: Tab, tmp_path: Path):
     page.tab.set_input_files("#file", path)
     page.tab.wait_for_selector("#message.bad")
     assert "layers.0.object" in page.text("#message")
+
+
+def test_what_stands_around_the_model(page: Tab):
+    """Axes, the legend and histories are there or not; numbers at the edge are those of the place."""
+
+    def edge() -> int:
+        return page.tab.evaluate(
+            """() => { const c = document.querySelector('canvas.over');
+            return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.filter((v) => v).length; }"""
+        )
+
+    page.tab.click("li[data-layer=elements]")
+    page.after(lambda: page.tab.select_option("#field", "stress_yy"))
+    assert edge() > 100 and "stress yy (Pa)" in page.text(".legend")
+    page.tab.uncheck("#show-axes")
+    assert edge() == 0
+    page.tab.uncheck("#show-legend")
+    assert page.text(".legend") == ""
+    page.tab.uncheck("#show-histories")
+    assert not page.tab.is_visible("#history")
+    for name in ("axes", "legend", "histories"):
+        page.tab.check(f"#show-{name}")
+    assert edge() > 100 and page.text(".legend") and page.tab.is_visible("#history")
+
+
+def test_a_range_of_the_language_is_a_filter(page: Tab):
+    page.tab.click("li[data-layer=elements]")
+    page.tab.fill("#filter", "range x 0 1.5 group 'base' and stress_yy < 0")
+    page.after(lambda: page.tab.click("#apply"))
+    count = page.text("li[data-layer=elements] small")
+    assert count.endswith(" of 10") and 0 < int(count.split()[0]) < 10
 
 
 def test_language_and_theme(page: Tab):
@@ -304,6 +340,9 @@ def test_a_run_is_followed_told_to_save_and_to_stop(browser: Any, launch: Launch
     try:
         page = Tab(browser, viewing.url, locale="en-GB")
         assert "running on" in page.text("#run-state") and page.text("#run-state").startswith("a.sc")
+        wait(lambda: page.text("#far"))  # how far it is, of what, how long it takes, and the last line of the log
+        assert re.fullmatch(r"step \d+, step 100000000 · \d\.\d % · left [\d:]+", page.text("#far"))
+        assert "step 100000000" in page.text("#log-line") or "steps/s" in page.text("#log-line")
         first = page.text("#moment")
         wait(lambda: page.text("#moment") != first)
         page.tab.click("#checkpoint")
@@ -316,7 +355,8 @@ def test_a_run_is_followed_told_to_save_and_to_stop(browser: Any, launch: Launch
         assert run.wait(60) == 85
         assert len(list(data.glob("*.sav"))) >= saved
         wait(lambda: "stopped at step" in page.text("#run-state"))
-        assert page.tab.locator("#stop").is_disabled() and page.errors == []
+        assert page.tab.locator("#stop").is_disabled() and page.errors == [] and not page.tab.is_visible("#far")
+        assert not (data / "progress.json").exists()
     finally:
         viewing.close()
 

@@ -75,6 +75,44 @@ def test_it_is_turned_moved_cut_and_put_back(page: Tab):
     assert page.text("#message").startswith("view: section: expected x=1.5") and same(first, page.pixels())
 
 
+def test_a_slice_and_the_slider_of_the_section(page: Tab):
+    first = look_from(page, "-y")
+    axis = page.after(lambda: page.tab.select_option("#cut-axis", "x"))
+    assert page.tab.input_value("#section") == "x=2" and same(
+        first, axis
+    )  # the eye does not see the cut from the front
+    look_from(page, "+x")
+    cut = page.pixels()
+    alone = page.after(lambda: page.tab.check("#slice"))
+    assert page.tab.input_value("#section") == "slice x=2" and same(
+        cut, alone
+    )  # and from the side the cut hides the rest
+    look_from(page, "iso")
+    assert len(np.unique(page.pixels().reshape(-1, 3), axis=0)) < len(np.unique(cut.reshape(-1, 3), axis=0)) + 300
+    thin = page.pixels()
+    moved = page.after(lambda: page.tab.locator("#cut").fill("3"))
+    assert page.tab.input_value("#section") == "slice x=3" and not same(thin, moved)
+    whole = page.after(lambda: page.tab.select_option("#cut-axis", ""))
+    assert page.tab.input_value("#section") == "" and not same(whole, moved)
+
+
+def test_a_distance_in_space(page: Tab, viewing: Viewing):
+    """Between two places on the body, of which one is nearer to the eye; beside the body that in the picture."""
+    page.tab.keyboard.press("d")
+    places = []
+    for u, v in ((0.45, 0.65), (0.6, 0.45)):
+        with page.tab.expect_response("**/pick") as told:
+            page.tab.mouse.click(*page.place(u, v))
+        places.append(np.array(told.value.json()["point"]))
+    page.tab.wait_for_function("document.querySelector('#message').textContent.includes('Δz')")
+    assert float(page.text("#message").split()[0]) == pytest.approx(np.linalg.norm(places[1] - places[0]), rel=1e-4)
+    for x, y, z in places:  # on the right, the front or the top: x = 4, y = 0, z = 2.2
+        assert min(abs(x - 4.0), abs(y), abs(z - 2.2)) < 0.02
+    for u in (0.02, 0.03):
+        page.tab.mouse.click(*page.place(u, 0.02))
+    page.tab.wait_for_function("document.querySelector('#message').textContent.includes('plane')")
+
+
 def test_a_query_tells_the_element_behind_the_pixel(page: Tab, folder: Path):
     """Cut at y = 1.6 and seen from the front, the place (x, z) of the plane is under the mouse."""
     look_from(page, "-y")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import subprocess
 import sys
 
@@ -107,6 +108,35 @@ def test_a_log_file_gets_a_line_each_ten_seconds(log, out, clock):
         clock.t += 1.0
         log.step(status(step))
     assert out.getvalue().count("\nstep") == 10
+
+
+def test_the_folder_is_told_how_far_it_is(log, clock, tmp_path):
+    """Once a second, from the second second on; of a command that went on from a checkpoint with what was before."""
+    log.script_started("a.py", 400)
+    log.command_started("CYC", 3, 100, 50, before=20)
+    log.place = tmp_path
+    log.wants(50)
+    clock.t += 0.5
+    log.wants(60)
+    assert not (tmp_path / "progress.json").exists()
+    clock.t += 1.5
+    log.wants(90)
+    told = json.loads((tmp_path / "progress.json").read_text())
+    assert told == {
+        "step": 90, "command": "CYC", "line": "line 3: CYC, 120 steps, 100 left", "speed": 20.0, "part": 0.5,
+        "left": 3.0, "script_part": 0.1, "script_left": 18.0,
+    }  # fmt: skip
+    clock.t += 0.5
+    log.wants(100)
+    assert json.loads((tmp_path / "progress.json").read_text())["step"] == 90
+    log.at(100, "solve", 100, float("inf"))
+    clock.t += 2.0
+    log.at(140, "solve", 100, float("inf"))
+    told = json.loads((tmp_path / "progress.json").read_text())
+    assert told["part"] is None and told["left"] is None and told["speed"] == 20.0
+    log.place = tmp_path / "gone"
+    clock.t += 2.0
+    log.at(180, "solve", 100, float("inf"))  # and nothing happens
 
 
 def test_set_stepbar_means_each_interval(log, out, clock):

@@ -156,6 +156,7 @@ class Window {
     if (this.over.width !== w || this.over.height !== h) { this.over.width = w; this.over.height = h; }
     const pen = this.over.getContext("2d");
     pen.clearRect(0, 0, w, h);
+    if (this.view.axes) axes(this, pen, w, h);
     if (!this.points.length) return;
     const [left, right, , top] = this.box;
     const k = w / (right - left);
@@ -229,6 +230,39 @@ function eyes() {
   const names = Object.keys(about.eyes), { eye } = current.view;
   options($("eye"), [...names, ...(names.includes(eye) ? [] : [eye])].map((name) => [name, name]), eye);
   $("section").value = current.view.section;
+  cutter();
+}
+
+/** The slider and the box beside the words of a section: they stand for x=..., y=... or z=... */
+function cutter() {
+  const { section } = current.view, found = /^(slice )?([xyz])([=<>])(.+)$/.exec(section);
+  const axis = "xyz".indexOf(found?.[2] ?? $("cut-axis").value), slider = $("cut");
+  $("slice").checked = section.startsWith("slice ");
+  $("slice").disabled = !section;
+  $("cut-axis").value = found ? found[2] : section ? "other" : "";
+  slider.disabled = !found;
+  if (!found) return;
+  const [low, high] = [about.box[0][axis], about.box[1][axis]];
+  slider.min = low; slider.max = high; slider.step = (high - low) / 200;
+  slider.value = found[4];
+}
+
+function cut(text) {
+  const some = $("linked").checked ? windows.filter((one) => one.source === current.source) : [current];
+  for (const one of some) { one.view.section = text; one.redraw(); }
+  $("section").value = text;
+  cutter();
+}
+
+function cutAlong() {
+  const axis = $("cut-axis").value, k = "xyz".indexOf(axis);
+  if (axis === "other") { cutter(); return; }
+  cut(k < 0 ? "" : `${$("slice").checked ? "slice " : ""}${axis}=${short((about.box[0][k] + about.box[1][k]) / 2, 4)}`);
+}
+
+function cutAt() {
+  const found = /^((?:slice )?[xyz][=<>])/.exec(current.view.section);
+  if (found) cut(`${found[1]}${short(Number($("cut").value), 4)}`);
 }
 
 function moved(one) {
@@ -284,6 +318,63 @@ function short(value, digits = 6) {
   const size = Math.abs(value);
   if (size >= 1e5 || (size && size < 1e-3)) return value.toExponential(digits - 1).replace(/\.?0*e\+?/, "e");
   return Number(value.toPrecision(digits)).toString();
+}
+
+// ---- axes ------------------------------------------------------------------------------------------------------------
+
+/** A round length of about this one: 1, 2 or 5 times a power of ten. */
+function round(length) {
+  const decade = 10 ** Math.floor(Math.log10(length)), part = length / decade;
+  return decade * (part < 1.5 ? 1 : part < 3.5 ? 2 : part < 7.5 ? 5 : 10);
+}
+
+/** Numbers along the lower and the left edge [m]; in space, where they would say nothing, the axes and a length. */
+function axes(one, pen, w, h) {
+  const k = w / Math.max(1, one.root.clientWidth), [left, right, bottom, top] = one.box, scale = w / (right - left);
+  const ink = getComputedStyle(document.documentElement).getPropertyValue("--ink");
+  pen.save();
+  pen.font = `${11 * k}px system-ui, sans-serif`;
+  pen.fillStyle = pen.strokeStyle = ink;
+  pen.lineWidth = k;
+  pen.beginPath();
+  const { turn } = one;
+  const step = round((right - left) * 110 * k / w), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const word = (v) => (step < 1e-4 || step >= 1e6 ? short(v, 4) : (Math.abs(v) < step / 2 ? 0 : v).toFixed(digits));
+  if (turn) {
+    const length = step * scale, [x0, y0] = [w - 14 * k - length, h - 12 * k];
+    pen.moveTo(x0, y0 - 5 * k); pen.lineTo(x0, y0); pen.lineTo(x0 + length, y0); pen.lineTo(x0 + length, y0 - 5 * k);
+    const [cx, cy, reach] = [44 * k, h - 44 * k, 26 * k];
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillText(`${word(step)} m`, x0 + length / 2, y0 - 11 * k);
+    [0, 1, 2].forEach((n) => {
+      const [x, y] = [turn[0][n], turn[1][n]];
+      pen.moveTo(cx, cy); pen.lineTo(cx + reach * x, cy - reach * y);
+      pen.fillText("xyz"[n], cx + 1.4 * reach * x, cy - 1.4 * reach * y);
+    });
+    pen.stroke();
+    pen.restore();
+    return;
+  }
+  pen.textAlign = "center";
+  pen.textBaseline = "bottom";
+  for (let n = Math.ceil(left / step); n * step <= right; n++) {
+    const x = (n * step - left) * scale;
+    pen.moveTo(x, h); pen.lineTo(x, h - 6 * k);
+    if (x > 50 * k && x < w - 30 * k) pen.fillText(word(n * step), x, h - 7 * k);
+  }
+  pen.textAlign = "left";
+  pen.textBaseline = "middle";
+  for (let n = Math.ceil(bottom / step); n * step <= top; n++) {
+    const y = (top - n * step) * scale;
+    pen.moveTo(0, y); pen.lineTo(6 * k, y);
+    if (y > 30 * k && y < h - 24 * k) pen.fillText(word(n * step), 9 * k, y);
+  }
+  pen.textAlign = "right";
+  pen.textBaseline = "bottom";
+  pen.fillText("m", w - 6 * k, h - 7 * k);
+  pen.stroke();
+  pen.restore();
 }
 
 // ---- legend ----------------------------------------------------------------------------------------------------------
@@ -356,8 +447,25 @@ function tree() {
     item.addEventListener("keydown", (event) => { if (event.key === "Enter") take(); });
     return item;
   }));
+  $("around").replaceChildren(...["axes", "legend", "histories"].map((name) => {
+    const line = document.createElement("label"), box = document.createElement("input");
+    line.className = "check";
+    box.type = "checkbox";
+    box.id = `show-${name}`;
+    box.checked = name === "histories" ? !$("charts").hidden : current.view[name];
+    box.addEventListener("change", () => around(name, box.checked));
+    line.append(box, say(`of_${name}`));
+    return line;
+  }));
   counts();
   properties();
+}
+
+/** What stands around the model is there, or not. */
+function around(name, on) {
+  if (name === "histories") { $("charts").hidden = !on; return; }
+  current.view[name] = on;
+  if (current.shown) current.put();
 }
 
 function counts() {
@@ -473,6 +581,8 @@ async function query(one, at) {
       ...found.values.filter(([name]) => !["x", "y", ...(turn ? ["z"] : [])].includes(name))];
     $("values").replaceChildren(...rows.map(([name, value, unit]) => {
       const row = document.createElement("tr");
+      row.title = say("copy");
+      row.addEventListener("click", () => copied(row.cells[1].textContent));
       for (const text of [name, `${typeof value === "number" ? short(value) : value ?? "–"} ${unit}`.trim()]) {
         const cell = document.createElement("td");
         cell.textContent = text;
@@ -484,18 +594,35 @@ async function query(one, at) {
   } catch (error) { complain(error); }
 }
 
-function measure(one, at) {
-  if (one.points.length !== 1) { one.points = [[at.x, at.y]]; told(say("first_point")); one.marks(); return; }
-  one.points.push([at.x, at.y]);
-  const [[x0, y0], [x1, y1]] = one.points;
-  told(say(about.box ? "distance_flat" : "distance", { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) }));
+async function measure(one, at) {
+  const first = one.points.length !== 1;
+  one.points = first ? [[at.x, at.y]] : [...one.points, [at.x, at.y]];
+  one.places = first ? [] : one.places ?? [];
   one.marks();
+  if (first) told(say("first_point"));
+  if (about.box) {
+    try {
+      one.places.push((await json("pick", { ...one.request(false), column: at.column, row: at.row })).point ?? null);
+    } catch (error) { complain(error); return; }
+  }
+  if (first) return;
+  const [[x0, y0], [x1, y1]] = one.points;
+  const [a, b] = one.places;
+  const flat = { d: short(Math.hypot(x1 - x0, y1 - y0)), x: short(x1 - x0), y: short(y1 - y0) };
+  if (a && b) {
+    const by = b.map((v, k) => v - a[k]);
+    told(say("distance_space", { d: short(Math.hypot(...by)), x: short(by[0]), y: short(by[1]), z: short(by[2]) }));
+  } else told(say(about.box ? "distance_flat" : "distance", flat));
 }
 
-async function copy() {
+function copy() {
   const lines = [...$("values").rows].map((row) => [...row.cells].map((cell) => cell.textContent).join("\t"));
+  return copied([$("answer-title").textContent, ...lines].join("\n"));
+}
+
+async function copied(text) {
   try {
-    await navigator.clipboard.writeText([$("answer-title").textContent, ...lines].join("\n"));
+    await navigator.clipboard.writeText(text);
     told(say("copied"));
   } catch { told(say("not_copied"), true); }
 }
@@ -647,6 +774,20 @@ function run() {
   const n = frames().length;
   $("run-state").textContent = `${found.script && `${found.script}: `}${text.startsWith("state_") ? found.state : text}, ${say("frames", { n })}`;
   for (const id of ["stop", "checkpoint"]) $(id).disabled = !found.running;
+  const far = found.progress;
+  $("progress").hidden = $("far").hidden = $("log-line").hidden = !far;
+  if (!far) return;
+  const part = far.script_part ?? far.part, left = far.script_left ?? far.left;
+  if (part === null) $("progress").removeAttribute("value"); else $("progress").value = Math.min(part, 1);
+  $("far").textContent = [say("at_step", { step: far.step, command: far.command }),
+    ...(part === null ? [] : [`${(100 * part).toFixed(1)} %`]), ...(left === null ? [] : [say("left", { time: duration(left) })])].join(" · ");
+  $("log-line").textContent = far.line;
+}
+
+function duration(seconds) {
+  const all = Math.round(seconds), two = (n) => String(n).padStart(2, "0");
+  const [h, m, s] = [Math.floor(all / 3600), Math.floor(all / 60) % 60, all % 60];
+  return h ? `${h}:${two(m)}:${two(s)}` : m ? `${m}:${two(s)}` : `${s} s`;
 }
 
 async function tell(what) {
@@ -850,7 +991,13 @@ function connect() {
   on("filter", "keydown", (event) => { if (event.key === "Enter") change({ filter: $("filter").value }); });
   on("deformed", "change", () => { current.view.deformed = Number($("deformed").value) || 0; current.redraw(); });
   on("eye", "change", () => { looked(current, $("eye").value); current.fit(); moved(current); });
-  on("section", "change", () => { current.view.section = $("section").value.trim(); current.redraw(); });
+  on("section", "change", () => cut($("section").value.trim()));
+  on("cut-axis", "change", cutAlong);
+  on("cut", "input", cutAt);
+  on("slice", "change", () => {
+    const text = current.view.section.replace(/^slice /, "");
+    if (text) cut(`${$("slice").checked ? "slice " : ""}${text}`);
+  });
   on("title", "change", () => { current.view.title = $("title").value; current.redraw(); });
   on("up", "click", () => shift(-1));
   on("down", "click", () => shift(1));
