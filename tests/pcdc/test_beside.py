@@ -68,9 +68,9 @@ def test_frames_hold_what_was_said_and_what_touches(tmp_path: Path):
 
     fluid = moment.of("flow-nodes")
     given = fluid.fields["condition"] == kernels.PRESSURE
-    assert given.sum() == 1 and fluid.fields["fluid_pressure"][given].tolist() == [2e5]
+    assert given.sum() == 1 and fluid.fields["fluid_pressure"][given] == pytest.approx(2e5)
     assert np.allclose(fluid.centres()[given], (1.0, 0.4), atol=1e-3) and fluid.fields["inflow"][given][0] > 0.0
-    assert (fluid.fields["fluid_pressure"][~given] < 2e5).all()
+    assert (fluid.fields["fluid_pressure"][~given] < 1e5).all()
 
     touching, found = moment.of("contacts"), diagnostics.contacts(blocks)
     pairs = {*zip(touching.fields["element_1"].tolist(), touching.fields["element_2"].tolist())}

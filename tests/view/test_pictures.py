@@ -15,14 +15,16 @@ from hpcdem.cli.draw import work
 from hpcdem.core.errors import HpcdemError
 from hpcdem.core.looks import COLOURS
 from hpcdem.halo.comm import SerialComm
+from hpcdem.io.axes import View
 from hpcdem.io.frame import Columns
 from hpcdem.io.vtkhdf import read_vtkhdf
 from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.physics.fdem.diagnostics import QUANTITIES
 from hpcdem.post.view.model import Layer, ModelView, read_view
-from hpcdem.post.view.moment import Moment, of_blocks, of_particles, read_moment, unit_of
+from hpcdem.post.view.moment import BALLS, SPOTS, Moment, Objects, of_blocks, of_particles, read_moment, unit_of
 from hpcdem.post.view.paper import Paper, draw
 from hpcdem.post.view.scene import STEPS, default_view, scene, shades_of, with_field
+from hpcdem.post.view.screen import paint
 from tests.view import frames
 
 pytestmark = pytest.mark.figures
@@ -137,6 +139,34 @@ def test_objects_and_fields_of_particles(sand: Moment):
     np.testing.assert_array_equal(particles.values("kinetic_energy", ""), np.arange(25.0) ** 2)
     np.testing.assert_array_equal(particles.values("rotation", ""), 0.01 * np.arange(25))
     np.testing.assert_array_equal(sand.of("contacts").read()[0][0], [[0.0, 0.0], [1.0, 0.0]])
+
+
+def test_clumps_are_their_members():
+    frame = frames.discs()
+    k = np.arange(25)
+    frame.tables["particles"].columns["clump"] = np.select([k < 4, k > 22], [10, 33], -1)
+    moment = of_particles(frame)
+    clumps = moment.of("clumps")
+    assert clumps.count == 6 and clumps.fields["members"].tolist() == [4, 4, 4, 4, 2, 2]
+    assert clumps.value("clump", 4) == 33 and clumps.value("gid", 4) == 33 and clumps.vectors["velocity"][4, 0] == 23.0
+    layer = default_view(moment).layer("clumps")
+    assert layer is not None and not layer.visible and "clumps" not in of_particles(frames.discs()).objects
+    painted = scene(moment, bare(Layer(object="clumps", filter="members < 3"))).layers[0]
+    assert painted.rows.tolist() == [4, 5] and painted.kind.tolist() == [3, 3]  # each clump in one colour
+    np.testing.assert_array_equal(painted.shape[0], [[3.0, 4.0], [4.0, 4.0]])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_points_are_as_large_on_paper_whatever_the_scale(dim: int):
+    """Of 3 points times 4: discs, in space octahedra, from the front a square on its corner."""
+    at = np.full((1, dim), 0.5)
+    objects = {"flow-nodes": Objects(SPOTS if dim == 2 else BALLS, 1, lambda: (at,), {})}
+    for width in (1.0, 1e4):
+        seen = View(*(0.5 + 0.5 * width * side for side in (-1, 1, -1, 1)))
+        view = ModelView(layers=(Layer(object="flow-nodes", size=4.0),), eye="-y" if dim == 3 else "iso")
+        picture = paint(scene(Moment(0, 0.0, objects, dim=dim), view, seen), 960, 960)
+        assert (picture.row >= 0).sum() == pytest.approx(np.pi * 144.0 if dim == 2 else 2 * 144.0, rel=0.12)
+        assert picture.row[480, 480] == 0
 
 
 def test_stress_of_a_particle_is_that_of_its_contacts():
