@@ -255,7 +255,7 @@ function cut(text) {
 }
 
 function cutAlong() {
-  const axis = $("cut-axis").value, k = "xyz".indexOf(axis);
+  const axis = $("cut-axis").value, k = ["x", "y", "z"].indexOf(axis);
   if (axis === "other") { cutter(); return; }
   cut(k < 0 ? "" : `${$("slice").checked ? "slice " : ""}${axis}=${short((about.box[0][k] + about.box[1][k]) / 2, 4)}`);
 }
