@@ -77,14 +77,14 @@ def write_last(project: Project) -> None:
     """A frame of each name of a state that makes no sense any more, for the user to look at. Collective."""
     with np.errstate(all="ignore"):
         for name in project.frames:
-            _write(project, name)
+            _write(project, name, sound=False)
 
 
-def _write(project: Project, name: str, later: Deliveries | None = None) -> None:
+def _write(project: Project, name: str, later: Deliveries | None = None, sound: bool = True) -> None:
     path, comm = project.folder() / f"{name}_{project.step:010d}.vtkhdf", project.comm
     with project.blocks.timers.around("output"):
         if later is None:
-            write_mesh_frame(path, frame(project), comm)
+            write_mesh_frame(path, frame(project, sound), comm)
         else:
             moment = _kept(frame(project))
             if comm.size == 1:
@@ -186,8 +186,8 @@ def _with_channels(blocks: Blocks, joints: dict[str, np.ndarray]) -> dict[str, n
     return found
 
 
-def frame(project: Project) -> MeshFrame:
-    """What is written at this moment. Collective."""
+def frame(project: Project, sound: bool = True) -> MeshFrame:
+    """What is written at this moment; sound: with what elements do to each other and what acts on them. Collective."""
     blocks, comm, mesh = project.blocks, project.comm, project.whole_mesh()
     with blocks.one_moment():
         corners = _corners(blocks)
@@ -211,5 +211,5 @@ def frame(project: Project) -> MeshFrame:
         there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
         return MeshFrame(
             int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
-            {found.name: found.columns() for found in there}, beside.tables(blocks),
+            {found.name: found.columns() for found in there}, beside.tables(blocks) if sound else {},
         )  # fmt: skip
