@@ -91,6 +91,7 @@ def test_states_follow_the_law():
     assert diagnostics.values(sim, "law_g12")[:9].tolist() != diagnostics.values(sim, "law_g12")[9:].tolist()
 
 
+@pytest.mark.slow
 def test_two_laws_give_the_bits_of_one():
     """Of two laws one runs in the loop over forces, of the other stress is found before it; which is which follows the
     number of elements. Beside them some that yield."""

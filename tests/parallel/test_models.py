@@ -38,7 +38,7 @@ WAYS = {
     "4 ranks": Way(4, saves=True),
     "2 threads": Way(threads=2),
     "from 4 ranks to 2": Way(2, source="4 ranks"),
-    "from 4 ranks to 2 threads": Way(threads=2, source="4 ranks"),
+    "from 4 ranks to 2 threads": Way(threads=2, source="4 ranks", slow=True),
     "from one to one": Way(source="alone"),
     "2 ranks": Way(2, slow=True),
     "3 ranks": Way(3, saves=True, slow=True),
