@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,18 +11,15 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem.kernels import dashpots
 from hpcdem.physics.dem.kernels.motion import KICK_X
 
-if TYPE_CHECKING:
-    from hpcdem.physics.dem.simulation import Simulation
-
 # Called with the tuples made here, which mypy cannot count.
 _of_pairs: Any = dashpots.of_pairs
 _of_walls: Any = dashpots.of_walls
 
 
 class Dashpots:
-    """Of a closed model, as its tables are."""
+    """Of a closed model (physics.dem.simulation.Simulation), as its tables are."""
 
-    def __init__(self, sim: Simulation) -> None:
+    def __init__(self, sim: Any) -> None:
         """Collective. CommandError for a model with contacts that would not follow."""
         _refuse(sim)
         log_e = math.log(sim.settings.restitution)
@@ -35,48 +32,37 @@ class Dashpots:
         self._on_walls = np.zeros((len(sim.lists.slot_row), 2))
         self._rates = np.zeros(len(mobility))
 
-    def push(self, sim: Simulation) -> None:
+    def push(self, sim: Any) -> None:
         """Add the forces at the present places and velocities."""
         self._into(sim, sim.lists.force)
 
-    def fastest(self, sim: Simulation) -> float:
+    def fastest(self, sim: Any) -> float:
         """Largest sum of c/m of a particle's contacts as they are [1/s]: none of their motions against each other dies
         away faster than at twice this rate. Collective."""
         self._rates[:] = 0.0
         self._into(sim, sim.lists.force.copy())
         return float(sim.comm.max_into(np.array([self._rates.max(initial=0.0)]))[0])
 
-    def on_walls(self, sim: Simulation) -> np.ndarray:
+    def on_walls(self, sim: Any) -> np.ndarray:
         """Forces on the particles of the wall slots as they are (slots, 2) [N]."""
         self._into(sim, sim.lists.force.copy())
         return self._on_walls
 
-    def _into(self, sim: Simulation, force: np.ndarray) -> None:
+    def _into(self, sim: Any, force: np.ndarray) -> None:
         p, lists, b, n_mat = sim.particles, sim.lists, sim.lists.blocks, len(sim.materials)
         walls = sim.walls.table()
         more = n_mat, self.mobility, self.beta, force, self._rates
         for t in range(lists.n_blocks):
             _of_pairs(
-                t,
-                p.hot,
-                p.ihot,
-                b.cut,
-                b.lo,
-                b.poff,
-                b.foff,
-                lists.ptr,
-                lists.partner,
-                lists.bond,
-                sim.pair_laws,
-                *more,
-            )
+                t, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, sim.pair_laws, *more,
+            )  # fmt: skip
             _of_walls(
                 t, p.hot, p.ihot, b.lo, b.foff, lists.wptr, walls, lists.slot_row, lists.slot_wall, lists.slot_side,
                 sim.wall_laws, *more, self._on_walls,
             )  # fmt: skip
 
 
-def _refuse(sim: Simulation) -> None:
+def _refuse(sim: Any) -> None:
     others = {
         "clumps, whose discs have no mass of their own": bool(sim.clumps),
         "a law of the user, whose stiffness is not known": sim.pair_law is not None,
