@@ -16,8 +16,7 @@ class Seepage:
     """discharge [m2/s]: mean of what comes in and goes out; exact [m2/s]: that of Charny; imbalance: difference of both
     over what comes in; levels: (x [m], level of the water [m], that of Dupuit [m]); seepage_face [m]: height over the
     lower level of the highest node of the side where water comes out; level_error: largest difference of the levels
-    from Dupuit's up to three quarters of the way, over them; account: what of the volume of fluid does not add up;
-    steps."""
+    from Dupuit's up to three quarters of the way, over them; account: what of the volume of fluid does not add up."""
 
     discharge: float
     exact: float
@@ -26,7 +25,6 @@ class Seepage:
     seepage_face: float
     level_error: float
     account: float
-    steps: int
 
 
 class DamSeepage(Water):
@@ -42,8 +40,6 @@ class DamSeepage(Water):
     right: float = quantity(4.0, "m", "level of the water on the right", ge=0)
     size: float = quantity(0.5, "m", "edges of the elements", gt=0)
     gravity: float = quantity(9.81, "m/s2", "acceleration of gravity, downwards", gt=0)
-    fluid_bulk: float = quantity(3e4, "Pa", "bulk modulus of the water; steady flow does not depend on it", gt=0)
-    balance: float = quantity(1e-4, "1", "steady when inflow and outflow differ by this part", gt=0, le=0.1)
 
     @model_validator(mode="after")
     def _fits(self) -> DamSeepage:
@@ -94,8 +90,8 @@ discharge = 0.5 * (inflow + outflow)
 leaving = pcdc.values('flow-node', 'inflow')
 seeps = (x > length - near) & (leaving < 0.0) & (y > right)
 seepage_face = float((y[seeps] - right).max()) if seeps.any() else 0.0
-print('discharge %.5g m2/s after %d steps; after Charny %.5g m2/s (%+.2f %%)'
-      % (discharge, steps, exact, 100 * (discharge / exact - 1)))
+print('discharge %.5g m2/s; after Charny %.5g m2/s (%+.2f %%)'
+      % (discharge, exact, 100 * (discharge / exact - 1)))
 print('levels up to three quarters of the way: at most %.3g %% from those of Dupuit; seepage face %.3g m'
       % (100 * level_error, seepage_face))
 line = [(k * length / 60, dupuit(k * length / 60)) for k in range(61)]

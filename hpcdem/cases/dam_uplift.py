@@ -18,7 +18,7 @@ class Uplift:
     the dam, drained [m2/s]: in the drain; exact_discharge [m2/s]: of the closed form, with the permeability of a
     lattice; error: largest difference of the pressure on the base from the closed form, over that of the head;
     diagram: (x [m], pressure [Pa], closed form [Pa]) along the base; safety: against sliding of a triangular dam;
-    imbalance: inflow less outflow over the inflow; account: what of the volume of fluid does not add up; steps."""
+    imbalance: inflow less outflow over the inflow; account: what of the volume of fluid does not add up."""
 
     uplift: float
     linear: float
@@ -31,7 +31,6 @@ class Uplift:
     safety: float
     imbalance: float
     account: float
-    steps: int
 
 
 class DamUplift(Water):
@@ -102,7 +101,7 @@ GROUT = """
 near = 1e-6 * base
 if curtain > 0:
     pcdc element group 'grouted' set 'grout' range x [a - near] [b + near] y [-curtain - near] 0
-    pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk [fluid_bulk] \\
+    pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 2.2e9 \\
         viscosity [viscosity/fluid_density] aperature-initial [tightness*aperture] \\
         aperature-minumum [0.01*tightness*aperture] range face-of 'grouted' set 'grout'
 """
@@ -160,8 +159,8 @@ conductivity = math.sqrt(3) * aperture**3 / (12 * size) * weight / viscosity
 exact_discharge = conductivity * head * ratio
 carried = 0.5 * concrete * gravity * base * head - uplift
 safety = carried * math.tan(math.radians(friction)) / (0.5 * weight * head**2)
-print('uplift %.5g MN/m after %d steps; linear %.5g, closed form %.5g MN/m%s' % (
-    1e-6*uplift, steps, 1e-6*linear, 1e-6*exact, ' without the drain' if drain > 0 else ''))
+print('uplift %.5g MN/m; linear %.5g, closed form %.5g MN/m%s' % (
+    1e-6*uplift, 1e-6*linear, 1e-6*exact, ' without the drain' if drain > 0 else ''))
 print('pressure on the base: at most %.3g %% of the head from the closed form' % (100 * error))
 print('below the dam %.4g m2/s, in the drain %.4g m2/s; closed form %.4g m2/s' % (
     discharge, drained, exact_discharge))

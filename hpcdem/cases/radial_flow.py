@@ -16,7 +16,7 @@ class Radial:
     """inflow, outflow [m2/s]: through the hole and the outer circle; imbalance: their difference over the inflow;
     error: largest difference of the mean pressure on RINGS circles from the closed form, over the difference of both
     pressures; permeability [m2]: that with which the closed form has this inflow; profile: (radius [m], mean pressure
-    [Pa], closed form [Pa]) of these rings; account: what of the volume of fluid does not add up; steps."""
+    [Pa], closed form [Pa]) of these rings; account: what of the volume of fluid does not add up."""
 
     inflow: float
     outflow: float
@@ -25,7 +25,6 @@ class Radial:
     permeability: float
     profile: list[tuple[float, float, float]] = field(repr=False)
     account: float
-    steps: int
 
 
 class RadialFlow(Water):
@@ -41,7 +40,6 @@ class RadialFlow(Water):
     inner_pressure: float = quantity(10e6, "Pa", "pressure in the hole", ge=0)
     outer_pressure: float = quantity(1e6, "Pa", "pressure on the outer circle", ge=0)
     size: float = quantity(0.15, "m", "edges of the elements", gt=0)
-    fluid_bulk: float = quantity(1e9, "Pa", "bulk modulus of the water; steady flow does not depend on it", gt=0)
 
     @model_validator(mode="after")
     def _fits(self) -> RadialFlow:
@@ -91,7 +89,7 @@ error = max(abs(found - exact) for _, found, exact in profile) / abs(inner_press
 permeability = (inflow * viscosity * math.log(outer / inner)
                 / (2 * math.pi * (inner_pressure - outer_pressure)))
 lattice = math.sqrt(3) * aperture**3 / (12 * size)   # that of equilateral triangles
-print('inflow %.5g m2/s, outflow %.5g m2/s after %d steps' % (inflow, outflow, steps))
+print('inflow %.5g m2/s, outflow %.5g m2/s' % (inflow, outflow))
 print('pressure on rings: largest difference from the closed form %.3g %% of that between the circles' % (100*error))
 print('permeability %.4g m2; that of a lattice of equilateral triangles of this size %.4g m2' % (permeability, lattice))
 line = [(inner * (outer / inner)**(k / 60), 1e-6 * closed_form(inner * (outer / inner)**(k / 60))) for k in range(61)]

@@ -6,15 +6,11 @@ from hpcdem.cases.base import Case, quantity
 
 
 class Water(Case):
-    """Parameters of the fluid. Where flow is steady its bulk modulus does not count: each sub-step is as long as the
-    fluid is soft."""
+    """Parameters of the fluid; where flow is steady its bulk modulus does not count."""
 
     fluid_density: float = quantity(1000.0, "kg/m3", "density of the water", gt=0)
     viscosity: float = quantity(1e-3, "Pa s", "dynamic viscosity of the water", gt=0)
-    fluid_bulk: float = quantity(1e6, "Pa", "bulk modulus of the water; steady flow does not depend on it", gt=0)
     aperture: float = quantity(1e-5, "m", "hydraulic aperture of the joints", gt=0)
-    balance: float = quantity(1e-6, "1", "steady when inflow and outflow differ by this part", gt=0, le=0.1)
-    patience: int = quantity(400000, "1", "steps after which the search for steady flow ends", ge=1000)
 
 
 class Warm(Case):
@@ -46,22 +42,16 @@ pcdc element c-model mech-iso-e property density 2500 young 50e9 poisson-r 0.25
 pcdc model option mechanical off                 # the rock stands still
 """
 CHANNELS = """\
-pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk [fluid_bulk] \\
+pcdc face-joint c-model hydr-p-m property fluid-density [fluid_density] fluid-bulk 2.2e9 \\
     viscosity [viscosity/fluid_density] aperature-initial [aperture] aperature-minumum [0.01*aperture] RANGE
 """
 """All joints, or those of a RANGE, are channels."""
 
 STEADY = """
-# Steps until what comes in goes out.
 import numpy as np
-pcdc history create 'inflow' flow-node value inflow sum every 100 range group 'in' set 'wet'
-pcdc history create 'outflow' flow-node value inflow sum every 100 range group 'out' set 'wet'
-steps, inflow, outflow = 0, 1.0, 0.0
-while steps < patience and not abs(inflow - outflow) <= balance * abs(inflow):
-    pcdc model step 1000
-    steps += 1000
-    inflow = float(pcdc.values('flow-node', 'inflow', group='in', set='wet').sum())
-    outflow = -float(pcdc.values('flow-node', 'inflow', group='out', set='wet').sum())
+pcdc model solve hydraulic steady
+inflow = float(pcdc.values('flow-node', 'inflow', group='in', set='wet').sum())
+outflow = -float(pcdc.values('flow-node', 'inflow', group='out', set='wet').sum())
 imbalance = abs(inflow - outflow) / max(abs(inflow), 1e-300)
 account = pcdc.fluid['relative']                 # what of the volume of fluid does not add up
 nodes = pcdc.numbers('flow-node')
@@ -70,4 +60,4 @@ x, y, pressure = (np.asarray(v) for v in (pcdc.values('node', 'position-x'), pcd
 at = np.searchsorted(pcdc.numbers('node'), nodes)
 x, y = x[at], y[at]
 """
-"""inflow, outflow [m2/s] of the groups 'in' and 'out' set 'wet'; imbalance, account, steps; x, y, pressure of nodes."""
+"""inflow, outflow [m2/s] of the groups 'in' and 'out' set 'wet'; imbalance, account; x, y, pressure of nodes."""

@@ -116,6 +116,17 @@ def test_long_steps_do_not_mind_an_incompressible_fluid() -> None:
     assert run.count.steps == 3
 
 
+def test_an_incompressible_fluid_without_outlet() -> None:
+    """A rate into a full channel between blocks that stand: K dV / V everywhere, as large as that is; nothing is
+    lost."""
+    sim, flow = line(10, 1.0, fluid_bulk=1e15)
+    flow.fill(None, saturation=1.0)
+    flow.prescribe(at(sim, 0.0, 0.0), kernels.RATE, 1e-9)
+    over(sim, 10.0, 3)
+    assert flow.values("flow-node", "pressure") == pytest.approx(1e15 * 1e-8 / 1e-5, rel=1e-6)
+    assert flow.account()["relative"] < 1e-12
+
+
 def test_steady_flow_around_a_line_of_wells() -> None:
     """Between two walls of a lattice: equal gradients, and the permeability of the lattice without the half channels
     that are missing on two surfaces; no time passes."""

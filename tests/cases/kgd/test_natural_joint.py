@@ -1,18 +1,32 @@
-"""A hydraulic fracture meets a weak joint that holds by friction: it crosses, or opens it and turns (Renshaw & Pollard
-1995 at a right angle; Blanton 1986 at others)."""
+"""A hydraulic fracture meets a weak joint that holds by friction: it crosses, stops, or opens it and turns. Beside
+Renshaw & Pollard 1995 (at a right angle) with the extension of Gu & Weng 2010 to others, and Blanton 1986.
+
+They ask different things. For Renshaw, Pollard, Gu and Weng the tip comes near: where its tension has reached the
+strength on the joint, has the joint slipped already? For Blanton it has arrived: is less pressure needed to break the
+rock beyond, beside which the joint slips by as much as its friction allows, or to open the joint?"""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from hpcdem.physics.fdem import diagnostics
-from tests.conftest import absent
+from tests.conftest import ROOT, absent
 from tests.pcdc.test_time import Rock
 
-STRENGTH, LOW, FRICTION = 5e6, 1e6, 0.6
+STRENGTH, LOW = 5e6, 1e6
+FOUND = {
+    (90.0, 2e6, 0.6): "opens", (90.0, 6e6, 0.6): "crosses", (90.0, 12e6, 0.6): "crosses",
+    (75.0, 2e6, 0.6): "opens", (75.0, 6e6, 0.6): "crosses", (75.0, 12e6, 0.6): "crosses",
+    (60.0, 2e6, 0.6): "opens", (60.0, 6e6, 0.6): "stops", (60.0, 12e6, 0.6): "stops", (60.0, 20e6, 0.6): "stops",
+    (60.0, 12e6, 0.75): "crosses", (60.0, 12e6, 0.9): "crosses",
+    (45.0, 2e6, 0.6): "opens", (30.0, 2e6, 0.6): "opens",
+}  # fmt: skip
+"""Angle [degrees], stress along the fracture [Pa], friction of the joint: what happens."""
 SCRIPT = """
 import math
 at, reach, side, size, far, penalty, energy, strength = 0.4, 0.8, 0.4, 0.02, 6.0, 3e12, 100.0, STRENGTH
@@ -50,37 +64,114 @@ pcdc model solve hydraulic time 1.2 dt 0.006
 """
 
 
-def crosses(angle: float, high: float) -> bool:
-    """What criteria say: Renshaw and Pollard at a right angle; Blanton with b = 0.2 at others."""
-    if angle == 90.0:
-        return high / (STRENGTH + LOW) > 0.35 * (1.0 + 1.0 / FRICTION) / 1.06
-    turn = math.cos(2.0 * math.radians(angle)) - 0.2 * math.sin(2.0 * math.radians(angle))
-    return turn < 0.0 and (high - LOW) / STRENGTH > -1.0 / turn
+def of_tip(angle: float, friction: float) -> float:
+    """Stress [Pa] along the fracture above which its tip breaks the rock at the joint before that slips (Gu & Weng;
+    at a right angle nearly that of Renshaw & Pollard); infinity."""
+    t = math.radians(angle)
+    c, s, c3, s3 = math.cos(0.5 * t), math.sin(0.5 * t), math.cos(1.5 * t), math.sin(1.5 * t)
+    tip = c * np.array([[1.0 - s * s3, s * c3], [s * c3, 1.0 + s * s3]])
+    across, along = np.array([-math.sin(t), math.cos(t)]), np.array([math.cos(t), math.sin(t)])
+
+    def over(size: float, high: float) -> float:
+        return float(np.linalg.eigvalsh(np.diag([-high, -LOW]) + size * tip)[1]) - STRENGTH
+
+    for high in np.arange(LOW, 100e6, 0.1e6):
+        stress = np.diag([-high, -LOW]) + brentq(over, 0.0, 1e3 * STRENGTH, args=(high,)) * tip
+        if abs(along @ stress @ across) < 1e5 - friction * float(across @ stress @ across):
+            return float(high)
+    return math.inf
+
+
+def renshaw_pollard(friction: float) -> float:
+    """The same at a right angle, with the stress across the fracture for the largest one."""
+    return (STRENGTH + LOW) * 0.35 * (1.0 + 1.0 / friction) / 1.06
+
+
+def blanton(angle: float, friction: float) -> float:
+    """Stress [Pa] along the fracture above which less pressure breaks the rock beyond than opens the joint; infinity.
+    b for a joint that is long beside what slips."""
+    root = math.sqrt(1.0 + math.exp(0.5 * math.pi / friction))
+    b = math.log(((1.0 + root) / (1.0 - root)) ** 2) / (2.0 * math.pi)
+    turn = math.cos(2.0 * math.radians(angle)) - b * math.sin(2.0 * math.radians(angle))
+    return LOW - STRENGTH / turn if turn < 0.0 else math.inf
+
+
+def test_the_criteria() -> None:
+    """By hand; both right-angled ones within a tenth; friction of 0.6 never holds at 60 degrees."""
+    assert renshaw_pollard(0.6) == pytest.approx(5.283e6, rel=1e-3)
+    assert of_tip(90.0, 0.6) == pytest.approx(renshaw_pollard(0.6), rel=0.1)
+    assert blanton(90.0, 0.6) == pytest.approx(LOW + STRENGTH) and blanton(30.0, 0.6) == math.inf
+    assert blanton(60.0, 0.6) == pytest.approx(8.726e6, rel=1e-3)
+    assert of_tip(60.0, 0.6) == math.inf and of_tip(60.0, 0.9) == pytest.approx(15.2e6, abs=0.2e6)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("angle", "high"), [(90.0, 2e6), (90.0, 6e6), (90.0, 12e6), (60.0, 2e6), (60.0, 6e6), (30.0, 2e6)]
-)
-def test_it_crosses_or_turns(tmp_path, angle, high) -> None:
-    """Angle between them, and the stress along the fracture; that across it is 1 MPa. Not as Blanton says: at 60
-    degrees and 12 MPa, where the joint is near slipping by itself, it slips and the fracture stops."""
+@pytest.mark.parametrize(("angle", "high", "friction"), FOUND)
+def test_it_crosses_stops_or_opens_the_joint(tmp_path, angle, high, friction) -> None:
+    """The stress across the fracture is 1 MPa. Where all criteria agree it is as they say, and within 5 % of them."""
     try:
         import gmsh  # noqa: F401
     except ImportError:
         absent("gmsh", "no package gmsh here: install the extra [mesh]")
     text = SCRIPT.replace("ANGLE", repr(angle)).replace("HIGH", repr(high)).replace("STRENGTH", repr(STRENGTH))
-    rock = Rock(tmp_path, text.replace("LOW", repr(LOW)).replace("FRICTION", repr(FRICTION)))
-    past, slipped = {}, 0.0
+    rock = Rock(tmp_path, text.replace("LOW", repr(LOW)).replace("FRICTION", repr(friction)))
+    past, slipped = {}, 0
     for layer in ("before", "beyond", "joint"):
         joints = rock["pcdc"].numbers("joint", group=layer, set="part")
         state, damage = (diagnostics.values(rock.blocks, name, np.asarray(joints)) for name in ("state", "damage"))
         past[layer] = int(((state == 3) | ((state == 2) & (damage > 0.2))).sum())
         if layer == "joint":
             slipped = int((state >= 2).sum())
-    print(angle, high, past, slipped)
+    print(angle, high, friction, past, slipped)
     assert past["before"] >= 18
-    if crosses(angle, high):
-        assert past["beyond"] >= 15 and past["joint"] == 0 and slipped <= 3
+    happens = FOUND[angle, high, friction]
+    if happens == "crosses":
+        assert past["beyond"] >= 15 and past["joint"] <= 1
     else:
-        assert past["beyond"] == 0 and past["joint"] >= 4 and slipped >= 20
+        assert past["beyond"] == 0 and slipped >= 20 and (past["joint"] >= 4) == (happens == "opens")
+    bounds = [renshaw_pollard(friction) if angle == 90.0 else of_tip(angle, friction), blanton(angle, friction)]
+    if high > 1.05 * max(bounds):
+        assert happens == "crosses"
+    if high < 0.95 * min(bounds):
+        assert happens != "crosses"
+
+
+def draw(path: Path) -> None:
+    """What happens, over the angle and the stress along the fracture, and over friction, with the criteria."""
+    import matplotlib.pyplot as plt
+
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.0, 3.6), sharex=True)
+    figure.subplots_adjust(left=0.09, right=0.98, top=0.93, bottom=0.29, wspace=0.25)
+    angles, frictions = np.arange(46.0, 90.1, 1.0), np.arange(0.5, 1.01, 0.02)
+    looks = {"crosses": ("o", "C2"), "stops": ("s", "C1"), "opens": ("^", "C3")}
+    for axes, at, tips, arrived in (
+        (left, angles, [of_tip(a, 0.6) for a in angles], [blanton(a, 0.6) for a in angles]),
+        (right, frictions, [of_tip(60.0, f) for f in frictions], [blanton(60.0, f) for f in frictions]),
+    ):
+        axes.plot(np.array(tips) / 1e6, at, "k", lw=1, label="Gu & Weng")
+        axes.plot(np.array(arrived) / 1e6, at, "k--", lw=1, label="Blanton")
+    left.plot(renshaw_pollard(0.6) / 1e6, 90.0, "k+", ms=10, label="Renshaw & Pollard")
+    names = {"crosses": "crosses", "stops": "joint slips, fracture stops", "opens": "opens the joint"}
+    for axes, chosen in (
+        (left, [(h, a, what) for (a, h, f), what in FOUND.items() if f == 0.6]),
+        (right, [(h, f, what) for (a, h, f), what in FOUND.items() if a == 60.0]),
+    ):
+        for what, (mark, colour) in looks.items():
+            points = np.array([(h / 1e6, y) for h, y, w in chosen if w == what])
+            axes.plot(*points.reshape(-1, 2).T, mark, color=colour, label=names[what], ls="none", clip_on=False)
+        axes.set(xlabel="stress along the fracture (MPa)", xlim=(0.0, 25.0))
+    left.set(ylabel="angle between both (degrees)", ylim=(25.0, 92.0))
+    right.set(ylabel="friction of the joint", ylim=(0.5, 1.0))
+    figure.legend(*left.get_legend_handles_labels(), frameon=False, fontsize=8, ncol=3, loc="lower center")
+    for axes, title in ((left, "(a) friction 0.6"), (right, "(b) 60°")):
+        axes.set_title(title, loc="left", fontsize=9)
+    figure.savefig(path, dpi=200)
+    plt.close(figure)
+
+
+@pytest.mark.figures
+def test_the_figure(tmp_path) -> None:
+    draw(tmp_path / "natural_joint.png")
+    assert (tmp_path / "natural_joint.png").stat().st_size > 20000
+    assert "figures/natural_joint.png" in (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    assert (ROOT / "docs" / "figures" / "natural_joint.png").is_file()
