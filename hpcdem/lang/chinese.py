@@ -1,5 +1,5 @@
 """What commands and models of both languages do, in Chinese, a line each: for the Chinese reference pages
-(docs/zdem_reference.zh.md, docs/pcdc_reference.zh.md). Keywords have their meaning in English only."""
+(docs/zdem_reference.zh.md, docs/pcdc_reference.zh.md). Keywords of PCDC have their meaning in English only."""
 
 from __future__ import annotations
 
@@ -153,3 +153,157 @@ MODELS = {
     "liner-node-constrain": "衬砌节点的速度。",
     "liner-node-force-boundary-condition": "衬砌各节点上的力和弯矩。",
 }
+
+ZDEM_KEYWORDS = {
+    "restart file": "重启文件",
+    "file of particles": "颗粒文件",
+    "factor on x, y and r": "x、y 和 r 的倍数",
+    "only particles of the file within these bounds, before scaling": "只取文件中在此范围内的颗粒(缩放之前)",
+    "x of the left wall": "左墙的 x",
+    "x of the right wall": "右墙的 x",
+    "y of the lower wall": "底墙的 y",
+    "height above bottom": "底墙以上的高度",
+    "normal stiffness, linear contacts only": "法向刚度,只用于线性接触",
+    "shear stiffness, linear contacts only": "切向刚度,只用于线性接触",
+    "friction coefficient": "摩擦系数",
+    "number of the wall": "墙的编号",
+    "end points P1 and P2": "端点 P1 和 P2",
+    "normal stiffness": "法向刚度",
+    "shear stiffness": "切向刚度",
+    "colour, by name or number": "颜色,用名称或编号",
+    "velocity in x, until it is changed": "x 方向速度,直到被修改",
+    "velocity in y, until it is changed": "y 方向速度,直到被修改",
+    "number of the particle": "颗粒编号",
+    "centre": "圆心",
+    "radius": "半径",
+    "group the particles are put in": "颗粒所入的组",
+    "particles asked for": "要求的颗粒数",
+    "one particle on every node of a lattice": "规则点阵的每个节点一个颗粒",
+    "first id of a lattice": "点阵的第一个编号",
+    "radii drawn at random, a repeated one more often": "随机抽取的半径,重复给出的更常抽到",
+    "left and right side of the rectangle": "矩形的左右边",
+    "lower and upper side of the rectangle": "矩形的上下边",
+    "first centre": "第一个圆心",
+    "end of the row": "这一排的终点",
+    "distance of neighbours over the sum of their radii": "相邻圆心距与半径之和的比",
+    "clump file": "团块文件",
+    "the origin of the file comes to this place": "文件的原点放在此处",
+    "turns the file, anticlockwise": "文件逆时针转动的角度",
+    "factor on all lengths of the file": "文件中所有长度的倍数",
+    "the group as a fourth column": "第四列为组名",
+    "density; per area unless SET disk off": "密度;除 SET disk off 外为单位面积的密度",
+    "shear modulus G of the Hertz-Mindlin contact": "Hertz-Mindlin 接触的剪切模量 G",
+    "Poisson ratio of the Hertz-Mindlin contact": "Hertz-Mindlin 接触的泊松比",
+    "local damping: share of the force that acts against the motion": "局部阻尼:与运动方向相反的那部分力的比例",
+    "the particles take the Hertz-Mindlin contact; a later kn or ks without it takes that back":
+    "颗粒采用 Hertz-Mindlin 接触;此后不带它的 kn 或 ks 使之取消",
+    "normal stiffness of the linear contact": "线性接触的法向刚度",
+    "shear stiffness of the linear contact": "线性接触的切向刚度",
+    "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a built-in "
+    "one again":
+    "这些颗粒之间遵循用户 Python 文件中的接触律(docs/user_laws.md);linear:恢复内置接触律",
+    "properties that this law declares": "该接触律声明的性质",
+    "velocity in x": "x 方向速度",
+    "velocity in y": "y 方向速度",
+    "angular velocity, anticlockwise": "角速度,逆时针",
+    "pressure that pushes each particle along x: force = pressure 2 R thickness (SET thickness), until it is "
+    "changed":
+    "沿 x 推动每个颗粒的压力:力 = 压力 × 2R × 厚度(SET thickness),直到被修改",
+    "the same along y": "沿 y,同上",
+    "moves the particles to this group; a particle is in one group": "把颗粒移入此组;一个颗粒只在一个组中",
+    "model 1 bond: Young's modulus": "1 型胶结:杨氏模量",
+    "model 1 bond: shear modulus": "1 型胶结:剪切模量",
+    "model 1 bond: tensile strength": "1 型胶结:抗拉强度",
+    "model 1 bond: cohesion": "1 型胶结:黏聚力",
+    "marks the bonds as those of a membrane: kept and written, without any effect on the motion":
+    "把胶结标记为橡皮膜的胶结:保存并输出,对运动没有作用",
+    "model 2 bond: tensile strength": "2 型胶结:抗拉强度",
+    "model 2 bond: shear strength": "2 型胶结:抗剪强度",
+    "largest gap that is bonded, up to 10 of the largest radius; the word alone keeps the default":
+    "胶结允许的最大间隙,最多为最大半径的 10 倍;只写此词时取默认值",
+    "factor on the radii in the search for bonds, see cratio of GLINE": "寻找胶结时半径的倍数,见 GLINE 的 cratio",
+    "the only thing BOND does": "BOND 唯一的功能",
+    "motion in x": "x 方向运动",
+    "motion in y": "y 方向运动",
+    "rotation": "转动",
+    "time step; of DT and frac the one given last counts": "时间步;DT 和 frac 以后给出的为准",
+    "gravity in x and y": "x 和 y 方向的重力",
+    "volume that makes the mass: on pi r^2, off (or 0) 4/3 pi r^3, hex 2 sqrt(3) r^2":
+    "计算质量所用的体积:on 为 pi r^2,off(或 0)为 4/3 pi r^3,hex 为 2 sqrt(3) r^2",
+    "time step over sqrt(smallest mass / largest pair stiffness)": "时间步与 sqrt(最小质量 / 最大接触刚度) 之比",
+    "lattice-solid damping, force -v times this": "格点固体阻尼,力为 -v 乘以此值",
+    "share of the speed at which discs that are not bonded part again, from each other and from walls; 1: nothing "
+    "is lost":
+    "无胶结的圆盘之间及与墙碰撞后分离速度与接近速度之比(恢复系数);1:没有损失",
+    "a line of progress every so many steps": "每隔这么多步一行进度",
+    "a restart file .sav every so many steps": "每隔这么多步一个重启文件 .sav",
+    "a frame .dat and .vtkhdf every so many steps": "每隔这么多步一帧 .dat 和 .vtkhdf",
+    "a vector picture every so many steps": "每隔这么多步一幅矢量图",
+    "a .vtk file every so many steps": "每隔这么多步一个 .vtk 文件",
+    "a row of energy.csv every so many steps, and the energy budget at the end":
+    "每隔这么多步在 energy.csv 写一行,并在结束时给出能量平衡表",
+    "of the model, in the force of PROP xp, yp and the stresses of HIST":
+    "模型厚度,用于 PROP xp、yp 的力和 HIST 的应力",
+    "start of the random numbers of GEN": "GEN 随机数的种子",
+    "sides of walls that act: left of P1->P2 (ZDEM up to 2.0) or both":
+    "墙起作用的侧:P1->P2 的左侧(ZDEM 2.0 及以前)或两侧",
+    "attempts of GEN per particle asked for; not set: GEN gives up after 1000 failures in a row":
+    "GEN 每个所求颗粒的尝试次数;不给时连续失败 1000 次后停止",
+    "folder of the results": "结果目录",
+    "units of all that follows: values that are unlikely in them are warned of, histories and curves are labelled "
+    "with them; no value is changed":
+    "此后所有数值的单位制:不合常理的值会警告,监测量和曲线带此单位;数值一律不变",
+    "steps": "步数",
+    "the only thing that can be moved": "唯一可以移动的对象",
+    "distance in x": "x 方向的距离",
+    "distance in y": "y 方向的距离",
+    "a frame .dat and .vtkhdf each time the wall has moved so far": "墙每移动这么远一帧 .dat 和 .vtkhdf",
+    "a vector picture each time the wall has moved so far": "墙每移动这么远一幅矢量图",
+    "a restart file .sav each time the wall has moved so far": "墙每移动这么远一个重启文件 .sav",
+    "a .vtk file each time the wall has moved so far": "墙每移动这么远一个 .vtk 文件",
+    "number of the history": "监测的编号",
+    "steps between two records": "两次记录之间的步数",
+    "record the kinetic energy": "记录动能",
+    "record the time": "记录时间",
+    "record the unbalanced force over the mean contact force": "记录不平衡力与平均接触力之比",
+    "record the number of contacts that touch": "记录相互接触的接触数",
+    "record the number of bonds": "记录胶结数",
+    "record the number of the step": "记录步数",
+    "record the kinetic and elastic energy": "记录动能与弹性能",
+    "record the axial stress [Pa] on an end wall made of the particles of a group: force of all others on it, over "
+    "its width and SET thickness; the axis is across the row":
+    "记录由一组颗粒构成的端墙上的轴向应力 [Pa]:其他颗粒对它的力除以其宽度和 SET thickness;轴向垂直于这一排",
+    "record (D0 - D) / D0, D the distance of the mean positions of two groups along the axis in which they are "
+    "farther apart, D0 that at the HIST command":
+    "记录 (D0 - D) / D0,D 为两组平均位置沿相距较远的轴的距离,D0 为 HIST 命令时的值",
+    "the wall of xstress, ystress": "xstress、ystress 的墙",
+    "record the force in x of the particles on a wall, over its height and SET thickness [Pa]":
+    "记录颗粒对墙的 x 方向力除以墙高和 SET thickness [Pa]",
+    "record the force in y of the particles on a wall, over its width and SET thickness [Pa]":
+    "记录颗粒对墙的 y 方向力除以墙宽和 SET thickness [Pa]",
+    "record (D0 - D) / D0, D the distance of the middles of two walls in x":
+    "记录 (D0 - D) / D0,D 为两墙中点在 x 方向的距离",
+    "record (D0 - D) / D0, D the distance of the middles of two walls in y":
+    "记录 (D0 - D) / D0,D 为两墙中点在 y 方向的距离",
+    "histories are all that can be plotted; the word may be left out": "只有监测量可以绘图;此词可省略",
+    "history on the x axis": "x 轴的监测量",
+    "history on the y axis": "y 轴的监测量",
+    "steps between two drawings": "两次绘图之间的步数",
+    "particles filled, not as circles": "颗粒填充,而不是圆圈",
+    "outlines of particles": "颗粒的轮廓",
+    "walls": "墙",
+    "bonds": "胶结",
+    "ids": "编号",
+    "rotations": "转动",
+    "search cells": "搜索网格",
+    "contact forces": "接触力",
+    "centres with a <= x < b": "圆心 a <= x < b",
+    "centres with a <= y < b": "圆心 a <= y < b",
+    "centres inside a quadrilateral, corners in order (even-odd rule)": "圆心在四边形内,角点按顺序(奇偶规则)",
+    "centres with (x-x0)^2/a^2 + (y-y0)^2/b^2 <= 1": "圆心 (x-x0)^2/a^2 + (y-y0)^2/b^2 <= 1",
+    "particles of a group": "某个组的颗粒",
+    "particles with first <= id <= last": "编号 first <= id <= last 的颗粒",
+    "both; also where two terms follow each other without a word": "两者都满足;两项之间不写词时也如此",
+    "either": "满足其一",
+}  # fmt: skip
+"""Meanings of keywords of ZDEM by their English."""

@@ -6,22 +6,23 @@ Words, values, units and defaults are those of the tables, as on the English pag
 
 from __future__ import annotations
 
+import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from hpcdem.lang import chinese
 from hpcdem.lang.pages import escaped
 from hpcdem.lang.pcdc import reference as pcdc
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.lang.zdem import reference as zdem
-from hpcdem.lang.zdem.table import COLORS, ZDEM
+from hpcdem.lang.zdem.table import COLORS, ZDEM, Option
 
 _HEAD = """\
 # {name} 命令
 
 本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/lang/chinese.py` 生成,请勿直接修改
 (`python -m hpcdem.lang.reference_zh {package} > docs/{package}_reference.zh.md`)。
-命令的说明是中文,关键字的含义目前只有英文;
+{keywords}
 完整的英文说明见 [{name} commands]({package}_reference.md)。
 """
 
@@ -51,7 +52,7 @@ _PCDC = """
 def zdem_page() -> str:
     """All of docs/zdem_reference.zh.md."""
     parts = [
-        _HEAD.format(name="ZDEM", package="zdem"),
+        _HEAD.format(name="ZDEM", package="zdem", keywords="命令和关键字的说明是中文;"),
         _ZDEM,
         _overview({c.name: _said(chinese.ZDEM, c.name, c.doc) for c in ZDEM.commands}),
     ]
@@ -68,11 +69,16 @@ def zdem_page() -> str:
         lines += [*zdem._syntax(command), "```", ""]
         if not command.same_as:
             if command.options:
-                lines += [_chinese(zdem._options(command.options, [])), ""]
+                lines += [_chinese(zdem._options(_meant(command.options)), all_of_it=True), ""]
             lines += ["例:", "", "```", *command.example, "```", ""]
         parts.append("\n".join(lines))
     parts += ["## RANGE\n\n写在行末,只对部分颗粒起作用;不写时对全部。各项用 `and`、`or` 连接,从左到右。\n"]
-    parts += [_chinese(zdem._options(ZDEM.range_terms)), "\n## 颜色\n", "| 编号 | 名称 |", "|---|---|"]
+    parts += [
+        _chinese(zdem._options(_meant(ZDEM.range_terms)), all_of_it=True),
+        "\n## 颜色\n",
+        "| 编号 | 名称 |",
+        "|---|---|",
+    ]
     parts += [f"| {number} | {name} |" for name, number in COLORS.items()]
     return "\n".join(parts).rstrip("\n") + "\n"
 
@@ -80,7 +86,7 @@ def zdem_page() -> str:
 def pcdc_page() -> str:
     """All of docs/pcdc_reference.zh.md."""
     parts = [
-        _HEAD.format(name="PCDC", package="pcdc"),
+        _HEAD.format(name="PCDC", package="pcdc", keywords="命令的说明是中文,关键字的含义目前只有英文;"),
         _PCDC,
         _overview({c.name: _said(chinese.PCDC, c.name, c.doc) for c in PCDC.commands}),
     ]
@@ -122,15 +128,20 @@ def _overview(texts: dict[str, str]) -> str:
     return "\n".join([*lines, ""])
 
 
-def _chinese(table: str) -> str:
-    """A table of keywords with its head in Chinese."""
+def _meant(options: Sequence[Option]) -> list[Option]:
+    """Keywords of ZDEM with their meanings in Chinese."""
+    return [dataclasses.replace(option, doc=chinese.ZDEM_KEYWORDS.get(option.doc, option.doc)) for option in options]
+
+
+def _chinese(table: str, all_of_it: bool = False) -> str:
+    """A table of keywords with its head in Chinese; all_of_it: so are their meanings."""
     head, *rows = table.split("\n")
     names = {
         "keyword": "关键字",
         "value": "值",
         "unit": "单位",
         "default": "默认",
-        "meaning": "含义(英文)",
+        "meaning": "含义" if all_of_it else "含义(英文)",
         "from": "来源",
     }
     cells = [names[cell.strip()] for cell in head.strip("|").split("|")]

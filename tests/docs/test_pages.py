@@ -120,7 +120,14 @@ def test_commands_have_their_line_in_chinese() -> None:
     assert set(chinese.ZDEM) == {command.name for command in ZDEM.commands}
     for texts, names in ((chinese.PCDC, {command.name for command in PCDC.commands}), (chinese.MODELS, models)):
         assert set(texts) <= names and len(texts) > 0.9 * len(names)
-    for text in (*chinese.ZDEM.values(), *chinese.PCDC.values(), *chinese.MODELS.values()):
+    options = {o.doc for c in ZDEM.commands for o in (*c.leading, *c.options)} | {o.doc for o in ZDEM.range_terms}
+    assert set(chinese.ZDEM_KEYWORDS) <= options and len(chinese.ZDEM_KEYWORDS) > 0.9 * len(options)
+    for text in (
+        *chinese.ZDEM.values(),
+        *chinese.ZDEM_KEYWORDS.values(),
+        *chinese.PCDC.values(),
+        *chinese.MODELS.values(),
+    ):
         assert re.search("[\u4e00-\u9fff]", text)
 
 
