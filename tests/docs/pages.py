@@ -36,9 +36,14 @@ def blocks(page: Path) -> list[Block]:
     return found
 
 
+def without_blocks(page: Path) -> str:
+    """A page without its blocks."""
+    return _FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
 def prose(page: Path) -> str:
     """A page without its blocks and the code in its lines."""
-    return re.sub(r"(`+)(?!`).*?(?<!`)\1(?!`)", "`", _FENCE.sub("", page.read_text(encoding="utf-8")))
+    return re.sub(r"(`+)(?!`).*?(?<!`)\1(?!`)", "`", without_blocks(page))
 
 
 def links(page: Path) -> list[str]:
@@ -50,7 +55,7 @@ def links(page: Path) -> list[str]:
 @cache
 def anchors(page: Path) -> set[str]:
     """What headings of a page are linked by."""
-    text = _FENCE.sub("", page.read_text(encoding="utf-8"))
+    text = without_blocks(page)
     seen: Counter[str] = Counter()
     found = set()
     for head in re.findall(r"^#+ (.*)", text, re.MULTILINE):

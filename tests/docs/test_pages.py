@@ -9,6 +9,7 @@ import shlex
 import subprocess
 import tomllib
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -18,7 +19,7 @@ from hpcdem.cli import python_reference, reference
 from hpcdem.lang import chinese, fields_reference, reference_zh
 from hpcdem.lang.pcdc.table import PCDC
 from hpcdem.lang.zdem.table import ZDEM
-from tests.docs.pages import DOCS, PAGES, ROOT, anchors, blocks, links, prose
+from tests.docs.pages import DOCS, PAGES, ROOT, anchors, blocks, links, prose, without_blocks
 
 NAVIGATION = runpy.run_path(str(DOCS / "site" / "navigation.py"))["NAVIGATION"]
 IDS = [str(page.relative_to(ROOT)) for page in PAGES]
@@ -32,6 +33,13 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert target.exists(), link
         if anchor:
             assert anchor in anchors(target.resolve()), f"{link}: {sorted(anchors(target.resolve()))}"
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=[*IDS, "CHANGELOG.md"])
+def test_headings_leave_no_level_out(page: Path) -> None:
+    """The site refuses a page that does."""
+    levels = [len(head) for head in re.findall(r"^(#+) ", without_blocks(page), re.MULTILINE)]
+    assert levels[0] == 1 and all(after <= before + 1 for before, after in pairwise(levels))
 
 
 def test_every_figure_is_on_a_page() -> None:
@@ -122,13 +130,9 @@ def test_commands_have_their_line_in_chinese() -> None:
         assert set(texts) <= names and len(texts) > 0.9 * len(names)
     options = {o.doc for c in ZDEM.commands for o in (*c.leading, *c.options)} | {o.doc for o in ZDEM.range_terms}
     assert set(chinese.ZDEM_KEYWORDS) <= options and len(chinese.ZDEM_KEYWORDS) > 0.9 * len(options)
-    for text in (
-        *chinese.ZDEM.values(),
-        *chinese.ZDEM_KEYWORDS.values(),
-        *chinese.PCDC.values(),
-        *chinese.MODELS.values(),
-    ):
-        assert re.search("[\u4e00-\u9fff]", text)
+    for table in (chinese.ZDEM, chinese.ZDEM_KEYWORDS, chinese.PCDC, chinese.MODELS):
+        for text in table.values():
+            assert re.search("[\u4e00-\u9fff]", text)
 
 
 def test_pages_of_both_languages_say_the_same_code() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +16,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    for name in ("sphinx", "myst_parser", "furo", "sphinx_design", "sphinx_copybutton", "latex2mathml"):
-        pytest.importorskip(name, reason="the extra [docs]")
     folder = tmp_path_factory.mktemp("site")
-    words = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-c", "docs/site", ".", folder]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run([ROOT / "scripts" / "docs", folder], capture_output=True, text=True, check=False)
+    if not (ROOT / ".venv-docs").is_dir():
+        pytest.skip(f"the packages of [docs] cannot be installed here: {done.stderr[-200:]}")
     assert done.returncode == 0, done.stderr
     return folder
 
