@@ -12,7 +12,7 @@ from tests.docs import notebooks
 SHORTER = {
     "thrust_belt": {"way": "40.0", "length": "3e3", "thickness": "800.0"},
     "ucs": {"size": "0.0125"},
-    "ensemble": {"seeds": '"1:2"', "way": "30.0"},
+    "ensemble": {"seeds": '"1:2"', "way": "400.0"},
 }
 
 
