@@ -54,7 +54,8 @@ class Dashpots:
         more = n_mat, self.mobility, self.beta, force, self._rates
         for t in range(lists.n_blocks):
             _of_pairs(
-                t, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, sim.pair_laws, *more,
+                t, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, sim.pair_laws,
+                *more,
             )  # fmt: skip
             _of_walls(
                 t, p.hot, p.ihot, b.lo, b.foff, lists.wptr, walls, lists.slot_row, lists.slot_wall, lists.slot_side,
