@@ -261,4 +261,5 @@ def test_help():
     from bench.cli import ABOUT, bench
 
     assert all(name in ABOUT for name in workloads())
-    assert set(bench.commands) == {"blocks", "coupled", "push", "start", "memory", "strain-stress", "scaling", "view"}
+    assert set(bench.commands) == {"blocks", "coupled", "fracture", "push", "start", "memory", "strain-stress",
+                                   "scaling", "view"}  # fmt: skip

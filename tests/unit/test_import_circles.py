@@ -25,6 +25,12 @@ def test_the_package_has_no_circle():
     assert circle("hpcdem") == []
 
 
+@pytest.mark.parametrize("tool", ["bench", "digests", "faults", "soak"])
+def test_the_tools_have_no_circle(tool, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts" / "lib")
+    assert circle(tool) == []
+
+
 @pytest.mark.parametrize(
     "way",
     [

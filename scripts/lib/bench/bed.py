@@ -60,7 +60,7 @@ def ready(bed: Bed, layout: Layout) -> tuple[Path, Path]:
 def make(job: dict[str, Any]) -> dict[str, Any]:
     """Make one bed and write its files; collective."""
     import hpcdem
-    from bench.worker import contacts
+    from bench.measured import contacts
 
     bed = Bed(job["unit"], job["copies"], job["law"])
     sim = hpcdem.Simulation(job["folder"])

@@ -31,8 +31,7 @@ import numpy as np
 
 from bench import launch
 from bench.launch import Layout
-from bench.runs import say
-from bench.tables import Lines, Spread
+from bench.tables import Lines, Spread, say
 from hpcdem.physics.fdem import changes, convergence, diagnostics, user_laws
 from hpcdem.physics.fdem.pairs_space import ContactSpace
 from hpcdem.physics.flow.model import Flow
@@ -144,7 +143,7 @@ def sub_step(rows: list[dict[str, Any]], layout: Layout) -> float:
 
 def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, step it by the clock; collective."""
-    from bench.worker import versions
+    from bench.measured import versions
     from hpcdem import session
     from hpcdem.physics.fdem.simulation import Blocks
     from hpcdem.physics.fdem.warm_up import warm_up

@@ -12,8 +12,7 @@ from typing import Any
 from bench import launch
 from bench.blocks import JOINT, ROCK, digest
 from bench.launch import Layout
-from bench.runs import say
-from bench.tables import Lines, Spread
+from bench.tables import Lines, Spread, say
 from hpcdem.physics.fdem import changes
 
 RATE = 500.0
@@ -57,7 +56,7 @@ def coupled(layouts: list[Layout], repeats: int, seconds: float, lines: Lines) -
 
 def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, step it by the clock; collective. stages: mean seconds of a rank."""
-    from bench.worker import versions
+    from bench.measured import versions
     from hpcdem import session
     from hpcdem.core.timers import Timers
     from hpcdem.physics.coupling.warm_up import warm_up

@@ -8,8 +8,7 @@ from typing import Any
 
 from bench import launch
 from bench.launch import Layout
-from bench.runs import say
-from bench.tables import Lines
+from bench.tables import Lines, say
 
 AWAY = 12
 """Edges along a side of the outline; the case has 6."""
@@ -49,7 +48,7 @@ def fracture(layouts: list[Layout], seconds: float, lines: Lines, **case: Any) -
 
 def work(job: dict[str, Any]) -> dict[str, Any]:
     """Make the model, pump by the clock; collective. stages: seconds of rank 0."""
-    from bench.worker import versions
+    from bench.measured import versions
     from hpcdem.cases import HydraulicFracture
     from hpcdem.cases.run import Carrier
     from hpcdem.physics.flow.model import Flow

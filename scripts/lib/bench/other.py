@@ -11,8 +11,7 @@ from typing import Any
 
 from bench import bed, launch
 from bench.launch import Layout
-from bench.runs import say
-from bench.tables import Lines, Row, Spread
+from bench.tables import Lines, Row, Spread, say
 from bench.workloads import Bed
 
 SCRIPT = launch.ROOT / "examples" / "push.py"

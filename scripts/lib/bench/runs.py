@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +9,12 @@ from bench import bed, launch
 from bench.launch import Failed, Layout
 from bench.peers import PEERS
 from bench.peers.base import Case
-from bench.tables import Lines, Row
+from bench.tables import Lines, Row, say
 from bench.workloads import Workload, steps_for, warm_for
 
 RATE, RATE_BESIDE = 80e6, 40e6
 """Particle-steps/s from which the number of steps follows, alone and beside peers: the same steps on any layout, so
 that all layouts do the same work and end with the same digest. Beside peers fewer, as these do the same steps."""
-
-
-def say(text: str) -> None:
-    """What is being done, on standard error."""
-    print(text, file=sys.stderr, flush=True)
 
 
 def one(workload: Workload, sav: Path, layout: Layout, repeat: int, steps: int, **more: Any) -> Row:

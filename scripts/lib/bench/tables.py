@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -110,6 +111,11 @@ class Lines:
         """No more lines."""
         if self._file is not None and self._own:
             self._file.close()
+
+
+def say(text: str) -> None:
+    """What is being done, on standard error."""
+    print(text, file=sys.stderr, flush=True)
 
 
 def console() -> Any:

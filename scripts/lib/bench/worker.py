@@ -5,10 +5,7 @@ The solver is driven through `hpcdem.Simulation`; only clocks and counters are t
 
 from __future__ import annotations
 
-import hashlib
 import json
-import platform
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -18,6 +15,7 @@ from typing import Any
 import hpcdem
 from bench import bed as beds
 from bench import blocks, coupled, fracture, strain_stress
+from bench.measured import contacts, digest, forget_peak, no_first_frame, peak, solver_arrays, versions
 from bench.scaling import measure as scaling
 from bench.workloads import MATERIAL, Bed
 from hpcdem import session
@@ -41,11 +39,6 @@ def restored(job: dict[str, Any], file: str | None = None) -> hpcdem.Simulation:
     sim = hpcdem.Simulation(job["folder"])
     sim.restore(file or job["file"])
     return sim
-
-
-def no_first_frame(sim: hpcdem.Simulation) -> None:
-    """CYC begins with a frame; for a bed of a million it takes longer than the measurement."""
-    sim.engine.last_frame = (sim.steps, True)
 
 
 def run(job: dict[str, Any]) -> dict[str, Any]:
@@ -125,41 +118,6 @@ def measured(sim: hpcdem.Simulation, warm: int, steps: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def contacts(sim: hpcdem.Simulation) -> int:
-    """Touching pairs of the whole model."""
-    from hpcdem.engine import output
-
-    return int(output.HISTORIES["contacts"][1](sim.engine))
-
-
-def digest(sim: hpcdem.Simulation) -> str:
-    """The same if the positions are, to the last bit, whatever the layout."""
-    return hashlib.sha256(b"".join(c.tobytes() for c in sim.gather("x", "y"))).hexdigest()[:16]
-
-
-def versions() -> dict[str, str]:
-    """What it was computed with."""
-    import numba
-    import numpy
-
-    from hpcdem.runtime import launch
-
-    cpu = platform.processor() or platform.machine()
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        cpu = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), cpu)
-    except OSError:
-        pass
-    try:
-        mpi = launch.mpi_library()
-    except ImportError:
-        mpi = "none"
-    return {
-        "hpcdem": launch.version(), "python": platform.python_version(), "numpy": numpy.__version__,
-        "numba": numba.__version__, "mpi": mpi, "cpu": cpu,
-    }  # fmt: skip
-
-
 def memory(job: dict[str, Any]) -> dict[str, Any]:
     """Bring in a bed (or none), step it, and look at the memory of the ranks."""
     shared = session.current()
@@ -184,52 +142,6 @@ def memory(job: dict[str, Any]) -> dict[str, Any]:
     ranks = shared.comm.allgather((loaded, peak(), solver_arrays(sim)))
     each = {name: list(values) for name, values in zip(("loading", "stepping", "arrays"), zip(*ranks), strict=True)}
     return each | {"particles": sim.count, "seconds": seconds}
-
-
-def solver_arrays(sim: hpcdem.Simulation) -> int:
-    """Bytes of all numpy arrays that the engine holds, those inside its parts too; views are counted once."""
-    import numpy as np
-
-    seen: set[int] = set()
-
-    def weigh(thing: Any) -> int:
-        if id(thing) in seen:
-            return 0
-        seen.add(id(thing))
-        if isinstance(thing, np.ndarray):
-            return weigh(thing.base) if isinstance(thing.base, np.ndarray) else thing.nbytes
-        if isinstance(thing, dict):
-            return sum(weigh(v) for v in thing.values())
-        if isinstance(thing, list | tuple):
-            return sum(weigh(v) for v in thing)
-        if type(thing).__module__.startswith("hpcdem"):
-            slots = [getattr(thing, name, None) for kind in type(thing).__mro__ for name in _slots(kind)]
-            return sum(weigh(v) for v in [*getattr(thing, "__dict__", {}).values(), *slots] if v is not None)
-        return 0
-
-    return weigh(sim.engine)
-
-
-def _slots(kind: type) -> tuple[str, ...]:
-    slots = kind.__dict__.get("__slots__", ())
-    return (slots,) if isinstance(slots, str) else tuple(slots)
-
-
-def peak() -> int:
-    """Most memory of this process since `forget_peak` [B]."""
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-        return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) * 1024
-    except (OSError, StopIteration):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-
-
-def forget_peak() -> None:
-    """From here on `peak` counts again, where the kernel allows it."""
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        pass
 
 
 TASKS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {

@@ -88,7 +88,7 @@ def cases(ranks: int, unit: int, small: bool) -> list[Case]:
 def measure(unit: int, most_ranks: int, repeats: int, small: bool, lines: Lines) -> None:
     """Everything on 1, 2, ... ranks; how a launch falls differs, so `repeats` launches on one and two ranks."""
     from bench import bed
-    from bench.runs import say
+    from bench.tables import say
 
     maker = launch.Layout(min(2, most_ranks), 1)
     for repeat in range(repeats):
@@ -115,7 +115,7 @@ def measure(unit: int, most_ranks: int, repeats: int, small: bool, lines: Lines)
 def work(job: dict[str, Any]) -> dict[str, Any]:
     """All cases of a job one after the other; on two ranks also the parts alone. Collective."""
     import hpcdem
-    from bench.worker import versions
+    from bench.measured import versions
     from hpcdem import session
 
     comm = session.current().comm
@@ -134,7 +134,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
 def stepped(sim: hpcdem.Simulation, case: dict[str, Any]) -> Row:
     """One bed: its line."""
     from bench import bed as beds
-    from bench.worker import no_first_frame, solver_arrays
+    from bench.measured import no_first_frame, solver_arrays
     from hpcdem.physics.dem.simulation import NARROW
 
     bed = Bed(**case["bed"])
