@@ -11,7 +11,7 @@ import h5py
 
 from faults import judge
 from faults.case import DONE, USAGE, Case
-from faults.kinds import kind
+from faults.kind import kind
 
 
 def _stopped(case: Case) -> list[Path]:

@@ -7,7 +7,7 @@ import signal
 import time
 
 from faults.case import DONE, STOPPED, Case
-from faults.kinds import kind
+from faults.kind import kind
 
 
 def _jumps(case: Case) -> list[list[float]]:

@@ -10,7 +10,7 @@ import time
 
 from faults import judge
 from faults.case import DONE, FAILED, Case, Skipped
-from faults.kinds import kind
+from faults.kind import kind
 from faults.kinds.kill import strike
 from faults.runs import Job
 

@@ -6,7 +6,7 @@ import signal
 from functools import partial
 
 from faults.case import Case
-from faults.kinds import kind
+from faults.kind import kind
 from faults.model import files
 from faults.runs import Job
 

@@ -6,7 +6,7 @@ import signal
 import time
 
 from faults.case import DONE, STOPPED, Case
-from faults.kinds import kind
+from faults.kind import kind
 from faults.runs import Job
 
 ASKED = "go on with"

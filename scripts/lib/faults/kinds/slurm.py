@@ -9,7 +9,7 @@ from typing import Any
 
 from faults import judge, runs
 from faults.case import Case, Skipped
-from faults.kinds import kind
+from faults.kind import kind
 
 SLOW = 0.02
 """Seconds that a row takes, so that the queue comes in time."""

@@ -9,7 +9,7 @@ import signal
 
 from faults import judge, runs
 from faults.case import DONE, USAGE, Case
-from faults.kinds import kind
+from faults.kind import kind
 from faults.model import files
 
 
