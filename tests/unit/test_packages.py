@@ -23,6 +23,7 @@ RECIPES = {
     "spack/package.py": r'"py-([\w-]+)@([\d.]+):"',
 }
 BESIDE = {"python", "setuptools"}
+LMOD = Path("/etc/profile.d/lmod.sh")
 
 
 @pytest.mark.parametrize("name", RECIPES)
@@ -49,6 +50,24 @@ def test_every_recipe_is_on_the_page():
     page = (ROOT / "docs" / "packages.md").read_text()
     for path in filter(Path.is_file, (ROOT / "packaging").rglob("*")):
         assert str(path.relative_to(ROOT)) in page
+
+
+@pytest.mark.skipif(not LMOD.exists(), reason="no Lmod here: apt-get install lmod")
+def test_the_module_is_loaded_and_taken_away(tmp_path):
+    """Its program is in the path then, and only then."""
+    (tmp_path / "modules" / "hpcdem").mkdir(parents=True)
+    shutil.copy(ROOT / "packaging" / "modules" / f"{PROJECT['version']}.lua", tmp_path / "modules" / "hpcdem")
+    program = tmp_path / "made" / "bin" / "hpcdem"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n")
+    program.chmod(0o755)
+    lines = f"""source {LMOD}; module use {tmp_path}/modules
+module load hpcdem; command -v hpcdem; echo $HPCDEM_BIN $HDF5_USE_FILE_LOCKING
+module unload hpcdem; echo "[$HPCDEM_BIN]"
+"""
+    env = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "HPCDEM_PREFIX": str(tmp_path / "made")}
+    done = subprocess.run(["bash", "-c", lines], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [str(program), f"{program.parent} FALSE", "[]"], done.stderr
 
 
 @pytest.fixture(scope="module")
