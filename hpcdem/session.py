@@ -355,6 +355,20 @@ def _hexes() -> WarmUp:
     return warm_up.hexahedra, (hexes,)
 
 
+def _yielding_hexes() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import plastic_hexes
+
+    return warm_up.yielding_hexahedra, (plastic_hexes,)
+
+
+def _creep_hexes() -> WarmUp:
+    from hpcdem.physics.fdem import warm_up
+    from hpcdem.physics.fdem.kernels import creep_hexes
+
+    return warm_up.creeping_hexahedra, (creep_hexes,)
+
+
 def _space() -> WarmUp:
     from hpcdem.physics.fdem import tetrahedra, warm_up
     from hpcdem.physics.fdem.kernels import contact_space, detect_space, space, tets
@@ -393,6 +407,8 @@ KINDS = {
     "creep-space": Kernels(_creep_space, after=("space",)),
     "tangent-space": Kernels(_tangent_space, after=("tangent", "plastic-tangent", "yielding-space")),
     "hexes": Kernels(_hexes, after=("tangent-space",)),
+    "yielding-hexes": Kernels(_yielding_hexes, after=("hexes", "yielding-space")),
+    "creep-hexes": Kernels(_creep_hexes, after=("hexes", "creep-space")),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the

@@ -134,6 +134,40 @@ def blocks_of_hexes(sim: Blocks) -> None:
     changes.set_velocity(sim, np.arange(len(mesh.points) - len(flier.points), len(mesh.points)), 30.0, 1.0, -3.0)
 
 
+def hexes_that_flow(sim: Blocks) -> None:
+    """The same; of the bar a part creeps, and one yields and softens."""
+    blocks_of_hexes(sim)
+    bar, x = np.arange(len(sim.mesh.cells)) < 12 * 2 * 2 * 6, sim.mesh.centroids()[:, 0]
+    soft = {**ROCK, "young": 1e8, "maxwell_viscosity": 4e6, "kelvin_shear": 1e8, "kelvin_viscosity": 1e5}
+    changes.element_model(sim, np.flatnonzero(bar & (x < 0.8)), "mech_burgers", {**soft, "kelvin_strain_xz": 1e-6})
+    sim.table("weaker", [(0.0, 1.5e4), (5e-3, 3e3)])
+    soil = {**ROCK, "young": 1e8, "friction": 25.0, "dilation": 10.0, "tensile": 1e4}
+    changes.element_model(
+        sim, np.flatnonzero(bar & (x > 0.8) & (x < 2.1)), "mech_mohr_coulomb",
+        {**soil, "cohesion": Over("weaker", PLASTIC_STRAIN)},
+    )  # fmt: skip
+    creep.switch(sim, True)
+
+
+def dig_hexes_that_flow(sim: Blocks) -> None:
+    """The same; some forget that they have yielded or crept, or become elastic."""
+    dig_hexes(sim)
+    if sim.clock.step == 300:
+        changes.reset_state(sim, np.arange(96, 144))
+        changes.reset_kelvin_strain(sim, np.arange(48))
+    if sim.clock.step == 600:
+        changes.element_model(sim, np.flatnonzero(sim.yielding())[:24], "mech_iso_elastic", {**ROCK, "young": 1e8})
+
+
+def flow_and_creep(sim: Blocks, notes: dict[str, Any]) -> Found:
+    return {**flow(sim, notes), **crept(sim, notes)}
+
+
+def they_flow_and_creep(found: Found) -> None:
+    assert (found["plastic_shear_strain"] > 1e-5).sum() > 100 and (found["plastic_state"] % 2 == 1).any()
+    assert (np.abs(found["creep_strain_xx"]) > 1e-6).sum() > 90 and (found["creep_work"] > 0.0).sum() > 90
+
+
 def dig_hexes(sim: Blocks) -> None:
     """Whole hexahedra are taken out in the middle of the run."""
     if sim.clock.step == 500:
@@ -400,5 +434,8 @@ MODELS = {
         warm_soil, warm_and_flowing, it_is_warm, dig_soil, steps=1000, middle=401, come=10, slow=True
     ),
     "hexahedra": Model(blocks_of_hexes, touching, it_hits, dig_hexes, steps=900, middle=401, come=10),
+    "hexahedra that flow": Model(
+        hexes_that_flow, flow_and_creep, they_flow_and_creep, dig_hexes_that_flow, steps=900, middle=401, come=10
+    ),
     "settling": Model(settling, result, it_settles, steps=200, middle=101, slow=True),
 }

@@ -1,4 +1,5 @@
-"""Tetrahedra that creep after Burgers: closed forms of creep and relaxation, the plain step, restarts, refusals.
+"""Tetrahedra and hexahedra that creep after Burgers: closed forms of creep and relaxation, the plain step, restarts,
+refusals.
 
 J(t) and what it becomes in the Laplace domain: see tests/blocks/test_creep.py."""
 
@@ -6,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,26 +18,27 @@ from hpcdem.core.errors import CommandError
 from hpcdem.halo.comm import SerialComm
 from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, reference, saved_state
 from hpcdem.physics.fdem.kernels import creep_tets
+from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.test_creep import LOAD, ROCK, SALT, after_step, compliance, transform
-from tests.space.support import box, faces_on, nodes_on
+from tests.space.support import box, faces_on, hexes, nodes_on
 
 BURGERS = "mech_burgers"
 COMPONENTS = ("xx", "yy", "xy", "zz", "xz", "yz")
 
 
-def body(**other: float) -> Blocks:
+def body(make: Callable[..., Mesh] = box, **other: float) -> Blocks:
     """A cube of a metre that creeps, at rest, without conditions."""
     sim = Blocks(SerialComm())
-    sim.take_mesh(box((2, 2, 2), (1.0, 1.0, 1.0), shaken=0.2))
+    sim.take_mesh(make((2, 2, 2), (1.0, 1.0, 1.0), shaken=0.2))
     changes.element_model(sim, None, BURGERS, {**SALT, **other})
     sim.option(dynamic=False, collision=False)
     return sim
 
 
-def loaded(xx: float, yy: float, zz: float, **other: float) -> Blocks:
+def loaded(xx: float, yy: float, zz: float, make: Callable[..., Mesh] = box, **other: float) -> Blocks:
     """The cube on rollers on three sides, with these stresses on the others, in balance."""
-    sim = body(**other)
+    sim = body(make, **other)
     mesh = sim.mesh
     for side, axis in (("left", "x"), ("front", "y"), ("bottom", "z")):
         sim.velocity_condition(nodes_on(mesh, side), **{f"v{axis}": 0.0})
@@ -90,10 +93,11 @@ def width(sim: Blocks) -> np.ndarray:
     return np.array([diagnostics.values(sim, f"displacement_{axis}", corner)[0] for axis in "xyz"])
 
 
-def test_uniaxial_stress() -> None:
+@pytest.mark.parametrize("make", [box, hexes])
+def test_uniaxial_stress(make: Callable[..., Mesh]) -> None:
     """10 MPa along z: strain sigma [1 / 9K + J(t) / 3], 3.8889e-4 at once, 1.084397e-3 after 1e5 s; across it sigma
     [1 / 9K - J(t) / 6]."""
-    sim = loaded(0.0, 0.0, 1e7)
+    sim = loaded(0.0, 0.0, 1e7, make)
     assert width(sim)[2] == pytest.approx(3.8889e-4, rel=1e-3)
     for time in (2e4, 8e4):
         crept(sim, time, 20)
@@ -106,10 +110,11 @@ def test_uniaxial_stress() -> None:
     assert np.abs(matrices(sim) - np.diag([0.0, 0.0, 1e7])).max() < 1e-4 * 1e7
 
 
-def test_true_triaxial_stress() -> None:
+@pytest.mark.parametrize("make", [box, hexes])
+def test_true_triaxial_stress(make: Callable[..., Mesh]) -> None:
     """Three stresses, by superposition; the energy that is given is stored or lost."""
     stress = np.array([2e6, -5e6, 9e6])
-    sim = loaded(*stress)
+    sim = loaded(*stress, make=make)
     given = 0.5 * float(stress @ width(sim))
     before = width(sim)
     crept(sim, 5e4, 25)
@@ -121,8 +126,8 @@ def test_true_triaxial_stress() -> None:
     assert lost > 0.2 * given and stored + lost == pytest.approx(given, rel=1e-3)
 
 
-@pytest.mark.parametrize("turned", [False, True])
-def test_relaxation_at_fixed_strain(turned: bool) -> None:
+@pytest.mark.parametrize(("turned", "make"), [(False, box), (True, box), (True, hexes)])
+def test_relaxation_at_fixed_strain(turned: bool, make: Callable[..., Mesh]) -> None:
     """S(t) = 2 e D / N after a step of strain with all components, the mean stress stays; second order in the creep
     step; turned with the body by any angle."""
     n, d = transform(ROCK)
@@ -130,7 +135,7 @@ def test_relaxation_at_fixed_strain(turned: bool) -> None:
     strain = np.array([[1e-4, 2e-5, -3e-5], [2e-5, -2e-4, 4e-5], [-3e-5, 4e-5, 5e-5]])
     errors = []
     for steps in (20, 200):
-        sim = body(**ROCK)
+        sim = body(make, **ROCK)
         held(sim, turn @ (np.eye(3) + strain))
         before = matrices(sim)
         waited(sim, 3e5, steps)

@@ -19,7 +19,7 @@ from tests.cases.solids import exact
 from tests.flow.support import WATER
 from tests.heat.support import GRANITE
 from tests.space.support import LAME, ROCK, SHEAR, body, box, faces_on, hexes, nodes_on
-from tests.space.test_equilibrium import STRAIN, STRESSES, boundary, farthest, slopes_by_difference
+from tests.space.test_equilibrium import SOIL, STRAIN, STRESSES, boundary, farthest, slopes_by_difference
 
 CUBE = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
 
@@ -113,7 +113,7 @@ def test_forces_are_those_of_the_plain_reference(large, beta):
         for axis in range(3):
             x[place[i] + axis], v[place[i] + axis] = now[:, axis], rng.uniform(-3.0, 3.0, 8)
         force = np.full(sim.x.shape, np.nan)  # neighbours share no rows
-        own.forces(force)
+        own.forces(force, sim.local.quad_s0)
         exact = reference.hexahedron_forces(mesh[i], now, *speeds_and_solid(sim, v, place, i))
         exact += own.h[i, 8:16, None] * (np.array([1.0, -2.0, -9.0]) - 30.0 * v[place[i][:, None] + np.arange(3)])
         found = force.reshape(-1)[place[i][:, None] + np.arange(3)]
@@ -121,7 +121,7 @@ def test_forces_are_those_of_the_plain_reference(large, beta):
         assert np.isfinite(force.reshape(-1, 4)[:, :3]).sum() == 24 * own.count
     several = np.full(sim.x.shape, np.nan)
     sim.threads = 3
-    own.forces(several)
+    own.forces(several, sim.local.quad_s0)
     assert np.array_equal(force, several, equal_nan=True)
 
 
@@ -132,6 +132,25 @@ def speeds_and_solid(sim, v, place, i):
     o = sim.options
     solid = reference.Solid(h[16], h[17], h[18], stress, not o.large_strain, o.stiffness_damping)
     return v[place[i][:, None] + np.arange(3)], solid
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_the_matrix_of_rock_that_flows(large):
+    """Most hexahedra flow, in shear and in tension; their sides are warped."""
+    rng = np.random.default_rng(3)
+    sim = body(hexes((2, 2, 2), (1.0, 1.0, 1.0), 0.2), dynamic=False)
+    changes.element_model(sim, None, "mech_mohr_coulomb", {**SOIL, "tensile": 0.5e6})
+    sim.initial_stress(None, xx=-1e6, yy=-7e6, zz=-3e6, xy=1e6, xz=0.5e6)
+    sim.option(large_strain=large)
+    sim.close_model()
+    x = equilibrium.all_nodes(sim).x
+    x = x + rng.uniform(-4e-4, 4e-4, x.shape)
+    equilibrium.place_corners(sim, x)
+    (_, flowing, _), _ = equilibrium.tangent(sim)
+    (_, elastic, _), _ = equilibrium.tangent(sim, flows=False)
+    assert (np.abs(flowing.stiffness - elastic.stiffness).max(axis=(1, 2)) > 0.0).mean() > 0.5
+    for product, slope in slopes_by_difference(sim, x, 1e-9):
+        assert np.abs(product - slope).max() < (2e-2 if large else 1e-4) * np.abs(slope).max()
 
 
 def turned(points: np.ndarray, angle: float) -> np.ndarray:
@@ -271,9 +290,6 @@ def test_dug_out_as_a_whole():
 
 def test_what_hexes_cannot_do_is_refused():
     sim = body(hexes((2, 1, 1), (1.0, 0.5, 0.5)))
-    soil = {**ROCK, "friction": 30.0, "cohesion": 1e6, "tensile": 1e5}
-    with pytest.raises(CommandError, match="hexahedra are elastic in this version"):
-        changes.element_model(sim, None, "mech_mohr_coulomb", soil)
     with pytest.raises(CommandError, match="no joints between hexahedra"):
         sim.joint_model(None, "classic_intrinsic_cohesive_interface", {"tensile_strength": 1e6})
     changes.element_model(sim, np.arange(6), "mech_iso_elastic", {**ROCK, "young": 1e9})

@@ -1,5 +1,5 @@
-"""Tetrahedra that yield after Mohr and Coulomb: the return against the plain loop, closed forms of one way of loading,
-what they remember, refusals."""
+"""Tetrahedra and hexahedra that yield after Mohr and Coulomb: the return against the plain loop, closed forms of one
+way of loading, what they remember, refusals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hpcdem.physics.fdem.mesh import Mesh
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.tables import PLASTIC_STRAIN, Over
 from tests.blocks.test_plasticity import FLOWS
-from tests.space.support import box, faces_on, nodes_on
+from tests.space.support import box, faces_on, hexes, nodes_on
 
 MOHR_COULOMB = "mech_mohr_coulomb"
 SOIL = {
@@ -29,6 +29,10 @@ SOIL = {
 A, B = SOIL["bulk"] + 4.0 / 3.0 * SOIL["shear"], SOIL["bulk"] - 2.0 / 3.0 * SOIL["shear"]
 COMPONENTS = ("xx", "yy", "xy", "zz", "xz", "yz")
 TET = Mesh.of([(0.0, 0.0, 0.0), (1.0, 0.1, 0.0), (0.2, 0.9, 0.1), (0.1, 0.2, 0.8)], [(0, 1, 2, 3)])
+
+
+def meshed(name: str) -> Mesh | None:
+    return {"tetrahedron": TET, "hexahedra": hexes((2, 2, 2), (1.0, 1.0, 1.0), 0.2), "cube": None}[name]
 
 
 def steepness(degrees: float) -> float:
@@ -185,6 +189,44 @@ def test_flow_as_the_plain_loop(large: bool, threads: int) -> None:
     sim.x[:] = start
 
 
+@pytest.mark.parametrize("large", [False, True])
+def test_flow_of_hexahedra_as_the_plain_loop(large: bool) -> None:
+    """Of more than a block of them, some elastic, on several threads: stresses and forces follow."""
+    mesh = hexes((4, 3, 3), (1.0, 1.0, 1.0), 0.2)
+    sim = soil(mesh, dilation=20.0)
+    sim.threads = 2
+    elastic = {"density": 2e3, "young": 5e9, "poisson_ratio": 0.2}
+    changes.element_model(sim, np.arange(30, 60), "mech_iso_elastic", elastic)
+    sim.option(large_strain=large)
+    initial = np.array([[-3e6, 1e6, 0.5e6], [1e6, -5e6, -1e6], [0.5e6, -1e6, -2e6]])
+    sim.initial_stress(None, **{c: initial["xyz".index(c[0]), "xyz".index(c[1])] for c in COMPONENTS})
+    rock = reference.MohrCoulomb(
+        SOIL["bulk"], SOIL["shear"], math.radians(30.0), math.radians(20.0), SOIL["cohesion"], SOIL["tensile"]
+    )
+    sim.close_model()
+    rng, several, own = np.random.default_rng(5), 0, sim.local.hexes
+    for size in (1e-4, 2e-3, 5e-3):
+        at = mesh.points + size * rng.normal(size=mesh.points.shape)
+        sim.x.reshape(-1, 4, 4)[:, :, :3] = at[mesh.cells[sim.number]]
+        force, found, state = sim.evaluate().force.reshape(-1), matrices(sim), diagnostics.values(sim, "plastic_state")
+        for i, (nodes, e) in enumerate(zip(own.nodes, own.number)):
+            solid = reference.Solid(B, 2.0 * SOIL["shear"], 0.0, initial, not large)
+            if sim.element_rows.name(sim.element_row[e]) == MOHR_COULOMB:
+                want, stress, flows = reference.yielded_hexahedron(mesh.points[nodes], at[nodes], solid, rock)
+                several += flows
+                assert (state[e : e + 6] > 0.0).all() == flows
+            else:
+                two_mu = 5e9 / 1.2
+                solid = solid._replace(lame=two_mu * 0.2 / 0.6, two_mu=two_mu)
+                want = reference.hexahedron_forces(mesh.points[nodes], at[nodes], np.zeros((8, 3)), solid)
+                stress = found[e]
+                assert not state[e : e + 6].any()
+            here = force[own.place[i][:, None] + np.arange(3)]
+            assert here == pytest.approx(want, abs=1e-9 * np.abs(want).max())
+            assert found[e + 5] == pytest.approx(stress, abs=1e-9 * np.abs(stress).max())
+    assert several > 60 and not sim.cold["plastic"].any()
+
+
 AXES = {"z": np.eye(3), "turned": Rotation.from_euler("zxy", (20.0, -50.0, 35.0), degrees=True).as_matrix()}
 
 
@@ -196,14 +238,14 @@ def loaded(sim: Blocks, turn: np.ndarray, strain: tuple[float, float, float], pa
 
 @pytest.mark.parametrize("turned", list(AXES))
 @pytest.mark.parametrize("parts", [1, 20])
-@pytest.mark.parametrize("mesh", ["tetrahedron", "cube"])
+@pytest.mark.parametrize("mesh", ["tetrahedron", "cube", "hexahedra"])
 @pytest.mark.parametrize("dilation", [0.0, 10.0, 30.0])
 def test_uniaxial_strain(turned: str, parts: int, mesh: str, dilation: float) -> None:
     """Pressed along one axis between stiff walls both lateral stresses are equal, an edge of the surface: with the
     plastic strain l (-1, m / 2, m / 2) s_1 = -a e + l (a - b m), s_3 = -b e + l (b - (a + b) m / 2), s_1 = N s_3 -
     k."""
     m, e, turn = steepness(dilation), 0.01, AXES[turned]
-    sim = soil(TET if mesh == "tetrahedron" else None, dilation=dilation)
+    sim = soil(meshed(mesh), dilation=dilation)
     loaded(sim, turn, (0.0, 0.0, -e), parts)
     lag = (A * e - N * B * e - K) / (A - B * m - N * (B - 0.5 * (A + B) * m))
     s1, s3 = -A * e + lag * (A - B * m), -B * e + lag * (B - 0.5 * (A + B) * m)
@@ -217,12 +259,14 @@ def test_uniaxial_strain(turned: str, parts: int, mesh: str, dilation: float) ->
     assert (diagnostics.values(sim, "plastic_state") == SHEAR_NOW).all()
     work = lag * (-s1 + m * s3)
     if parts == 1:
-        volume = diagnostics.values(sim, "volume")
-        assert diagnostics.values(sim, "plastic_work") == pytest.approx(work * volume, rel=1e-9)
+        done, volume = diagnostics.values(sim, "plastic_work"), diagnostics.values(sim, "volume")
+        assert done.sum() == pytest.approx(work * volume.sum(), rel=1e-9)
+        if mesh != "hexahedra":  # whose sides are not plane, so that each has three volumes
+            assert done == pytest.approx(work * volume, rel=1e-9)
 
 
 @pytest.mark.parametrize("turned", list(AXES))
-@pytest.mark.parametrize("mesh", ["tetrahedron", "cube"])
+@pytest.mark.parametrize("mesh", ["tetrahedron", "cube", "hexahedra"])
 @pytest.mark.parametrize("parts", [1, 10])
 @pytest.mark.parametrize(
     ("strain", "what"),
@@ -233,7 +277,7 @@ def test_strains_of_three_sizes(
 ) -> None:
     """Proportional strain from no stress: on the plane s_1 = N s_3 - k with the plastic strain l (-1, 0, m); triaxial
     compression goes along the edge s_2 = s_3, extension along s_1 = s_2."""
-    sim, turn = soil(TET if mesh == "tetrahedron" else None), AXES[turned]
+    sim, turn = soil(meshed(mesh)), AXES[turned]
     loaded(sim, turn, strain, parts)
     d = np.full((3, 3), B) + (A - B) * np.eye(3)
     ways = {
@@ -299,12 +343,13 @@ def test_a_turned_body_does_the_same() -> None:
         assert np.abs(other - one).max() < 1e-9 * np.abs(one).max()
 
 
-def test_before_it_yields_it_is_the_elastic_element() -> None:
+@pytest.mark.parametrize("make", [box, hexes])
+def test_before_it_yields_it_is_the_elastic_element(make) -> None:
     """The same bits, in motion."""
     ends = []
     for name in (MOHR_COULOMB, "mech_iso_elastic"):
         sim = Blocks(SerialComm())
-        sim.take_mesh(box((3, 2, 2), (1.0, 0.7, 0.5), shaken=0.2))
+        sim.take_mesh(make((3, 2, 2), (1.0, 0.7, 0.5), shaken=0.2))
         rock = {"density": 2500.0, "young": 30e9, "poisson_ratio": 0.3, "damp_factor": 0.1}
         strong = {"friction": 30.0, "dilation": 5.0, "cohesion": 1e12, "tensile": 1e12}
         changes.element_model(sim, None, name, rock | (strong if name == MOHR_COULOMB else {}))
@@ -316,9 +361,10 @@ def test_before_it_yields_it_is_the_elastic_element() -> None:
     assert np.array_equal(*ends)
 
 
-def test_energy_of_flow() -> None:
+@pytest.mark.parametrize("mesh", ["cube", "hexahedra"])
+def test_energy_of_flow(mesh: str) -> None:
     """Work of the walls = what is stored and what flow has lost, of proportional strain in small parts."""
-    sim = soil(dilation=20.0)
+    sim = soil(meshed(mesh), dilation=20.0)
     initial = -1e6
     sim.initial_stress(None, xx=initial, yy=initial, zz=initial)
     sim.option(large_strain=False)
@@ -335,14 +381,17 @@ def test_energy_of_flow() -> None:
     assert lost > 0.3 * work and stored + lost == pytest.approx(work, rel=2e-3)
 
 
-@pytest.mark.parametrize("name", ["cohesion", "friction", "dilation", "tensile"])
-def test_strength_that_follows_plastic_strain(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "mesh"),
+    [*((name, "cube") for name in ("cohesion", "friction", "dilation", "tensile")), ("cohesion", "hexahedra")],
+)
+def test_strength_that_follows_plastic_strain(name: str, mesh: str) -> None:
     """A table of each property alone: the end is that of the value that belongs to the strain, found by a plain loop
     of small steps."""
     ends = {"cohesion": (3.45e6, 1e6), "friction": (30.0, 15.0), "dilation": (10.0, 0.0), "tensile": (1e6, 2e5)}[name]
     table = [(0.0, ends[0]), (4e-3, ends[1])]
     way = np.array([6e-3, 1e-3, 0.0]) if name == "tensile" else np.array([-0.02, 3e-3, 1e-3])
-    sim, parts = soil(**{name: table}), 60
+    sim, parts = soil(meshed(mesh), **{name: table}), 60
     loaded(sim, AXES["turned"], tuple(way), parts)
     law, strain, d = dict(SOIL), np.zeros(2), np.full((3, 3), B) + (A - B) * np.eye(3)
     e_p = np.zeros(3)
@@ -359,7 +408,7 @@ def test_strength_that_follows_plastic_strain(name: str) -> None:
         law[name] = float(np.interp(strain[which], *zip(*table)))
     want = AXES["turned"] @ np.diag(end) @ AXES["turned"].T
     assert np.abs(matrices(sim) - want).max() < 1e-8 * np.abs(want).max()
-    plain = soil()
+    plain = soil(meshed(mesh))
     loaded(plain, AXES["turned"], tuple(way), parts)
     assert np.abs(matrices(plain) - want).max() > 1e-3 * np.abs(want).max()
     again = sim.cold["softening"].copy()
@@ -380,18 +429,19 @@ def test_every_number_of_the_law_counts() -> None:
         assert all(np.abs(one - other).max() > 1e3 for other in ends[:i])
 
 
-def test_what_is_remembered_and_forgotten() -> None:
+@pytest.mark.parametrize("mesh", ["cube", "hexahedra"])
+def test_what_is_remembered_and_forgotten(mesh: str) -> None:
     """Back inside it has yielded before; element reset state forgets that, and stress stays."""
-    sim = soil()
+    sim = soil(meshed(mesh))
     loaded(sim, np.eye(3), (0.0, 0.0, -0.01), 4)
     deform(sim, np.diag([1.0, 1.0, 1.0 - 0.008]))
     assert (diagnostics.values(sim, "plastic_state") == SHEAR_PAST).all()
     before, work = matrices(sim), diagnostics.values(sim, "plastic_work")
-    changes.reset_state(sim, np.arange(10))
+    changes.reset_state(sim, np.arange(12))
     assert np.array_equal(matrices(sim), before) and np.array_equal(diagnostics.values(sim, "plastic_work"), work)
-    assert (diagnostics.values(sim, "plastic_state")[:10] == 0.0).all()
-    assert (diagnostics.values(sim, "plastic_shear_strain")[:10] == 0.0).all()
-    assert (diagnostics.values(sim, "plastic_state")[10:] == SHEAR_PAST).all()
+    assert (diagnostics.values(sim, "plastic_state")[:12] == 0.0).all()
+    assert (diagnostics.values(sim, "plastic_shear_strain")[:12] == 0.0).all()
+    assert (diagnostics.values(sim, "plastic_state")[12:] == SHEAR_PAST).all()
     changes.element_model(sim, None, "mech_iso_elastic", {"density": 2e3, "bulk": SOIL["bulk"], "shear": SOIL["shear"]})
     assert np.abs(matrices(sim) - before).max() < 1e-12 * np.abs(before).max()  # what has flowed stays
 

@@ -361,10 +361,6 @@ class ModelDefinition:
         if name not in (MECH_ISO_ELASTIC.name, MECH_MOHR_COULOMB.name, MECH_BURGERS.name):
             self.refuse_in_space(f"model {name} of elements")
         at = self.numbers_of_elements(elements)
-        if name != MECH_ISO_ELASTIC.name and len(self._mesh().hexes) and (self._mesh().hex_of()[at] >= 0).any():
-            raise CommandError(
-                f"hexahedra are elastic in this version: the model {name.replace('_', '-')} is for tetrahedra"
-            )
         self._assign(self.element_rows, (self.element_row, at), at, ELEMENT, name, properties)
         self._note_moduli(at)
 

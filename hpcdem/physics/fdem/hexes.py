@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,9 +35,11 @@ def place_masses(sim: State, mass: np.ndarray) -> None:
 
 
 class Hexes:
-    """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; place: see
-    `hexes.forces`; of (count, 24): corner of the hexahedron at each corner of these; corner_of (n, 4): of all rows of
-    storage, the place in x and force of the corner that has the forces of each corner."""
+    """count: hexahedra of this rank; rows (count, 6): storage rows of their tetrahedra; begin (count,): which owned
+    element the first of these is; of (count, 24): corner of the hexahedron at each corner of these; place: see
+    `hexes.forces`; corner_of (n, 4): of all rows of storage, the place in x and force of the corner that has the forces
+    of each corner; model (count,): row of their models; remember: some may yield or creep, each tetrahedron has a
+    stress without strain of its own."""
 
     def __init__(self, sim: State, true_mass: np.ndarray) -> None:
         self.sim = sim
@@ -58,13 +61,15 @@ class Hexes:
                 f"elements {self.number[apart[0]]} and following are one hexahedron of several materials"
             )
         first, self.of = hexahedra.places(mesh.cells, of)
-        begin = (tets.ROW * self.rows[:, 0]).astype(np.int32)
+        self.begin = self.rows[:, 0] - own.start
         self.place = np.zeros((n + 3, 8), np.int32)
-        self.place[:n] = begin[:, None] + tets.ROW * (first // 4) + tets.STRIDE * (first % 4)
+        self.place[:n] = tets.ROW * self.rows[:, :1] + tets.ROW * (first // 4) + tets.STRIDE * (first % 4)
         self.corner_of = np.arange(0, sim.x.size, tets.STRIDE, dtype=np.int32).reshape(-1, 4)
         self.corner_of[self.rows] = np.take_along_axis(self.place[:n], self.of, axis=1).reshape(n, PARTS, 4)
         mass = true_mass[self.place[:n] // tets.ROW, self.place[:n] % tets.ROW // tets.STRIDE]
         self._make_constants(models[:, 0], mass)
+        self.model = models[:, 0]
+        self.remember = "plastic" in sim.cold or "creep" in sim.cold
         if sim.stress0 is not None and n:
             self.h[:n, :6] = sim.initial_stresses(self.number)
 
@@ -95,13 +100,13 @@ class Hexes:
         self.h[:n, hexes.H_ETA] = eta
         self.modulus = models[model, space.LAME] + models[model, space.MU2]
 
-    def forces(self, force: np.ndarray) -> None:
-        """Into the rows (n, 16) [N] of these tetrahedra."""
+    def forces(self, force: np.ndarray, s0: np.ndarray) -> None:
+        """Into the rows (n, 16) [N] of these tetrahedra; s0: see `hexes.forces`."""
         sim, o = self.sim, self.sim.options
         kernel: Any = hexes.forces if sim.threads == 1 else hexes.forces_threaded
         kernel(
-            sim.threads, self.count, self.place, sim.x, sim.v, self.parts, self.h, not o.large_strain, force, o.gx,
-            o.gy, o.gz, o.mass_damping, o.stiffness_damping,
+            sim.threads, self.count, self.place, sim.x, sim.v, self.parts, self.h, self.remember, s0,
+            not o.large_strain, force, o.gx, o.gy, o.gz, o.mass_damping, o.stiffness_damping,
         )  # fmt: skip
 
     def add_contact(self, pairs: Any, force: np.ndarray) -> None:
@@ -110,33 +115,59 @@ class Hexes:
             return
         hexes.add(pairs.rows, self.corner_of, pairs.pushed, force)
 
-    def stresses(self, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Stress (n, 6) [Pa] and elastic energy (n,) [J] of some of them."""
+    def stresses(self, which: np.ndarray, s0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Stress (n, 6) [Pa] and elastic energy (n,) [J] of some of them with this stress without strain."""
         stress, energy = np.empty((len(which), 6)), np.empty(len(which))
         small = not self.sim.options.large_strain
-        hexes.stresses(which, self.place, self.sim.x, self.parts, self.h, small, stress, energy)
+        hexes.stresses(which, self.place, self.sim.x, self.parts, self.h, self.remember, s0, small, stress, energy)
         return stress, energy
 
-    def spread(self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray) -> None:
-        """Put them into those of owned elements: the how-manieth `at` (n,), ascending or not; energies by volume."""
-        hex_of = np.full(self.sim.n_own, -1, np.int64)
-        hex_of[self.rows - self.sim.n_left] = np.arange(self.count)[:, None]
+    def memories(self, memory: np.ndarray) -> np.ndarray:
+        """What each of their tetrahedra remembers (count, 10, n) in rows of owned elements, see plastic_hexes.py."""
+        rows = memory[self.begin[:, None] + np.arange(PARTS)]
+        return rows.reshape(self.count, 2 * PARTS, memory.shape[1] // 2)[:, : hexes.PARTS]
+
+    def shares(self) -> np.ndarray:
+        """Part of the volume that each of their tetrahedra has (count, 10)."""
+        of = np.moveaxis(self.parts[:, :, hexes.SHARE], 1, 2).reshape(-1, hexes.PARTS)[: self.count]
+        volume = np.repeat(self.h[: self.count, hexes.H_VOLUME : hexes.H_VOLUME + 2], hexes.PARTS // 2, axis=1) * of
+        return volume / volume.sum(axis=1, keepdims=True)
+
+    def part_of_volume(self) -> np.ndarray:
+        """Part of the volume that each of the six elements has that store one (count, 6)."""
+        volume = self.sim.areas[self.number[:, None] + np.arange(PARTS)]
+        return volume / volume.sum(axis=1, keepdims=True)
+
+    def numbers(self) -> np.ndarray:
+        """(n_own,) which of them each owned element is a part of, -1: of none."""
+        found = np.full(self.sim.n_own, -1, np.int64)
+        found[self.rows - self.sim.n_left] = np.arange(self.count)[:, None]
+        return found
+
+    def spread(
+        self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray, s0: np.ndarray,
+        more: Callable[[np.ndarray, np.ndarray], None],
+    ) -> None:  # fmt: skip
+        """Put them into those of owned elements: the how-manieth `at` (n,), ascending or not; energies by volume, to
+        which `more` adds what it finds of some of them."""
+        hex_of = self.numbers()
         here = np.flatnonzero(hex_of[at] >= 0)
         if not len(here):
             return
         which, back = np.unique(hex_of[at[here]], return_inverse=True)
-        found, stored = self.stresses(which)
+        found, stored = self.stresses(which, s0)
         stress[here] = found[back]
         if len(energy):
+            more(which, stored)
             volume = self.sim.areas[self.sim.number[at[here] + self.sim.n_left]]
             whole = self.sim.areas[self.number[which, None] + np.arange(PARTS)].sum(axis=1)
             energy[here] = stored[back] * volume / whole[back]
 
-    def stiffness(self) -> np.ndarray:
-        """K (count, 24, 24) [N/m]."""
+    def stiffness(self, h: np.ndarray, s0: np.ndarray) -> np.ndarray:
+        """K (count, 24, 24) [N/m] with these constants and this stress without strain."""
         found = np.empty((self.count, 24, 24))
         small = not self.sim.options.large_strain
-        hexes.stiffness(self.count, self.place, self.sim.x, self.parts, self.h, small, found)
+        hexes.stiffness(self.count, self.place, self.sim.x, self.parts, h, self.remember, s0, small, found)
         return found
 
     def at_corners(self, of_rows: np.ndarray) -> np.ndarray:
@@ -163,7 +194,7 @@ class Hexes:
         k = np.empty((self.count, 24, 24))
         h = self.h.copy()
         h[:, :6] = 0.0
-        hexes.stiffness(self.count, self.place, x, self.parts, h, True, k)
+        hexes.stiffness(self.count, self.place, x, self.parts, h, False, np.zeros((0, 10, 8)), True, k)
         rows = np.abs(k).sum(axis=2).reshape(self.count, 8, 3).max(axis=2)
         place = self.place[: self.count]
         mass[self.rows.reshape(-1)] = 0.0
@@ -175,8 +206,7 @@ class Hexes:
         """Of loaded triangles: which of them (k,) are half a side of a hexahedron, and where the corners of a half of
         the same side begin that is cut the other way (k, 3); both halves have another one each. corner (m, 3): where
         theirs begin in x; element (m,): of owned elements, the how-manieth."""
-        hex_of = np.full(self.sim.n_own, -1, np.int64)
-        hex_of[self.rows - self.sim.n_left] = np.arange(self.count)[:, None]
+        hex_of = self.numbers()
         of = np.flatnonzero(hex_of[element] >= 0)
         which = hex_of[element[of]]
         inside = (corner[of] - tets.ROW * self.rows[which, :1]) // tets.STRIDE

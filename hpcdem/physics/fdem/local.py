@@ -247,7 +247,7 @@ class Local:
             self.creeping_quads = np.flatnonzero(creeping[self.quad_rows])
         if self.plastic:
             self.quad_law = np.repeat(quad_law[:, None], 4, axis=1)
-            self._make_strength(rows)
+            self._make_strength(rows, self.quad_rows)
         quads = len(self.quad_rows)
         self.s0, self.quad_s0 = np.zeros((count + 3, 4)), np.zeros((quads, 16))
         self.said, self.uncrept, self.initial = (np.zeros((count, 4)) for _ in range(3))
@@ -335,13 +335,17 @@ class Local:
         self.said[:] = self.uncrept[:] = self.s0[: self.count]
         self.quad_said[:] = self.quad_uncrept[:] = self.quad_s0
         if self.creeps:
-            self._relieve_crept(np.arange(self.count), np.arange(len(self.quad_rows)), self.s0, self.quad_s0)
+            self._relieve_crept(np.arange(self.count), np.arange(self._quad_count()), self.s0, self.quad_s0)
         self.initial[:], self.quad_initial[:] = self.s0[: self.count], self.quad_s0
         if self.plastic:
             self._relieve_flowed(self.initial, self.quad_initial, self.s0, self.quad_s0)
         if self.plastic and self.creeps:  # some that creep may have yielded before, with another model
             self._relieve_flowed(self.said, self.quad_said, self.uncrept, self.quad_uncrept)
             self._relieve_crept(self.creeping, self.creeping_quads, self.s0, self.quad_s0)
+
+    def _quad_count(self) -> int:
+        """Quads of this rank, in space hexahedra."""
+        return len(self.quad_rows)
 
     def _relieve_crept(self, who: np.ndarray, quads: np.ndarray, s0: np.ndarray, quad_s0: np.ndarray) -> None:
         """Stress without strain of these triangles and quads, less that of their creep strain."""
@@ -357,16 +361,16 @@ class Local:
         if len(self.quad_rows):
             plastic_quads.relieve_all(self.quad_rows, sim.n_left, self.q, quad_base, memory, quad_s0)
 
-    def _make_strength(self, rows: np.ndarray) -> None:
+    def _make_strength(self, rows: np.ndarray, quad_rows: np.ndarray) -> None:
         """The table of yield surfaces; triangles whose strength follows tables have a row of their own. rows: storage
-        rows of the triangles."""
+        rows of the triangles; quad_rows: of quads."""
         sim = self.sim
         of_models = yield_table(sim.element_rows)
         history = sim.cold.get("softening", np.zeros((0, strength.HISTORY)))
         softens = softening_rows(sim.element_rows) if len(history) else np.zeros(len(of_models), bool)
         law = self.law[: self.count, None]
         of, element, first = [], [], len(of_models)
-        for laws_, at in ((law, rows), (self.quad_law, self.quad_rows)):
+        for laws_, at in ((law, rows), (self.quad_law[: len(quad_rows)], quad_rows)):
             own = softens[laws_]
             of.append(laws_[own])
             element.append(at[np.nonzero(own)[0]].astype(np.int64) - sim.n_left)

@@ -263,7 +263,7 @@ class LocalSpace(LawsSpace):
         else:
             if some:
                 force[hexes.rows.reshape(-1)] = 0.0  # the forces of their tetrahedra
-            hexes.forces(force)
+            hexes.forces(force, self.quad_s0)
             hexes.add_contact(self.pairs, force)
 
     def open_joints(self) -> None:
@@ -360,7 +360,7 @@ class LocalSpace(LawsSpace):
         """Stress (n_own, 6) [Pa] and, unless they are not wanted, elastic energies (n_own,) [J] of the owned elements,
         or of some of them (at: the how-manieth)."""
         sim = self.sim
-        s0, plastic, crept = self.remembered(flow)
+        s0, quad_s0, plastic, crept = self.remembered(flow)
         at = np.arange(sim.n_own) if at is None else at
         n = len(at)
         stress, energy = np.zeros((n, 6)), np.zeros(n if energies else 0)
@@ -372,7 +372,7 @@ class LocalSpace(LawsSpace):
             if self.heated:
                 energy += self._energy_of_heat()[at]
         if self.hexes is not None:
-            self.hexes.spread(stress, energy, at)
+            self.hexes.spread(stress, energy, at, quad_s0, self.hexes_store(plastic, crept))
         return stress, energy
 
     def _edges(self, slots: np.ndarray) -> np.ndarray:

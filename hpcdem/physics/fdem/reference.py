@@ -209,6 +209,31 @@ def yielded_quad(
     return found
 
 
+def yielded_hexahedron(
+    mesh: np.ndarray, x: np.ndarray, solid: Solid, rock: MohrCoulomb
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Forces (8, 3) [N] and mean stress (3, 3) [Pa] of a hexahedron that has not flowed before, after its flow, and
+    whether some of it flowed; the pressure of an overlay is the mean by volume of those of its tetrahedra."""
+    force, mean, whole, some = np.zeros((8, 3)), np.zeros((3, 3)), 0.0, False
+    lame, one = rock.bulk - 2.0 / 3.0 * rock.shear, np.eye(3)
+    for overlay in (OVERLAYS[:5], OVERLAYS[5:]):
+        parts = [deformation(mesh[k], x[k], np.zeros((4, 3)), solid.small) for k in overlay]
+        volumes = [float(np.linalg.det(mesh[k][1:] - mesh[k][0])) / 6.0 for k in overlay]
+        volume = np.average([np.trace(d.strain) for d in parts], weights=volumes)
+        ends = []
+        for d in parts:
+            strain = d.strain + (volume - np.trace(d.strain)) / 3.0 * one
+            trial = solid.stress0 + lame * volume * one + 2.0 * rock.shear * strain
+            some |= bool(yield_functions(np.linalg.eigvalsh(trial), rock).max() > 0.0)
+            ends.append(returned_stress(trial, rock))
+        pressure = np.average([np.trace(s) / 3.0 for s in ends], weights=volumes)
+        for k, d, s, v in zip(overlay, parts, ends, volumes):
+            stress = d.rotation @ (s + (pressure - np.trace(s) / 3.0) * one) @ d.rotation.T
+            force[k] -= 0.5 * d.area * d.gradients @ stress
+            mean, whole = mean + v * stress, whole + v
+    return force, mean / whole, some
+
+
 def burgers_step(
     strain: np.ndarray,
     stress0: np.ndarray,

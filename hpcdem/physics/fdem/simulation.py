@@ -540,6 +540,8 @@ class Blocks(State):
         for kind, needed in (("yielding", "plastic" in self.cold), ("creep", "creep" in self.cold)):
             if needed:
                 self.prepare_kernels(f"{kind}-space" if self.dim == 3 else kind)
+                if self.dim == 3 and len(self.the_mesh().hexes):
+                    self.prepare_kernels(f"{kind}-hexes")
         for load in self.surface_loads:
             if load.kernel_kind:
                 self.prepare_kernels(load.kernel_kind + ("-space" if self.dim == 3 else ""))

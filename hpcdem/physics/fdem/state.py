@@ -160,7 +160,10 @@ class State(ModelDefinition, Model):
 
     @property
     def element_parts(self) -> int:
-        """Triangles for which a row of what elements remember has columns: quads have four."""
+        """Triangles for which a row of what elements remember has columns: quads have four. In space tetrahedra: the
+        six that store a hexahedron remember what its ten do, see plastic_hexes.py."""
+        if self.dim == 3:
+            return 2 if self.mesh is not None and len(self.mesh.hexes) else 1
         return 4 if self.wide else 1
 
     def memory(self, name: str) -> int:

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from hpcdem.physics.fdem.kernels import tet_stiffness, tets
+from hpcdem.physics.fdem.kernels import plastic_hexes, tet_stiffness, tets
 from hpcdem.physics.fdem.kernels.joints import YIELDED
 from hpcdem.physics.fdem.linear import Pieces
 from hpcdem.physics.fdem.local_space import LocalSpace
@@ -41,12 +41,13 @@ def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:
     local, small = cast(LocalSpace, sim.local), not sim.options.large_strain
     rows = local.rows[: local.count]
     found = np.empty((len(rows), 12, 12))
-    c, s0, _, _ = local.linear()
+    c, s0, h, quad_s0 = local.linear()
     if local.yields:
-        _, flowed, _ = local.flowed()
+        _, flowed, of_hexes = local.flowed()
         if local.creeps:
             flowed[local.creeping] = s0[local.creeping]
-        s0 = flowed
+            of_hexes[local.creeping_quads] = quad_s0[local.creeping_quads]
+        s0, quad_s0 = flowed, of_hexes
     tet_stiffness.elastic(rows, sim.x, c, s0, small, found)
     if local.yields and flows:
         who = local.who_yields[: local.yielding]
@@ -65,8 +66,22 @@ def of_elements(sim: Blocks, flows: bool) -> list[Pieces]:
     alone[hexes.rows - sim.n_left] = False
     corner = hexes.place[: hexes.count]
     nodes = sim.node[sim.number[corner // tets.ROW], corner % tets.ROW // tets.STRIDE]
+    of_hexes = hexes.stiffness(h, quad_s0)
+    if local.yields and flows and local.hexes_yield.any():
+        which = np.flatnonzero(local.hexes_yield)
+        stress, turn = np.empty((len(which), 10, 3, 3)), np.empty((len(which), 10, 3, 3))
+        of = which, hexes.place, sim.x, hexes.parts, hexes.h
+        plastic_hexes.trials(*of, local.quad_s0, small, stress, turn)
+        values, axes = principal(stress.reshape(-1, 3, 3))
+        axes = _product(turn.reshape(-1, 3, 3), axes).reshape(-1, 10, 3, 3)
+        part = of_hexes[which]
+        plastic_hexes.soften(
+            *of, values.reshape(-1, 10, 3), axes, local.quad_law, local.yield_table, small, part
+        )  # fmt: skip
+        of_hexes[which] = part
     return [
-        Pieces(number[alone], sim.node[number[alone]], found[alone]), Pieces(hexes.number, nodes, hexes.stiffness())
+        Pieces(number[alone], sim.node[number[alone]], found[alone]),
+        Pieces(hexes.number, nodes, of_hexes),
     ]  # fmt: skip
 
 

@@ -191,6 +191,42 @@ def hexahedra(threads: int = 1) -> None:
     equilibrium.tangent(sim)
 
 
+def _hexahedron(threads: int, law: str, properties: dict[str, Value]) -> Blocks:
+    points = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+    sim = Blocks(SerialComm(), threads)
+    sim.take_mesh(Mesh.of_hexes(points, [range(8)]))
+    changes.element_model(sim, None, law, {**ROCK, **properties})
+    sim.initial_stress(None, yy=1e3)
+    return sim
+
+
+def yielding_hexahedra(threads: int = 1) -> None:
+    """Those of hexahedra that yield, and their tangent."""
+    sim = _hexahedron(threads, "mech_mohr_coulomb", {"dilation": 10.0, "cohesion": 1.0, "tensile": 1.0})
+    sim.table("c", [(0.0, 1.0), (1.0, 0.0)])
+    sim.element_property(None, {"cohesion": Over("c", PLASTIC_STRAIN)})
+    convergence.advance(sim, 2)
+    for name in ("strain_energy", "plastic_work"):
+        diagnostics.values(sim, name)
+    sim.option(dynamic=False)
+    equilibrium.tangent(sim)
+
+
+def creeping_hexahedra(threads: int = 1) -> None:
+    """Those of hexahedra that creep, in motion and in a static creep step."""
+    sim = _hexahedron(threads, "mech_burgers", {"kelvin_shear": 1e9, "kelvin_viscosity": 1.0})
+    creep.switch(sim, True)
+    convergence.advance(sim, 2)
+    for name in ("strain_energy", "creep_strain_xx"):
+        diagnostics.values(sim, name)
+    sim.option(dynamic=False)
+    creep.switch(sim, True, dt=1.0)
+    creep.begin(sim, 1.0)
+    sim.local.linear()
+    sim.step()
+    creep.finish(sim, 1.0)
+
+
 def in_space(threads: int = 1) -> None:
     """Those of tetrahedra: in motion with conditions and loads, torn apart, and at rest."""
     sim = _in_space(threads, "mech_iso_elastic", {})

@@ -32,11 +32,11 @@ def squares(a):
 
 
 @njit(cache=True, error_model="numpy")
-def relieve(i, two_mu, base, crept, s0):
-    """Into row i of s0 the stress [Pa] of a tetrahedron without strain: base less 2 G_M times its creep strain (5,)."""
+def relieve(two_mu, base, crept, s0):
+    """Into s0 (8,) the stress [Pa] of a tetrahedron without strain: base less 2 G_M times its creep strain (5,)."""
     for k in range(5):
-        s0[i, PLACES[k]] = base[i, PLACES[k]] - two_mu * crept[k]
-    s0[i, 3] = base[i, 3] + two_mu * (crept[0] + crept[1])
+        s0[PLACES[k]] = base[PLACES[k]] - two_mu * crept[k]
+    s0[3] = base[3] + two_mu * (crept[0] + crept[1])
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -58,35 +58,41 @@ def _per_volume(q):
     return tets.per_volume(q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8])
 
 
+@njit(cache=True, error_model="numpy")
+def creep_one(x, c, per_volume, base, table, small, dt, keep, memory, s0, lanes, room):
+    """Let a tetrahedron creep by its rows of all tables, see `creep`; table (3,): of its model; room (3, 5)."""
+    crept, way, both_ends = room[0], room[1], room[2]
+    two_mu, per_kelvin = c[TWO_MU], table[PER_KELVIN]
+    e11, e22, e12, e33, e13, e23, _ = _strain(x, c, small, lanes)
+    e = _deviator(e11, e22, e12, e33, e13, e23)
+    b = _deviator(base[0], base[1], base[2], base[3], base[4], base[5])
+    back, kelvin, maxwell, div, ratio = factors(dt, two_mu, table[KELVIN], per_kelvin, table[PER_MAXWELL])
+    for k in range(5):
+        before, stress, old = memory[IN_KELVIN[k]], memory[BEFORE[k]], memory[CREPT[k]]
+        both_ends[k] = stress + stress_then(e[k], b[k], old, before, stress, two_mu, back, kelvin + maxwell, div)
+        then = ratio * before + both_ends[k] * kelvin
+        way[k] = then - before
+        crept[k] = old + (way[k] + both_ends[k] * maxwell)
+        if keep:
+            memory[CREPT[k]], memory[IN_KELVIN[k]] = crept[k], then
+            # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
+            memory[BEFORE[k]] = b[k] + two_mu * (e[k] - crept[k])
+    relieve(two_mu, base, crept, s0)
+    if keep and dt > 0.0:
+        lost = 0.5 * squares(both_ends) * maxwell
+        if per_kelvin > 0.0:
+            lost += 2.0 * squares(way) / (per_kelvin * dt)
+        memory[LOST] += lost / per_volume
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _creep(t, threads, who, rows, first_row, x, c, base, law, table, small, dt, keep, memory, s0):
-    n, lanes = len(who), np.zeros(tets.LANES * CAPACITY)
-    crept, way, both_ends = np.empty(5), np.empty(5), np.empty(5)
+    n, lanes, room = len(who), np.zeros(tets.LANES * CAPACITY), np.empty((3, 5))
     for m in range(n * t // threads, n * (t + 1) // threads):
         i = who[m]
-        j, row, two_mu = rows[i] - first_row, law[i], c[i, TWO_MU]
-        e11, e22, e12, e33, e13, e23, _ = _strain(x[rows[i]], c[i], small, lanes)
-        e = _deviator(e11, e22, e12, e33, e13, e23)
-        b = _deviator(base[i, 0], base[i, 1], base[i, 2], base[i, 3], base[i, 4], base[i, 5])
-        per_kelvin = table[row, PER_KELVIN]
-        back, kelvin, maxwell, div, ratio = factors(dt, two_mu, table[row, KELVIN], per_kelvin, table[row, PER_MAXWELL])
-        for k in range(5):
-            before, stress = memory[j, IN_KELVIN[k]], memory[j, BEFORE[k]]
-            old = memory[j, CREPT[k]]
-            both_ends[k] = stress + stress_then(e[k], b[k], old, before, stress, two_mu, back, kelvin + maxwell, div)
-            then = ratio * before + both_ends[k] * kelvin
-            way[k] = then - before
-            crept[k] = old + (way[k] + both_ends[k] * maxwell)
-            if keep:
-                memory[j, CREPT[k]], memory[j, IN_KELVIN[k]] = crept[k], then
-                # By its spring, so that asking again at these positions (dt = 0) finds the same bits.
-                memory[j, BEFORE[k]] = b[k] + two_mu * (e[k] - crept[k])
-        relieve(i, two_mu, base, crept, s0)
-        if keep and dt > 0.0:
-            lost = 0.5 * squares(both_ends) * maxwell
-            if per_kelvin > 0.0:
-                lost += 2.0 * squares(way) / (per_kelvin * dt)
-            memory[j, LOST] += lost / _per_volume(c[i])
+        j = rows[i] - first_row
+        per = _per_volume(c[i])
+        creep_one(x[rows[i]], c[i], per, base[i], table[law[i]], small, dt, keep, memory[j], s0[i], lanes, room)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -110,9 +116,10 @@ def creep_threaded(threads, who, rows, first_row, x, c, base, law, table, small,
 
 
 @njit(cache=True, error_model="numpy")
-def _columns(j, of, memory, out):
+def columns(of, memory, out):
+    """Five columns of what a tetrahedron remembers."""
     for k in range(5):
-        out[k] = memory[j, of[k]]
+        out[k] = memory[of[k]]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -121,8 +128,21 @@ def relieve_all(who, rows, first, c, base, memory, s0):
     crept = np.empty(5)
     for m in range(len(who)):
         i = who[m]
-        _columns(rows[i] - first, CREPT, memory, crept)
-        relieve(i, c[i, TWO_MU], base, crept, s0)
+        columns(CREPT, memory[rows[i] - first], crept)
+        relieve(c[i, TWO_MU], base[i], crept, s0[i])
+
+
+@njit(cache=True, error_model="numpy")
+def stored_one(two_mu, base, table, memory, a):
+    """What `stored` adds for a tetrahedron by its rows of all tables, per volume [J/m3]; a (5,): room."""
+    columns(CREPT, memory, a)
+    density = 0.5 * two_mu * squares(a) + base[3] * (a[0] + a[1])
+    density -= base[0] * a[0] + base[1] * a[1]
+    density -= 2.0 * (base[2] * a[2] + base[4] * a[3] + base[5] * a[4])
+    if table[PER_KELVIN] > 0.0:
+        columns(IN_KELVIN, memory, a)
+        density += table[KELVIN] * squares(a)
+    return density
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -131,29 +151,44 @@ def stored(rows, first, c, base, law, table, memory, out):
     base - 2 G_M e_c, and what the springs of the Kelvin units store, see `creep.stored`."""
     a = np.empty(5)
     for i in range(len(rows)):
-        j, row = rows[i] - first, law[i]
-        _columns(j, CREPT, memory, a)
-        density = 0.5 * c[i, TWO_MU] * squares(a) + base[i, 3] * (a[0] + a[1])
-        density -= base[i, 0] * a[0] + base[i, 1] * a[1]
-        density -= 2.0 * (base[i, 2] * a[2] + base[i, 4] * a[3] + base[i, 5] * a[4])
-        if table[row, PER_KELVIN] > 0.0:
-            _columns(j, IN_KELVIN, memory, a)
-            density += table[row, KELVIN] * squares(a)
-        out[j] += density / _per_volume(c[i])
+        j = rows[i] - first
+        out[j] += stored_one(c[i, TWO_MU], base[i], table[law[i]], memory[j], a) / _per_volume(c[i])
+
+
+@njit(cache=True, error_model="numpy")
+def strains_one(x, c, small, memory, out, share, lanes, a):
+    """Add `share` of what `strains` finds for a tetrahedron by its rows of all tables."""
+    _, _, _, _, _, _, r = _strain(x, c, small, lanes)
+    for part in range(2):
+        columns(IN_KELVIN if part else CREPT, memory, a)
+        found = tets.turned(a[0], a[1], a[2], -(a[0] + a[1]), a[3], a[4], r)
+        for k in range(6):
+            out[6 * part + k] += share * found[k]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def strains(rows, first, x, c, small, memory, out):
-    """Creep strain and Kelvin strain, xx, yy, xy, zz, xz, yz each, along the axes of space: into out (n_own, 12)."""
+    """Creep strain and Kelvin strain, xx, yy, xy, zz, xz, yz each, along the axes of space: added to out (n, 12)."""
     lanes, a = np.zeros(tets.LANES * CAPACITY), np.empty(5)
     for i in range(len(rows)):
         j = rows[i] - first
-        _, _, _, _, _, _, r = _strain(x[rows[i]], c[i], small, lanes)
-        for part in range(2):
-            _columns(j, IN_KELVIN if part else CREPT, memory, a)
-            found = tets.turned(a[0], a[1], a[2], -(a[0] + a[1]), a[3], a[4], r)
-            for k in range(6):
-                out[j, 6 * part + k] = found[k]
+        strains_one(x[rows[i]], c[i], small, memory[j], out[j], 1.0, lanes, a)
+
+
+@njit(cache=True, error_model="numpy")
+def elastic_one(two_mu, base, table, dt, memory, s0):
+    """`as_elastic` for a tetrahedron by its rows of all tables. Returns its 2 mu [Pa]."""
+    back, kelvin, maxwell, div, _ = factors(dt, two_mu, table[KELVIN], table[PER_KELVIN], table[PER_MAXWELL])
+    mean = (base[0] + base[1] + base[3]) / 3.0
+    for k in range(5):
+        start = base[PLACES[k]] - (mean if k < 2 else 0.0)
+        s0[PLACES[k]] = stress_then(
+            0.0, start, memory[CREPT[k]], memory[IN_KELVIN[k]], memory[BEFORE[k]], two_mu, back, kelvin + maxwell, div
+        )
+    s0[3] = mean - (s0[0] + s0[1])
+    s0[0] += mean
+    s0[1] += mean
+    return 1.0 / div
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -162,19 +197,6 @@ def as_elastic(who, rows, first, c, base, law, table, dt, memory, like, s0):
     (count + 3, 8) [Pa] its stress without strain, see `creep.as_elastic`; other arguments as for `creep`."""
     for m in range(len(who)):
         i = who[m]
-        j, row, two_mu = rows[i] - first, law[i], c[i, TWO_MU]
-        back, kelvin, maxwell, div, _ = factors(
-            dt, two_mu, table[row, KELVIN], table[row, PER_KELVIN], table[row, PER_MAXWELL]
-        )
-        mean = (base[i, 0] + base[i, 1] + base[i, 3]) / 3.0
-        for k in range(5):
-            start = base[i, PLACES[k]] - (mean if k < 2 else 0.0)
-            s0[i, PLACES[k]] = stress_then(
-                0.0, start, memory[j, CREPT[k]], memory[j, IN_KELVIN[k]], memory[j, BEFORE[k]], two_mu, back,
-                kelvin + maxwell, div,
-            )  # fmt: skip
-        s0[i, 3] = mean - (s0[i, 0] + s0[i, 1])
-        s0[i, 0] += mean
-        s0[i, 1] += mean
-        like[i, TWO_MU] = 1.0 / div
+        two_mu = c[i, TWO_MU]
+        like[i, TWO_MU] = elastic_one(two_mu, base[i], table[law[i]], dt, memory[rows[i] - first], s0[i])
         like[i, LAMBDA] = c[i, LAMBDA] + (two_mu - like[i, TWO_MU]) / 3.0

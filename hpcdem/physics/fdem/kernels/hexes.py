@@ -53,7 +53,7 @@ _MASS, _LAMBDA, _TWO_MU, _ETA = (lane(k) for k in (H_MASS, H_LAMBDA, H_TWO_MU, H
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gather(n, first, place, x, v, h, lanes):
+def gather(n, first, place, x, v, h, lanes):
     """Corners, velocities and constants of n hexahedra into lanes."""
     for e in range(U(0), U(n), _ROWS):
         i = first + np.int64(e)
@@ -81,7 +81,7 @@ def _weigh(n, gx, gy, gz, drag, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _relate(n, beta, lanes):
+def relate(n, beta, lanes):
     """Corners from the first one on, and what strains and rates are made of together."""
     for c in range(U(7), U(0), U(-1)):
         for axis in range(U(3)):
@@ -98,6 +98,17 @@ def _relate(n, beta, lanes):
                 m = lanes[H + _TWO_MU + e]
                 eta = lanes[H + _ETA + e] + beta * m
                 lanes[to + e] = m * lanes[of + e] + eta * lanes[to + e]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def load(n, first, j, s0, lanes):
+    """Stress without strain of tetrahedron j of n hexahedra, where that of the hexahedra stands."""
+    for e in range(U(0), U(n), _ROWS):
+        q = ((U(first) + e) * U(PARTS) + U(j)) * U(tets.STRESSES)
+        step = U(PARTS * tets.STRESSES)
+        of = (q, q + step, q + U(2) * step, q + U(3) * step)
+        four_columns(lanes, H + e, s0, of)
+        four_columns(lanes, H + _4 + e, s0, (of[0] + _ROWS, of[1] + _ROWS, of[2] + _ROWS, of[3] + _ROWS))
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -122,7 +133,7 @@ def _sides(n, corners, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _take(n, j, begin, parts, lanes):
+def take(n, j, begin, parts, lanes):
     """Constants, from `begin` in `parts` on, and sides of tetrahedron j of n hexahedra. (Distances between lanes must
     be constants in loops of vectors: hence the list.)"""
     for k in range(U(WORDS)):
@@ -175,7 +186,7 @@ def _sum_up(n, corners, lanes):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add(n, j, lanes):
-    """Forces and area vectors of tetrahedron j to those of its corners, see `_take`."""
+    """Forces and area vectors of tetrahedron j to those of its corners, see `take`."""
     if j == 0:
         _sum_up(n, CORNERS[0], lanes)
     elif j == 1:
@@ -204,7 +215,7 @@ def _product(a1, a2, a3, b1, b2, b3):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _slope(at, e, lanes):
+def slope(at, e, lanes):
     """Sides from lane `at` on, times the inverse of those in the mesh, by rows."""
     ux, uy, uz = lanes[at + e], lanes[at + _1 + e], lanes[at + _2 + e]
     at = at + _3
@@ -222,10 +233,10 @@ def _slope(at, e, lanes):
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _stress(beta, r, e, lanes):
+def stress(beta, r, e, lanes):
     """Stress of a tetrahedron but for the pressure that strains bring, in the frame r that turns with it; and what it
     brings to the pressure of its overlay."""
-    f, h = _slope(E, e, lanes), _slope(Y, e, lanes)
+    f, h = slope(E, e, lanes), slope(Y, e, lanes)
     h11, h22, h12, h33, h13, h23 = tets.in_frame(r, h)
     whole = h11 + (h22 + h33)
     trace = _product(r[0], r[3], r[6], f[0], f[3], f[6]) + (
@@ -264,9 +275,9 @@ def _large(n, beta, lanes):
     """Forces of a tetrahedron of each hexahedron but for the pressure of its overlay, area vectors (of its present
     shape: -1/12 of the cross products of its sides, for a mean of two overlays), and its part of that pressure."""
     for e in range(U(n)):
-        f = _slope(E, e, lanes)
+        f = slope(E, e, lanes)
         r = tets.rotation(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8])
-        s11, s22, s12, s33, s13, s23, p = _stress(beta, r, e, lanes)
+        s11, s22, s12, s33, s13, s23, p = stress(beta, r, e, lanes)
         lanes[P + e] += lanes[SH + e] * p
         s = tets.turned(s11, s22, s12, s33, s13, s23, r)
         ux, uy, uz = lanes[E + e], lanes[E + _1 + e], lanes[E + _2 + e]
@@ -284,7 +295,7 @@ def _large(n, beta, lanes):
 def _small(n, beta, lanes):
     """The same with small strains: area vectors are those of the mesh."""
     for e in range(U(n)):
-        s11, s22, s12, s33, s13, s23, p = _stress(beta, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), e, lanes)
+        s11, s22, s12, s33, s13, s23, p = stress(beta, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), e, lanes)
         lanes[P + e] += lanes[SH + e] * p
         c11, c12, c13 = lanes[C + e], lanes[C + _1 + e], lanes[C + _2 + e]
         c21, c22, c23 = lanes[C + _3 + e], lanes[C + _4 + e], lanes[C + _5 + e]
@@ -324,20 +335,22 @@ def _put(n, first, place, force, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _forces(t, threads, count, place, x, v, parts, h, small, force, gx, gy, gz, drag, beta):
+def _forces(t, threads, count, place, x, v, parts, h, own, s0, small, force, gx, gy, gz, drag, beta):
     lanes = np.zeros(LANES * np.int64(_PER))
     x, v, force = x.reshape(x.size), v.reshape(v.size), force.reshape(force.size)
-    parts, h = parts.reshape(parts.size), h.reshape(h.size)
+    parts, h, s0 = parts.reshape(parts.size), h.reshape(h.size), s0.reshape(s0.size)
     blocks = -(-count // BLOCK)
     for b in range(blocks * t // threads, blocks * (t + 1) // threads):
         first = b * BLOCK
         n = min(BLOCK, count - first)
-        _gather(n, first, place, x, v, h, lanes)
+        gather(n, first, place, x, v, h, lanes)
         _weigh(n, gx, gy, gz, drag, lanes)
-        _relate(n, beta, lanes)
+        relate(n, beta, lanes)
         for overlay in range(2):
             for j in range(5 * overlay, 5 * overlay + 5):
-                _take(n, j, U((b * PARTS + j) * WORDS * BLOCK), parts, lanes)
+                take(n, j, U((b * PARTS + j) * WORDS * BLOCK), parts, lanes)
+                if own:
+                    load(n, first, j, s0, lanes)
                 if small:
                     _small(n, beta, lanes)
                 else:
@@ -352,17 +365,18 @@ def forces(threads, *args):
     """Forces on the corners of hexahedra, stored; of their rows nothing else is touched.
 
     count: hexahedra; place (count + 3, 8) i4: where the corners begin in x (n, 16) and force (n, 16) [N]; parts
-    (blocks, 10, 10, 32): constants of the tetrahedra, `WORDS`; h (count + 3, 20): `HEX`; others: see `tets.forces`.
+    (blocks, 10, 10, 32): constants of the tetrahedra, `WORDS`; h (count + 3, 20): `HEX`; own: each tetrahedron
+    has a stress without strain of its own, s0 (count + 3, 10, 8) [Pa]; others: see `tets.forces`.
     """
     for t in range(threads):
         _forces(t, threads, *args)
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
-def forces_threaded(threads, count, place, x, v, parts, h, small, force, gx, gy, gz, drag, beta):
+def forces_threaded(threads, count, place, x, v, parts, h, own, s0, small, force, gx, gy, gz, drag, beta):
     """The same on several threads."""
     for t in prange(threads):
-        _forces(t, threads, count, place, x, v, parts, h, small, force, gx, gy, gz, drag, beta)
+        _forces(t, threads, count, place, x, v, parts, h, own, s0, small, force, gx, gy, gz, drag, beta)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -386,7 +400,7 @@ def tetrahedron(i, j, parts, h, q):
 
 
 @njit(cache=True, error_model="numpy")
-def _traces(i, place, x, parts, h, small, rows, constants, traces, lanes):
+def traces_of(i, place, x, parts, h, small, rows, constants, traces, lanes):
     """Corners of the ten tetrahedra of hexahedron i into rows (10, 16), their constants (10, 16), traces of their
     strains, and of each overlay the mean (2,)."""
     flat, mean = x.reshape(x.size), np.zeros(2)
@@ -408,22 +422,22 @@ def _traces(i, place, x, parts, h, small, rows, constants, traces, lanes):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stresses(which, place, x, parts, h, small, stress, energy):
+def stresses(which, place, x, parts, h, own, s0, small, stress, energy):
     """Stress (n, 6) xx, yy, xy, zz, xz, yz [Pa], without the viscous part, and elastic energy (n,) [J] of the hexahedra
-    `which` (n,): means by volume, see `tets.stresses`."""
+    `which` (n,): means by volume, see `tets.stresses`; own, s0: see `forces`."""
     rows, traces, lanes, shifted, s = (
         np.zeros((PARTS, ROW)), np.empty(PARTS), np.zeros(tets.LANES * np.int64(_PER)), np.zeros(8), np.empty(6)
     )  # fmt: skip
     constants = np.zeros((PARTS, TET))
     for n in range(len(which)):
         i = which[n]
-        mean = _traces(i, place, x, parts, h, small, rows, constants, traces, lanes)
+        mean = traces_of(i, place, x, parts, h, small, rows, constants, traces, lanes)
         stress[n], energy[n], whole = 0.0, 0.0, 0.0
         for j in range(PARTS):
             q = constants[j]
             shift = mean[j // 5] - traces[j]
             for k in range(6):
-                shifted[k] = h[i, k]
+                shifted[k] = s0[i, j, k] if own else h[i, k]
             for k in (0, 1, 3):
                 shifted[k] += (q[LAMBDA] + q[TWO_MU] / 3.0) * shift
             r = trial(rows[j], q, shifted, small, lanes, s)
@@ -435,7 +449,7 @@ def stresses(which, place, x, parts, h, small, stress, energy):
                 lanes, tets.X, q[0], q[1], q[2], q[3], q[4], q[5], q[6], q[7], q[8], small
             )
             e11, e22, e33 = e11 + shift / 3.0, e22 + shift / 3.0, e33 + shift / 3.0
-            o = h[i]
+            o = s0[i, j] if own else h[i]
             normal = (s[0] + o[0]) * e11 + (s[1] + o[1]) * e22 + (s[3] + o[3]) * e33
             shear = (s[2] + o[2]) * e12 + (s[4] + o[4]) * e13 + (s[5] + o[5]) * e23
             energy[n] += 0.25 * q[VOLUME] * (normal + 2.0 * shear)
@@ -444,7 +458,7 @@ def stresses(which, place, x, parts, h, small, stress, energy):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def stiffness(count, place, x, parts, h, small, out):
+def stiffness(count, place, x, parts, h, own, s0, small, out):
     """K (count, 24, 24) [N/m] of hexahedra, see tet_stiffness.py: deviators tetrahedron by tetrahedron, the volume by
     overlays."""
     rows, traces, lanes, shifted, s = (
@@ -453,7 +467,7 @@ def stiffness(count, place, x, parts, h, small, out):
     constants = np.zeros((PARTS, TET))
     g, whole = np.empty((4, 3)), np.empty(24)
     for i in range(count):
-        mean = _traces(i, place, x, parts, h, small, rows, constants, traces, lanes)
+        mean = traces_of(i, place, x, parts, h, small, rows, constants, traces, lanes)
         k = out[i]
         k[:] = 0.0
         for overlay in range(2):
@@ -463,7 +477,7 @@ def stiffness(count, place, x, parts, h, small, out):
                 q = constants[j]
                 volume = 0.5 * gradients(rows[j], q, small, g)
                 for m in range(6):
-                    shifted[m] = h[i, m]
+                    shifted[m] = s0[i, j, m] if own else h[i, m]
                 for m in (0, 1, 3):
                     shifted[m] += (q[LAMBDA] + q[TWO_MU] / 3.0) * (mean[overlay] - traces[j])
                 r = trial(rows[j], q, shifted, small, lanes, s)

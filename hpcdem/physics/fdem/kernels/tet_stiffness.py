@@ -117,45 +117,58 @@ def trials(rows, x, c, s0, small, stress, turn):
         stress[i, 1, 2] = stress[i, 2, 1] = s[5]
 
 
+@njit(cache=True, error_model="numpy")
+def lost_by_flow(s, surface, lame, two_mu, slope, lost):
+    """Into lost (6, 6) [Pa] what flow takes of the elastic stiffness along the principal axes of a trial stress s (3,)
+    [Pa], for the strains 11, 22, 33 and the shears 12, 13, 23; slope (3, 3): room. Returns whether it flows."""
+    r1, r2, r3, bits = principal_slopes(
+        s[0], s[1], s[2], surface[N_PHI], surface[N_PSI], surface[STRENGTH], surface[TENSILE], lame + two_mu, lame,
+        slope,
+    )  # fmt: skip
+    if bits == 0:
+        return False
+    r = (r1, r2, r3)
+    lost[:] = 0.0
+    for p in range(3):
+        total = lame * (slope[p, 0] + slope[p, 1] + slope[p, 2])
+        for q in range(3):
+            lost[p, q] = (lame + two_mu if p == q else lame) - (total + two_mu * slope[p, q])
+    for k in range(3):
+        p, q = (0, 0, 1)[k], (1, 2, 2)[k]
+        apart = s[q] - s[p]
+        turn = (r[q] - r[p]) / apart if apart > 0.0 else slope[q, q] - slope[q, p]
+        lost[3 + k, 3 + k] = 0.5 * two_mu * (1.0 - turn)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def strains_along(g, axes, b):
+    """Into b (6, 12) the strains along axes (3, 3), by columns, per movement of the corners; g (4, 3): gradients."""
+    for a in range(4):
+        for axis in range(3):
+            for p in range(3):
+                along = g[a, 0] * axes[0, p] + g[a, 1] * axes[1, p] + g[a, 2] * axes[2, p]
+                b[p, 3 * a + axis] = along * axes[axis, p]
+            for k in range(3):
+                p, q = (0, 0, 1)[k], (1, 2, 2)[k]
+                b[3 + k, 3 * a + axis] = (g[a, 0] * axes[0, p] + g[a, 1] * axes[1, p] + g[a, 2] * axes[2, p]) * axes[
+                    axis, q
+                ] + (g[a, 0] * axes[0, q] + g[a, 1] * axes[1, q] + g[a, 2] * axes[2, q]) * axes[axis, p]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def plastic(rows, x, c, principal, axes, law, table, small, out):
     """Take from the stiffness out (n, 12, 12) of tetrahedra in the storage rows (n,) what their flow at these positions
     takes. principal (n, 3) [Pa]: trial stresses, ascending; axes (n, 3, 3): theirs in space, by columns; law (n,): row
     of the table (rows, 4) of yield surfaces. Returns how many flow."""
     g, slope, lost, b = np.empty((4, 3)), np.empty((3, 3)), np.empty((6, 6)), np.empty((6, 12))
-    r, flowing = np.empty(3), 0
+    flowing = 0
     for i in range(len(rows)):
-        s, surface, lame, two_mu = principal[i], table[law[i]], c[i, LAMBDA], c[i, TWO_MU]
-        r[0], r[1], r[2], bits = principal_slopes(
-            s[0], s[1], s[2], surface[N_PHI], surface[N_PSI], surface[STRENGTH], surface[TENSILE], lame + two_mu, lame,
-            slope,
-        )  # fmt: skip
-        if bits == 0:
+        if not lost_by_flow(principal[i], table[law[i]], c[i, LAMBDA], c[i, TWO_MU], slope, lost):
             continue
         flowing += 1
-        lost[:] = 0.0
-        for p in range(3):
-            total = lame * (slope[p, 0] + slope[p, 1] + slope[p, 2])
-            for q in range(3):
-                lost[p, q] = (lame + two_mu if p == q else lame) - (total + two_mu * slope[p, q])
-        for k in range(3):
-            p, q = (0, 0, 1)[k], (1, 2, 2)[k]
-            apart = s[q] - s[p]
-            turn = (r[q] - r[p]) / apart if apart > 0.0 else slope[q, q] - slope[q, p]
-            lost[3 + k, 3 + k] = 0.5 * two_mu * (1.0 - turn)
         volume = (1.0 - KEPT) * gradients(x[rows[i]], c[i], small, g)
-        for a in range(4):
-            for axis in range(3):
-                for p in range(3):
-                    along = g[a, 0] * axes[i, 0, p] + g[a, 1] * axes[i, 1, p] + g[a, 2] * axes[i, 2, p]
-                    b[p, 3 * a + axis] = along * axes[i, axis, p]
-                for k in range(3):
-                    p, q = (0, 0, 1)[k], (1, 2, 2)[k]
-                    b[3 + k, 3 * a + axis] = (
-                        g[a, 0] * axes[i, 0, p] + g[a, 1] * axes[i, 1, p] + g[a, 2] * axes[i, 2, p]
-                    ) * axes[i, axis, q] + (
-                        g[a, 0] * axes[i, 0, q] + g[a, 1] * axes[i, 1, q] + g[a, 2] * axes[i, 2, q]
-                    ) * axes[i, axis, p]
+        strains_along(g, axes[i], b)
         for m in range(12):
             for p in range(6):
                 part = 0.0
