@@ -382,6 +382,7 @@ def _pictures() -> WarmUp:
     return warm_up.in_space, (screen,)
 
 
+_TANGENT_SPACE = ("tangent", "plastic-tangent", "yielding-space", "tangent-space")
 KINDS = {
     "shared": Kernels(_shared),
     "": Kernels(_particles),
@@ -406,9 +407,9 @@ KINDS = {
     "yielding-space": Kernels(_yielding_space, after=("space",)),
     "creep-space": Kernels(_creep_space, after=("space",)),
     "tangent-space": Kernels(_tangent_space, after=("tangent", "plastic-tangent", "yielding-space")),
-    "hexes": Kernels(_hexes, after=("tangent-space",)),
-    "yielding-hexes": Kernels(_yielding_hexes, after=("hexes", "yielding-space")),
-    "creep-hexes": Kernels(_creep_hexes, after=("hexes", "creep-space")),
+    "hexes": Kernels(_hexes, after=_TANGENT_SPACE),
+    "yielding-hexes": Kernels(_yielding_hexes, after=(*_TANGENT_SPACE, "hexes")),
+    "creep-hexes": Kernels(_creep_hexes, after=(*_TANGENT_SPACE, "hexes", "creep-space")),
     "pictures": Kernels(_pictures),
 }
 """Kinds of kernels: "" of all particles, "blocks" of all blocks, "coupled" what both need besides, "shared" by all; the
