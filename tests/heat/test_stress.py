@@ -177,3 +177,34 @@ def test_laws_of_users_know_no_temperature() -> None:
         sim.step()
     heat.adjust(None, {"expansion_coeficient": 0.0})
     sim.step()
+
+
+@pytest.mark.parametrize("capacity", [800.0, 1e-4])
+def test_slow_heat_waits_for_ten_steps(tmp_path, capacity: float) -> None:
+    """Without a word on sub-steps: rock is warm and under stress as by cycles in each step, quick heat has one in each;
+    a run that goes on from a file between two cycles comes to the same bits."""
+    found = {}
+    for steps in (0, 1):  # as many as are stable, one
+        sim = Blocks()
+        sim.take_mesh(shaken(rectangle(6, 4, 1.2, 0.8), 0.2))
+        changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+        heat = Heat.of(sim)
+        heat.assign(None, {**GRANITE, "capacity": capacity, "expansion_coeficient": ALPHA})
+        heat.prescribe(at(sim, x=0.0), 100.0)
+        sim.option(collision=False)
+        sim.heat_clock(steps=steps)
+        for _ in range(47):
+            sim.step()
+        saved_state.save(sim, tmp_path / "a.sav")
+        other = Blocks()
+        saved_state.restore(other, tmp_path / "a.sav")
+        for one in (sim, other):
+            for _ in range(54):
+                one.step()
+        assert np.array_equal(temperatures(sim), temperatures(other))
+        assert np.array_equal(diagnostics.values(sim, "stress_xx"), diagnostics.values(other, "stress_xx"))
+        found[steps] = heat.cycles, heat.time, temperatures(sim), sim.clock.time
+    cycles, time, t, now = found[0]
+    assert cycles == (11 if capacity > 1.0 else 101) and found[1][0] == 101
+    assert time == pytest.approx(now, rel=1e-9) and found[1][1] == pytest.approx(now, rel=1e-9)
+    assert t == pytest.approx(found[1][2], abs=1e-3 * np.ptp(found[1][2])) and np.ptp(t) > 0.0

@@ -703,7 +703,9 @@ _MODEL = (
             ("pcdc model sub-step mechanical 10 hydraulic 5", "pcdc model sub-step mechanical 100 thermal 1"),
             options=(Option("mech{anical}", (COUNT,), "steps of the blocks between two cycles of flow, and of heat",
                             default="1"),
-                     Option("therm{al}", (ZERO_OR_MORE,), "sub-steps of a cycle of heat; 0: as many as are stable",
+                     Option("therm{al}", (ZERO_OR_MORE,),
+                            "sub-steps of a cycle of heat; 0: as many as are stable, and where heat is that slow, "
+                            "without fluid or friction, a cycle every ten steps of blocks in motion",
                             default="0"),
                      Option("hyd{raulic}", (ZERO_OR_MORE,), "sub-steps of a cycle of flow; 0: as many as are stable",
                             default="0")),

@@ -44,6 +44,8 @@ def part_of_young(sim: State, row: np.ndarray | None = None, t: np.ndarray | Non
     """Young's modulus (n_own,) of owned elements over the largest that their table has; None: no table. row (n_own,):
     their rows if they had others; t (n_own,) [K]: their temperatures if not those of now."""
     rows = sim.element_rows
+    if not rows.column(temperature_table("young")).any():
+        return None
     row = sim.element_row[sim.number[sim.owned]] if row is None else row
     if not rows.column(temperature_table("young"))[row].any():
         return None

@@ -38,6 +38,8 @@ SAFETY = 0.9
 """Part of the stability limit that an estimated sub-step may be."""
 LOOK = 100
 """Cycles of heat after which it is looked whether it has blown up."""
+RARELY, MOST = 1e-2, 10
+"""Part of the stability limit for which heat by itself waits while blocks move, and steps of these, at most."""
 MANY = 100_000
 """Sub-steps in a cycle that are too many to be meant."""
 NEAR, DEEP = 1e-3, 0.2
@@ -88,6 +90,8 @@ class Heat(SurfaceLoad):
         elements."""
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
+        self.every = self._steps = 1
+        """Steps of blocks in motion before the next cycle, and those that the present one stands for."""
         self.dt = 0.0
         self.t = np.empty((0, 3))
         self._stale = True
@@ -570,7 +574,8 @@ class Heat(SurfaceLoad):
     @property
     def passes(self) -> bool:
         """Heat crosses where surfaces touch. Not collective."""
-        return self.blocks.options.collision and bool((self._transfers[self.blocks.alive] > 0.0).any())
+        some = self.blocks.options.collision and bool((self.column("transfer_coeficient") > 0.0).any())
+        return some and bool((self._transfers[self.blocks.alive] > 0.0).any())
 
     @property
     def _transfers(self) -> np.ndarray:
@@ -685,7 +690,7 @@ class Heat(SurfaceLoad):
         o, clock = self.blocks.options, self.blocks.clock
         period = o.mechanical or self._beside_flow()
         return (
-            float(o.mechanical), float(o.dynamic), float(o.flow_every), float(o.heat_steps), o.heat_dt,
+            float(o.mechanical), float(o.dynamic), float(self._steps), float(o.heat_steps), o.heat_dt,
             clock.dt if period else 0.0, self._limit, self._of_fluid(),
         )  # fmt: skip
 
@@ -702,7 +707,7 @@ class Heat(SurfaceLoad):
             return
         limit = SAFETY * self._limit
         if o.mechanical:
-            period = o.flow_every * blocks.clock.dt if o.dynamic else 0.0
+            period = self._steps * blocks.clock.dt if o.dynamic else 0.0
         else:
             period = blocks.clock.dt if self._beside_flow() else 0.0
         period = self._of_fluid() or period
@@ -821,9 +826,9 @@ class Heat(SurfaceLoad):
         if fluid is not None and o.hydraulic:
             if fluid.flow.waited > 0:  # heat goes with the fluid
                 return
-        elif o.mechanical and self.waited < o.flow_every:
+        elif o.mechanical and self.waited < (self.every if self._may_wait else o.flow_every):
             return
-        self.waited = 0
+        self._steps, self.waited = self.waited if self._may_wait else o.flow_every, 0
         with blocks.timers("heat"):
             self.renew_nodes()
             if o.mechanical:
@@ -839,9 +844,17 @@ class Heat(SurfaceLoad):
                 self._sub_step()
             self._power = None
             self.cycles += 1
+            self.every = max(1, int(min(RARELY * self._limit / blocks.clock.dt, MOST))) if self._may_wait else 1
             blocks.local.follow_heat()
         if self.cycles % LOOK == 0:
             self._check_finite()
+
+    @property
+    def _may_wait(self) -> bool:
+        """Heat alone, without friction, by the clock of blocks in motion, with sub-steps of which nothing is said."""
+        o = self.blocks.options
+        by_itself = o.mechanical and o.dynamic and self.flowing is None and not self._rubs
+        return by_itself and o.flow_every == 1 and o.heat_steps == 0 and o.heat_dt == 0.0
 
     def _rub(self) -> None:
         """Surfaces have slid for a step."""
@@ -923,7 +936,7 @@ class Heat(SurfaceLoad):
         return {
             "rows": [list(row) for row in self.rows], "prescribed": self.prescribed,
             "faces": [asdict(one) for one in self.faces], "accounts": self.accounts, "time": self.time,
-            "cycles": self.cycles, "waited": self.waited,
+            "cycles": self.cycles, "waited": self.waited, "every": self.every,
             "fluid": self.fluid.saved_state() if self.fluid is not None else None,
         }  # fmt: skip
 
@@ -947,7 +960,7 @@ class Heat(SurfaceLoad):
         made.prescribed = list(state["prescribed"])
         made.faces = [FaceCondition(**one) for one in state["faces"]]
         made.accounts, made.time = dict(state["accounts"]), state["time"]
-        made.cycles, made.waited = state["cycles"], state["waited"]
+        made.cycles, made.waited, made.every = state["cycles"], state["waited"], state.get("every", 1)
         for name, rows in (("elements", made.row), ("points", made.held), ("faces", made.face)):
             table = tables[f"heat_{name}"]
             rows[table["number"]] = table["row"]

@@ -13,6 +13,8 @@
 | wet-20k | intact-20k with a channel in every joint, half of them full, and one sub-step of flow per step |
 | soaked-20k | the same with eleven sub-steps of flow per step |
 | sandy-20k | as wet-20k, with proppant in the fluid, which settles |
+| warm-20k | intact-20k with heat and thermal stress, a cycle of heat every ten steps |
+| stepwise-20k | the same with a cycle in each step |
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | pairs-space-20k | 20 000 touching pairs of tetrahedra: two plates that lie on each other |
 | tets-20k, tets-200k | tetrahedra as one body in vibration, 6 of a box |
@@ -35,11 +37,13 @@ from bench.tables import Lines, Spread, say
 from hpcdem.physics.fdem import changes, convergence, diagnostics, user_laws
 from hpcdem.physics.fdem.pairs_space import ContactSpace
 from hpcdem.physics.flow.model import Flow
+from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.proppant.model import Proppant
 
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
-    "flowing-quads": 3e6, "wet": 6e6, "soaked": 3e6, "sandy": 5e6, "pairs": 3e6, "pairs-space": 1.5e6, "tets": 8e6,
+    "flowing-quads": 3e6, "wet": 6e6, "soaked": 3e6, "sandy": 5e6, "warm": 12e6,
+    "stepwise": 8e6, "pairs": 3e6, "pairs-space": 1.5e6, "tets": 8e6,
     "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
@@ -80,6 +84,8 @@ WORKLOADS = {
         Workload("wet-20k", "wet", 100),
         Workload("soaked-20k", "soaked", 100),
         Workload("sandy-20k", "sandy", 100),
+        Workload("warm-20k", "warm", 100),
+        Workload("stepwise-20k", "stepwise", 100),
         Workload("pairs-20k", "pairs", 141),
         Workload("pairs-space-20k", "pairs-space", 28),
         Workload("tets-20k", "tets", 15),
@@ -335,6 +341,21 @@ def sandy(sim: Any, side: int) -> None:
     sim.close_model()
 
 
+def warm(sim: Any, side: int, sub_steps: int = 0) -> None:
+    """Intact rock, warm on one side, with thermal stress."""
+    intact(sim, side)
+    heat = Heat.of(sim)
+    heat.assign(None, {"conductivity": 2.5, "capacity": 800.0, "expansion_coeficient": 1e-8})
+    heat.prescribe(np.flatnonzero(sim.mesh.points[:, 0] == sim.mesh.points[:, 0].min()), 1.0)
+    sim.heat_clock(steps=sub_steps)
+    sim.close_model()
+
+
+def stepwise(sim: Any, side: int) -> None:
+    """The same with a cycle of heat in each step."""
+    warm(sim, side, 1)
+
+
 def pairs(sim: Any, side: int) -> None:
     """Each square is two triangles that lie on each other along its diagonal, pressed and sheared."""
     mesh = square(side, gap=0.01)
@@ -402,6 +423,7 @@ def _swell(sim: Any, factor: float) -> None:
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
     "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "soaked": soaked, "sandy": sandy,
+    "warm": warm, "stepwise": stepwise,
     "pairs": pairs, "pairs-space": pairs_space, "tets": tets, "shattered": shattered, "own": own,
     "own-quads": own_quads,
 }  # fmt: skip
