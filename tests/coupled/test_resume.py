@@ -16,7 +16,7 @@ from tests.pcdc.test_whole import tables
 from tests.property.workers import Resident
 
 SCRIPT = Path(__file__).parent / "fall.sc"
-APART = ("run.json", ".lock", "stop", "peep")
+APART = ("run.json", "progress.json", ".lock", "stop", "peep")
 """Files that tell of the run, not of the model."""
 
 
