@@ -339,6 +339,15 @@ function axes(one, pen, w, h) {
   pen.beginPath();
   const { turn } = one;
   const step = round((right - left) * 110 * k / w), digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const write = (text, x, y) => {  // readable over the model
+    pen.save();
+    pen.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--stage");
+    pen.lineWidth = 3 * k;
+    pen.lineJoin = "round";
+    pen.strokeText(text, x, y);
+    pen.restore();
+    pen.fillText(text, x, y);
+  };
   const word = (v) => (step < 1e-4 || step >= 1e6 ? short(v, 4) : (Math.abs(v) < step / 2 ? 0 : v).toFixed(digits));
   if (turn) {
     const length = step * scale, [x0, y0] = [w - 14 * k - length, h - 12 * k];
@@ -346,11 +355,11 @@ function axes(one, pen, w, h) {
     const [cx, cy, reach] = [44 * k, h - 44 * k, 26 * k];
     pen.textAlign = "center";
     pen.textBaseline = "middle";
-    pen.fillText(`${word(step)} m`, x0 + length / 2, y0 - 11 * k);
+    write(`${word(step)} m`, x0 + length / 2, y0 - 11 * k);
     [0, 1, 2].forEach((n) => {
       const [x, y] = [turn[0][n], turn[1][n]];
       pen.moveTo(cx, cy); pen.lineTo(cx + reach * x, cy - reach * y);
-      pen.fillText("xyz"[n], cx + 1.4 * reach * x, cy - 1.4 * reach * y);
+      write("xyz"[n], cx + 1.4 * reach * x, cy - 1.4 * reach * y);
     });
     pen.stroke();
     pen.restore();
@@ -361,18 +370,18 @@ function axes(one, pen, w, h) {
   for (let n = Math.ceil(left / step); n * step <= right; n++) {
     const x = (n * step - left) * scale;
     pen.moveTo(x, h); pen.lineTo(x, h - 6 * k);
-    if (x > 50 * k && x < w - 30 * k) pen.fillText(word(n * step), x, h - 7 * k);
+    if (x > 50 * k && x < w - 30 * k) write(word(n * step), x, h - 7 * k);
   }
   pen.textAlign = "left";
   pen.textBaseline = "middle";
   for (let n = Math.ceil(bottom / step); n * step <= top; n++) {
     const y = (top - n * step) * scale;
     pen.moveTo(0, y); pen.lineTo(6 * k, y);
-    if (y > 30 * k && y < h - 24 * k) pen.fillText(word(n * step), 9 * k, y);
+    if (y > 30 * k && y < h - 24 * k) write(word(n * step), 9 * k, y);
   }
   pen.textAlign = "right";
   pen.textBaseline = "bottom";
-  pen.fillText("m", w - 6 * k, h - 7 * k);
+  write("m", w - 6 * k, h - 7 * k);
   pen.stroke();
   pen.restore();
 }
