@@ -42,6 +42,14 @@ def test_headings_leave_no_level_out(page: Path) -> None:
     assert levels[0] == 1 and all(after <= before + 1 for before, after in pairwise(levels))
 
 
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_tests_that_pages_name_are_there(page: Path) -> None:
+    """`tests/FILE.py::NAME`, and files and folders of tests by themselves."""
+    for file, name in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", page.read_text(encoding="utf-8")):
+        assert (ROOT / file).is_file(), file
+        assert not name or f"def {name}(" in (ROOT / file).read_text(encoding="utf-8"), f"{file}::{name}"
+
+
 def test_every_figure_is_on_a_page() -> None:
     used = {Path(link).name for page in PAGES for link in links(page)}
     assert not {path.name for path in (DOCS / "figures").iterdir()} - used
