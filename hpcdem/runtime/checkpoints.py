@@ -38,8 +38,8 @@ def go_back_to(path: Path, folders: list[Path], comm: Any) -> None:
 def none_before(before: float, folders: list[Path]) -> UsageError:
     """There is no checkpoint to go back to."""
     return UsageError(
-        f"--before {before:g}: no whole checkpoint in {' or '.join(map(str, folders))} is of that time of the model or "
-        "an earlier one (hpcdem info FILE.sav tells the time of each)"
+        f"no whole checkpoint in {' or '.join(map(str, folders))} is of {before:g} s of the model or an earlier time "
+        "(hpcdem info FILE.sav tells the time of each)"
     )
 
 

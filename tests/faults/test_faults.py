@@ -361,7 +361,7 @@ def test_a_run_goes_on_from_the_last_checkpoint_before_a_time(launch, script, un
     """81 s are step 2025. Later checkpoints of the run that was given up are passed over from then on."""
     assert launch(1, script, "--before", "81", cwd=script.parent).stderr.count("give --resume as well") == 1
     none = launch(1, script, "--resume", "--before", "39.9", "--no-figure", cwd=script.parent)
-    assert none.returncode == 2 and "--before 39.9: no whole checkpoint in" in none.stderr
+    assert none.returncode == 2 and "is of 39.9 s of the model or an earlier time" in none.stderr
     cut = launch(1, "resume", "--before", "81", "--time-limit", "0.001", "--no-figure", cwd=script.parent)
     assert cut.returncode == 85 and "going on from" in cut.stdout and "0000002000.sav" in cut.stdout, cut.stderr
     done = launch(1, "resume", "--no-figure", cwd=script.parent)

@@ -159,6 +159,28 @@ open(f"end_{sim.rank}.txt", "w").write(end)  # not printed: ranks write into one
     assert ends["cut"] == ends["whole"] * 2
 
 
+BACK = """\
+sim.set(save=100, print=0)
+sim.cycle(300)
+again, never = hpcdem.Simulation(), hpcdem.Simulation()
+assert again.resume(before=0.21) and again.steps == 300
+assert again.gather("y").tobytes() == sim.gather("y").tobytes()
+try:
+    never.resume(before=0.05)
+except hpcdem.HpcdemError as error:
+    open("said.txt", "w").write(str(error))
+"""
+
+
+def test_resumed_from_before_a_time(resident: Resident, tmp_path: Path) -> None:
+    """0.21 s are step 210."""
+    program(tmp_path, BACK)
+    done = resident(1, "study.py", "--no-figure", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "0000000200.sav, step 200" in done.stdout
+    assert "no whole checkpoint in" in (tmp_path / "said.txt").read_text()
+
+
 LOOK = """\
 import numpy as np
 sim.ball(50.0, 150.0, 2.0, group="stone")
