@@ -67,6 +67,7 @@ class LawsSpace(Local):
 
     def _make_warm(self) -> None:
         """What elements have before temperatures change it."""
+        self.heated = False
         self.warms = any(bool(one.any()) for one in self.sim.warms())
         self.stiff = self.c.copy() if self.warms else self.c
         self.initial_part: np.ndarray | None = None
@@ -87,6 +88,8 @@ class LawsSpace(Local):
     def _find_stress_without_strain(self) -> bool:
         """As in the plane: what was said of it and what heat brings, less the part of plastic and creep strain."""
         heat = self.sim.surface_loads.eigenstress(self.sim)
+        if heat is None and not (self.heated or self.plastic or self.creeps) and self.sim.stress0 is None:
+            return False  # of a table of zeros that nobody has written to nothing is in the memory
         self.s0[: self.count, :6] = self._stress
         if heat is not None:
             self.s0[: self.count, NORMAL] += heat[:, None]

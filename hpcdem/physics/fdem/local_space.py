@@ -142,13 +142,23 @@ class LocalSpace(LawsSpace):
 
     def _mark_special(self) -> None:
         """All forces are stored. Of hexahedra only one corner at each of their points has some."""
-        self.pulled = self.node_begin, self.node_corner
+        self.pulled: tuple[np.ndarray, np.ndarray] | None = None
         if self.hexes is not None:
             some = self.true_mass.reshape(-1)[self.node_corner // tets.STRIDE] > 0.0
             before = np.concatenate([[0], np.cumsum(some)])
             self.pulled = before[self.node_begin], self.node_corner[some]
         if len(self.force) < len(self.sim.number):
             self.force = np.zeros((len(self.sim.number), self.force_width))
+
+    def _place_nodes(self, mass: np.ndarray) -> int:
+        """Only the corners of nodes are kept."""
+        self.node_corner, self.node_place, self.node_again = (
+            np.empty(len(self.node_corner), np.int64) for _ in range(3)
+        )
+        lost = super()._place_nodes(mass)
+        self.node_corner = self.node_corner.astype(np.int32)
+        self.node_place = self.node_again = np.empty(0, np.int64)
+        return lost
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Stiffness (n_own, 4) [N/m] and dashpots (n_own, 4) [N s/m] at each corner, as in the plane: of its joints,
@@ -222,7 +232,7 @@ class LocalSpace(LawsSpace):
 
     def _set_kicks(self, dt: float) -> None:
         mass = self.mass[self.sim.owned]
-        self.kick = np.divide(dt, mass, out=np.zeros_like(mass), where=self.alone())
+        self.kick = np.divide(dt, mass, out=np.zeros(mass.shape), where=self.alone())
         self.some_alone = bool(self.alone().any())
 
     def _bind(self) -> None:
@@ -301,8 +311,9 @@ class LocalSpace(LawsSpace):
         if table is None:
             half = 0.5 * clock.dt if sim.options.dynamic else 0.0
             table = self.conditions_now(self.node_functions, clock.time, clock.time + half, clock.dt)
+        pulled = (self.node_begin, self.node_corner) if self.pulled is None else self.pulled
         self._move(
-            sim.threads, self.node_begin, self.node_corner, *self.pulled, self.node_kick, self.node_condition,
+            sim.threads, self.node_begin, self.node_corner, *pulled, self.node_kick, self.node_condition,
             self.node_share, table, self.some_applied, self.force, self.applied, sim.v, alpha, self.outside, self.felt,
         )  # fmt: skip
 

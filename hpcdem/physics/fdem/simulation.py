@@ -566,7 +566,7 @@ class Blocks(State):
             self.local = LocalSpace(self) if self.dim == 3 else Local(self)
             if not frozen:
                 self.origin = self.x[self.owned].copy()
-                self.listed = self.origin.copy()
+                self.listed = self.origin  # until lists are renewed without storage
                 self.rebuild_state.age = self.rebuild_state.stored = 0
                 self._note_time()
             self.rebuilds += 1

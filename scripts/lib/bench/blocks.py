@@ -18,6 +18,9 @@
 | pairs-20k | 20 000 touching pairs with friction; counted in pairs per second of the contact stage alone |
 | pairs-space-20k | 20 000 touching pairs of tetrahedra: two plates that lie on each other |
 | tets-20k, tets-200k | tetrahedra as one body in vibration, 6 of a box |
+| jointed-tets-20k, jointed-tets-200k | the same with a joint before its peak on every inner face |
+| hexes-3k, hexes-33k | hexahedra as one body in vibration |
+| plastic-hexes-3k | the same of a rock that can yield and does not |
 | shattered-20k | every edge open, all neighbours pressed together: the whole step |
 """
 
@@ -43,7 +46,8 @@ from hpcdem.physics.proppant.model import Proppant
 RATES = {
     "intact": 15e6, "plastic": 12e6, "flowing": 8e6, "yielded": 3e6, "quads": 10e6, "plastic-quads": 7e6,
     "flowing-quads": 3e6, "wet": 6e6, "soaked": 3e6, "sandy": 5e6, "warm": 12e6,
-    "stepwise": 8e6, "pairs": 3e6, "pairs-space": 1.5e6, "tets": 8e6,
+    "stepwise": 8e6, "pairs": 3e6, "pairs-space": 1.5e6, "tets": 8e6, "jointed-tets": 5e6, "hexes": 2e6,
+    "plastic-hexes": 1e6,
     "shattered": 1e6, "own": 15e6, "own-quads": 10e6,
 }  # fmt: skip
 """Element-steps per second from which the number of steps follows."""
@@ -62,9 +66,9 @@ class Workload:
 
     @property
     def elements(self) -> int:
-        """Triangles, quads, or tetrahedra."""
-        if self.kind == "tets":
-            return 6 * self.side**3
+        """Triangles, quads, tetrahedra or hexahedra."""
+        if "tets" in self.kind or "hexes" in self.kind:
+            return (6 if "tets" in self.kind else 1) * self.side**3
         return 12 * self.side**2 if self.kind == "pairs-space" else self.side**2 * (1 if "quads" in self.kind else 2)
 
 
@@ -90,6 +94,11 @@ WORKLOADS = {
         Workload("pairs-space-20k", "pairs-space", 28),
         Workload("tets-20k", "tets", 15),
         Workload("tets-200k", "tets", 32),
+        Workload("jointed-tets-20k", "jointed-tets", 15),
+        Workload("jointed-tets-200k", "jointed-tets", 32),
+        Workload("hexes-3k", "hexes", 15),
+        Workload("hexes-33k", "hexes", 32),
+        Workload("plastic-hexes-3k", "plastic-hexes", 15),
         Workload("shattered-20k", "shattered", 100),
     )
 }
@@ -128,7 +137,11 @@ def blocks(names: list[str], layouts: list[Layout], repeats: int, seconds: float
             ]
             speed = Spread.of(r["element_steps_per_s"] for r in rows)
             pairs = Spread.of(r["pairs_per_s"] for r in rows)
-            say(f"{name:<14} {layout}: {speed.text(1e6)} M element-steps/s, {pairs.text(1e6)} M pairs/s")
+            own = Spread.of(r["element_steps_per_s"] / r["cpu_use"] for r in rows)
+            say(
+                f"{name:<14} {layout}: {speed.text(1e6)} M element-steps/s, {own.text(1e6)} M by processor time, "
+                f"{pairs.text(1e6)} M pairs/s"
+            )
     for layout in layouts:
         if math.isfinite(part := sub_step(lines.rows, layout)):
             say(f"{layout}: a sub-step of flow takes {part:.2f} of a step of intact-20k")
@@ -174,6 +187,8 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     touching = sim.comm.allgather(_touching(local))
     ranks = sim.comm.allgather((seconds, used, own, sim.n_own))
     wall, n = max(r[0] for r in ranks), sum(r[3] for r in ranks)
+    if sim.dim == 3:  # a hexahedron is stored as six tetrahedra
+        n -= 5 * len(sim.the_mesh().hexes)
     contact = max(r[2].get("contact", 0.0) for r in ranks)
     stages = {
         name: {"mean": sum(r[2].get(name, 0.0) for r in ranks) / len(ranks),
@@ -383,13 +398,38 @@ def pairs_space(sim: Any, side: int) -> None:
     sim.close_model()
 
 
-def tets(sim: Any, side: int) -> None:
-    """A cube of side x side x side boxes of six tetrahedra without joints, in vibration."""
+def tets(sim: Any, side: int, joints: bool = False) -> None:
+    """A cube of side x side x side boxes of six tetrahedra, in vibration."""
     from hpcdem.pre.mesh import structured_space
 
     line = 0.01 * np.arange(side + 1)
-    sim.take_mesh(structured_space.box((line, line, line), 6))
+    _swing(sim, structured_space.box((line, line, line), 6), joints)
+
+
+def jointed_tets(sim: Any, side: int) -> None:
+    """The same with joints, all before their peak."""
+    tets(sim, side, joints=True)
+
+
+def hexes(sim: Any, side: int) -> None:
+    """The same cube of hexahedra."""
+    from hpcdem.pre.mesh import structured_space
+
+    line = 0.01 * np.arange(side + 1)
+    _swing(sim, structured_space.hexes((line, line, line)), False)
+
+
+def plastic_hexes(sim: Any, side: int) -> None:
+    """The same of a rock that is too strong to yield."""
+    hexes(sim, side)
+    _yields(sim, 1e9)
+
+
+def _swing(sim: Any, mesh: Any, joints: bool) -> None:
+    sim.take_mesh(mesh)
     changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    if joints:
+        sim.joint_model(None, "classic_intrinsic_cohesive_interface", JOINT)
     sim.option(collision=False)
     sim.close_model()
     corners = (slice(None), slice(None), slice(0, 3))
@@ -423,7 +463,7 @@ def _swell(sim: Any, factor: float) -> None:
 MAKERS = {
     "intact": intact, "plastic": plastic, "flowing": flowing, "yielded": yielded, "quads": quads,
     "plastic-quads": plastic_quads, "flowing-quads": flowing_quads, "wet": wet, "soaked": soaked, "sandy": sandy,
-    "warm": warm, "stepwise": stepwise,
-    "pairs": pairs, "pairs-space": pairs_space, "tets": tets, "shattered": shattered, "own": own,
+    "warm": warm, "stepwise": stepwise, "pairs": pairs, "pairs-space": pairs_space, "tets": tets,
+    "jointed-tets": jointed_tets, "hexes": hexes, "plastic-hexes": plastic_hexes, "shattered": shattered, "own": own,
     "own-quads": own_quads,
 }  # fmt: skip
