@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -346,14 +346,16 @@ class Simulation(BlockCommands):
         xp: float | None = None,
         yp: float | None = None,
         law: str | None = None,
+        between: Sequence[str] = (),
         parameter: Mapping[str, float] | None = None,
     ) -> None:
         """PROP: properties, velocities, colour and group of particles; what is left out stays. law: 'file.py:function'
-        beside the program (docs/user_laws.md), or "linear"; parameter: properties that it declares."""
+        beside the program (docs/user_laws.md), or "linear"; parameter: properties that it declares; between: the law is
+        that of pairs of discs with these two."""
         dem.properties.prop(
             self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
             hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
-            law=law, parameter=parameter, folder=self.directory,
+            law=law, between=between, parameter=parameter, folder=self.directory,
         )  # fmt: skip
 
     @_command

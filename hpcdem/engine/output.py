@@ -272,7 +272,7 @@ def tell_energy(sim: Simulation) -> None:
     rows = [
         (words, f"{getattr(seen, name):.6g}")
         for name, words in ENERGY_WORDS.items()
-        if name != "work_blocks" or seen.work_blocks
+        if name not in ("work_blocks", "loss_laws") or getattr(seen, name)
     ]
     rows += [(name, f"{value:.6g}") for name, value in of_physics.items()]
     joule = label(sim.settings.units, "J")
@@ -300,6 +300,7 @@ ENERGY_WORDS = {
     "loss_bonds": "lost when bonds broke",
     "loss_opened": "lost when contacts opened",
     "loss_stiffness": "lost by change of shear stiffness",
+    "loss_laws": "lost in pairs with a law of the user",
     "commands": "brought by commands",
     "box": "brought by leaving the BOX",
     "work_blocks": ACROSS,

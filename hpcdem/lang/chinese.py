@@ -202,6 +202,8 @@ ZDEM_KEYWORDS = {
     "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a built-in "
     "one again":
     "这些颗粒之间遵循用户 Python 文件中的接触律(docs/user_laws.md);linear:恢复内置接触律",
+    "this law is that of pairs of discs that have these two laws, instead of a law of particles":
+    "此接触律用于分别具有这两种接触律的颗粒之间,而不是颗粒自身的接触律",
     "properties that this law declares": "该接触律声明的性质",
     "velocity in x": "x 方向速度",
     "velocity in y": "y 方向速度",

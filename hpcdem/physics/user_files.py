@@ -241,17 +241,17 @@ def checked(
     return list(arguments)
 
 
-def check_what_returns(kernel: Any, count: int, wanted: Sequence[str], path: str, line: int) -> None:
-    """Wrong unless a kernel of `count` floats returns as many as wanted."""
+def check_what_returns(kernel: Any, count: int, wanted: Sequence[str], path: str, line: int, what: str = "law") -> None:
+    """Wrong unless a kernel of `count` floats returns as many as wanted; what: it is."""
     from numba import types
 
     found: Any = compiled(kernel, (types.float64,) * count, path, line)
     given = list(getattr(found, "types", [found]))
     if len(given) != len(wanted) or not isinstance(found, types.BaseTuple):
-        raise Wrong(line, f"the law must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
-    for what, type_ in zip(wanted, given):
+        raise Wrong(line, f"the {what} must return {len(wanted)} numbers ({', '.join(wanted)}), it returns {found}")
+    for one, type_ in zip(wanted, given):
         if type_ != types.float64:
-            raise Wrong(line, f"the law must return {what} as a float (0.0, not 0), it returns {type_}")
+            raise Wrong(line, f"the {what} must return {one} as a float (0.0, not 0), it returns {type_}")
 
 
 def stiffness_of(declared: Declared, law: str, values: Mapping[str, np.ndarray], unit: str) -> np.ndarray | None:

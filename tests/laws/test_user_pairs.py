@@ -11,12 +11,12 @@ import pytest
 
 from hpcdem.commands.dem import bonds, cycles, history, particles, properties, settings
 from hpcdem.core.errors import CommandError
-from hpcdem.core.selection import Ids
+from hpcdem.core.selection import Group, Ids
 from hpcdem.physics.dem import diagnostics
 from tests import support
 
 HERE = Path(__file__).resolve().parent
-LINEAR, STICKY = "pairs.py:linear", "pairs.py:sticky"
+LINEAR, STICKY, UNTOLD = "pairs.py:linear", "pairs.py:sticky", "pairs.py:untold"
 
 
 def two(tmp_path, speed=0.0, spin=0.0, apart=0.98, **given):
@@ -46,12 +46,7 @@ def test_a_heap_with_the_linear_law_has_the_bits_of_the_built_in_one(tmp_path):
     """Wherever discs lie, slide and part; with one thread and with three."""
     found = []
     for law, threads in ((None, 1), (LINEAR, 1), (LINEAR, 3)):
-        sim = support.model(tmp_path, dt=2e-4, disk="off")
-        sim.threads = threads
-        rng = np.random.default_rng(5)
-        for gid, (x, y) in enumerate(rng.uniform(0.0, 12.0, (300, 2)).tolist()):
-            particles.ball(sim, gid, x, y, 0.3 + 0.2 * rng.random())
-        properties.prop(sim, density=1000.0, kn=1e5, ks=8e4, fric=0.4, damp=0.3, law=law, folder=HERE)
+        sim = heap(tmp_path, threads, law=law)
         support.steps(sim, 200)
         order = np.argsort(sim.particles["gid"])
         hist = sim.lists.histories(sim.particles.ihot, float(sim.stamp))
@@ -77,6 +72,143 @@ def test_pairs_with_other_laws_beside_it(tmp_path):
     support.steps(sim, 50)
     fx = dict(zip(sim.particles["gid"].tolist(), sim.lists.owned_forces()[:, 0].tolist()))
     assert fx[1] == pytest.approx(1500.0, rel=1e-6) and fx[3] == pytest.approx(1000.0, rel=1e-3)
+
+
+HEAP = {"density": 1000.0, "kn": 1e5, "ks": 8e4, "fric": 0.4, "damp": 0.3}
+
+
+def heap(tmp_path, threads=1, **given):
+    """300 discs that fall apart and against each other; half of them are group 1."""
+    sim = support.model(tmp_path, dt=2e-4, disk="off")
+    sim.threads = threads
+    rng = np.random.default_rng(5)
+    for gid, (x, y) in enumerate(rng.uniform(0.0, 12.0, (300, 2)).tolist()):
+        particles.ball(sim, gid, x, y, 0.3 + 0.2 * rng.random())
+    properties.prop(sim, **HEAP, **given, folder=HERE)
+    properties.prop(sim, Ids(0, 149), group="one")
+    return sim
+
+
+def bits(sim):
+    order = np.argsort(sim.particles["gid"])
+    return sim.particles.hot[sim.particles.n_left :][: len(order)][order][:, :6].tobytes()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_two_laws_with_the_arithmetic_of_the_built_in_one_have_its_bits(tmp_path, threads):
+    """Of two files, and where they meet the built-in one, or one of them."""
+    shutil.copy(HERE / "pairs.py", tmp_path / "own.py")
+    plain = heap(tmp_path)
+    support.steps(plain, 200)
+    for meet in ("linear", LINEAR):
+        sim = heap(tmp_path, threads)
+        properties.prop(sim, law="own.py:linear", folder=tmp_path)
+        properties.prop(sim, Group("one"), law=LINEAR, folder=HERE)
+        properties.prop(sim, law=meet, between=(LINEAR, "own.py:linear"), folder=HERE)
+        support.steps(sim, 200)
+        assert bits(sim) == bits(plain)
+
+
+def test_what_discs_of_two_laws_do(tmp_path):
+    """Each two alike follow their law with properties of their own; those that meet the law that is said for them,
+    with the properties that are said; until then they have none in common."""
+    sim = support.model(tmp_path, dt=1e-4, disk="off")
+    for gid in range(8):
+        particles.ball(sim, gid, 0.98 * (gid % 2) + 5.0 * (gid // 2), 0.0, 0.5)
+    properties.prop(sim, density=1000.0, kn=2e5, ks=1e5, fric=0.5)
+    shutil.copy(HERE / "pairs.py", tmp_path / "own.py")
+    for of in (Ids(0, 1), Ids(4, 4)):
+        properties.prop(sim, of, law=STICKY, parameter={"pull": 500.0}, folder=HERE)
+    for of in (Ids(2, 3), Ids(5, 6)):
+        properties.prop(sim, of, law="own.py:sticky", parameter={"pull": 300.0, "stiffening": 3.0}, folder=tmp_path)
+    with pytest.raises(CommandError, match=r"have several laws, pairs\.py:sticky, own\.py:sticky; RANGE chooses"):
+        properties.prop(sim, Ids(0, 5), parameter={"pull": 2.0})
+    properties.fix(sim, ("x", "y", "spin"))
+    with pytest.raises(CommandError, match=r"4 and 5 touch, but one has the law pairs.py:sticky and the other own.py"):
+        cycles.cycle(sim, 1)
+    properties.prop(
+        sim, law=STICKY, between=("own.py:sticky", STICKY), parameter={"pull": 100.0, "stiffening": 4.0}, folder=HERE
+    )
+    with pytest.raises(CommandError, match=r"6 and 7 touch, but one has the law own.py:sticky and the other linear"):
+        cycles.cycle(sim, 1)
+    properties.prop(sim, law="linear", between=("own.py:sticky", "linear"))
+    cycles.cycle(sim, 1)
+    sim.particles["vx"][sim.particles["gid"] % 2 == 1] = 1.0
+    support.steps(sim, 50)  # by 5 mm apart
+    fx = dict(zip(sim.particles["gid"].tolist(), sim.lists.owned_forces()[:, 0].tolist()))
+    wanted = {1: 2000.0 - 2 * 500.0, 3: 2000.0 - 3 * 500.0, 5: 2000.0 - 4 * 500.0, 7: 1500.0}
+    assert [fx[k] for k in wanted] == pytest.approx(list(wanted.values()), abs=1.0)
+    support.steps(sim, 100)
+    fx = dict(zip(sim.particles["gid"].tolist(), sim.lists.owned_forces()[:, 0].tolist()))
+    wanted = {1: -500.0, 3: -300.0, 5: -100.0, 7: 500.0}
+    assert [fx[k] for k in wanted] == pytest.approx(list(wanted.values()), abs=1.0)
+
+
+def test_a_contact_that_gets_another_law_has_forgotten(tmp_path):
+    shutil.copy(HERE / "pairs.py", tmp_path / "own.py")
+    sim = two(tmp_path, law=STICKY, parameter={"pull": 1e9})
+    support.steps(sim, 10)
+    assert memory(sim) == pytest.approx([0.02, 1.001])
+    properties.prop(sim, law="own.py:sticky", parameter={"pull": 1e9}, folder=tmp_path)
+    support.steps(sim, 3)
+    assert memory(sim) == pytest.approx([0.02, 1.0003])
+    properties.prop(sim, law=STICKY, parameter={"pull": 1e9}, folder=HERE)
+    support.steps(sim, 2)
+    assert memory(sim) == pytest.approx([0.02, 1.0002])
+
+
+def test_between_refuses_what_makes_no_sense(tmp_path):
+    sim = two(tmp_path, law=LINEAR)
+    for given, said in (
+        ({"law": LINEAR, "between": (LINEAR, LINEAR)}, "both are pairs.py:linear"),
+        (
+            {"law": LINEAR, "between": (LINEAR, STICKY)},
+            "no disc was given the law pairs.py:sticky; there is",
+        ),
+        ({"law": STICKY, "between": (LINEAR, "linear")}, "needs pull"),
+        ({"law": "linear", "between": (LINEAR, "linear"), "parameter": {"pull": 1.0}}, "parameter belongs to a law of"),
+        ({"law": LINEAR, "between": (LINEAR, "linear"), "kn": 1.0}, "between takes a law and its parameter"),
+        ({"between": (LINEAR, "linear")}, "between takes a law and its parameter"),
+    ):
+        with pytest.raises(CommandError, match=said):
+            properties.prop(sim, folder=HERE, **given)
+
+
+def test_the_account_of_the_linear_law_is_that_of_the_built_in_one(tmp_path):
+    """What it loses is what slips, and what was strained where contacts open; both close alike."""
+    found = []
+    for law in (None, LINEAR):
+        sim = heap(tmp_path, law=law)
+        properties.prop(sim, damp=0.0)
+        settings.set_option(sim, "energy", 50)
+        cycles.cycle(sim, 300)
+        found.append(sim.energy.look(sim))
+    plain, own = found
+    for name in ("kinetic_translation", "elastic_normal", "elastic_shear"):
+        assert getattr(own, name) == pytest.approx(getattr(plain, name), rel=1e-12), name
+    assert plain.loss_laws == own.loss_friction == own.loss_opened == 0.0 < plain.loss_friction
+    assert own.loss_laws == pytest.approx(plain.loss_friction + plain.loss_opened, rel=1e-9)
+    assert own.closing == pytest.approx(plain.closing, abs=1e-9 * own.loss_laws)
+    assert abs(own.closing) < 1e-3 * plain.kinetic_translation
+
+
+def test_the_account_of_a_law_that_unloads_along_another_line(tmp_path):
+    """Two discs that meet with 2 m/s: loading up to the overlap m stores and loses k m^2 / 2 together; of it k m^2 / (2
+    s) comes back, as their speed, and the rest is lost: their speed after it is sqrt(1 / s) of that before."""
+    sim = support.model(tmp_path, dt=1e-5, disk="off")
+    for gid in range(2):
+        particles.ball(sim, gid, 1.001 * gid, 0.0, 0.5)
+    given = {"density": 1000.0, "kn": 2e6, "ks": 1e6, "fric": 0.0, "law": STICKY}
+    properties.prop(sim, **given, parameter={"pull": 0.0, "stiffening": 4.0}, folder=HERE)
+    sim.particles["vx"][:] = np.where(sim.particles["gid"] == 0, 1.0, -1.0)
+    settings.set_option(sim, "energy", 100)
+    cycles.cycle(sim, 50)
+    before = sim.energy.look(sim).kinetic_translation
+    cycles.cycle(sim, 10000)
+    seen = sim.energy.look(sim)
+    assert seen.elastic_normal == 0.0 and seen.kinetic_translation == pytest.approx(before / 4.0, rel=1e-3)
+    assert seen.loss_laws == pytest.approx(0.75 * before, rel=1e-3)
+    assert abs(seen.closing) < 1e-3 * before
 
 
 def test_what_a_law_is_given(tmp_path):
@@ -159,6 +291,11 @@ def test_the_time_step_follows_its_stiffness(tmp_path):
          "law.py:3: property 'a' is declared, but neither"),
         ("@pair_law()\ndef hard(u, fs):\n    return u, fs\n", "law.py: there is no law 'soft' in it; there is hard"),
         ("@pair_law(\n", "law.py:3: "),
+        ("def kept(u, dt):\n    return u, 0.0\n\n@pair_law(energy=kept)\ndef soft(u, fs):\n    return u, fs\n",
+         "law.py:3: 'dt' is no argument of an energy function; there is u, fs, two_rt, kn"),
+        ("def kept(u):\n    return u\n\n@pair_law(energy=kept)\ndef soft(u, fs):\n    return u, fs\n",
+         r"law.py:3: the energy must return 2 numbers \(normal, shear\)"),
+        ("@pair_law(energy=1.0)\ndef soft(u, fs):\n    return u, fs\n", "law.py:3: energy must be a function, got 1.0"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_file_is_told_with_its_line(tmp_path, text, said):
@@ -187,14 +324,22 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     sim = two(tmp_path, law=LINEAR)
     with pytest.raises(CommandError, match=r"bonds are not for a model with a law of the user, pairs\.py:linear"):
         bonds.bond(sim, n_bond=1.0, s_bond=1.0)
-    with pytest.raises(CommandError, match="stores and loses is not known"):
+
+
+def test_energy_is_refused_by_name_where_a_law_does_not_tell_it(tmp_path):
+    sim = two(tmp_path, law=LINEAR)
+    settings.set_option(sim, "energy", 10)
+    history.hist(sim, 1, 10, "energy")
+    with pytest.raises(CommandError, match=r"SET energy: what the law pairs\.py:untold stores is not known"):
+        properties.prop(sim, law=UNTOLD, folder=HERE)
+    settings.set_option(sim, "energy", 0)
+    with pytest.raises(CommandError, match=r"HIST energy: what the law pairs\.py:untold stores is not known"):
+        properties.prop(sim, law=UNTOLD, folder=HERE)
+    sim = two(tmp_path, law=UNTOLD)
+    with pytest.raises(CommandError, match=r"SET energy: what the law pairs\.py:untold stores is not known"):
         settings.set_option(sim, "energy", 10)
-    with pytest.raises(CommandError, match="HIST energy"):
+    with pytest.raises(CommandError, match=r"HIST energy: what the law pairs\.py:untold stores is not known"):
         history.hist(sim, 1, 10, "energy")
-    with pytest.raises(CommandError, match=r"other particles have the law pairs\.py:linear"):
-        properties.prop(sim, Ids(0, 0), law=STICKY, parameter={"pull": 1.0}, folder=HERE)
-    properties.prop(sim, law=STICKY, parameter={"pull": 1.0}, folder=HERE)  # all of them change over
-    settings.set_option(two(tmp_path), "energy", 10)
 
 
 def test_a_law_that_is_stiffer_than_it_says_is_refused(tmp_path):
@@ -214,7 +359,7 @@ def test_a_law_that_is_stiffer_than_it_says_is_refused(tmp_path):
 
 
 def test_mixed_pairs_stop_the_run(tmp_path):
-    """A law of the user beside a built-in one: such discs have no common law when they meet."""
+    """A law of the user beside a built-in one: such discs have no common law when they meet, unless one is said."""
     sim = two(tmp_path)
     properties.prop(sim, Ids(1, 1), law=LINEAR, folder=HERE)
     with pytest.raises(Exception, match="law"):
@@ -226,4 +371,4 @@ def test_the_file_can_lie_anywhere(tmp_path):
     sim = support.model(tmp_path, dt=1e-4, disk="off")
     particles.ball(sim, 0, 0.0, 0.0, 0.5)
     properties.prop(sim, law="own.py:linear", folder=tmp_path)
-    assert sim.pair_law is not None and sim.pair_law.title == "own.py:linear" and math.isclose(sim.stamp, 1)
+    assert sim.own_laws.titles == "own.py:linear" and math.isclose(sim.stamp, 1)

@@ -27,6 +27,10 @@ CYC 1500
 STOP
 """
 WORDS = {"built-in": "", "linear": "law pairs.py:linear", "sticky": "law pairs.py:sticky parameter pull 2e3"}
+WORDS["two"] = f"""{WORDS["sticky"]}
+PROP law pairs.py:linear RANGE x (0 30)
+PROP law pairs.py:sticky between pairs.py:linear|pairs.py:sticky parameter pull 1e3
+SET energy 500"""
 SLOW = pytest.mark.slow
 
 
@@ -40,7 +44,7 @@ def run(launch: Launcher, folder: Path, law: str, ranks: int, *options: str) -> 
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All three on one rank with one thread."""
+    """All of them on one rank with one thread."""
     folder = tmp_path_factory.mktemp("alone")
     for law in WORDS:
         run(Launcher(), folder / law, law, 1)
@@ -67,8 +71,18 @@ def test_contacts_remember(alone):
     assert states(alone / "linear")["particles/x"].tobytes() != sticky["particles/x"].tobytes()
 
 
+def test_two_laws_keep_an_account(alone):
+    """It closes to a thousandth of what the wall, gravity and damping move; each law is at work."""
+    rows = np.genfromtxt(alone / "two" / "data" / "energy.csv", delimiter=",", names=True)
+    assert abs(rows["relative"][-1]) < 1e-3 and rows["loss_laws"][-1] > 0.0 < rows["elastic_normal"][-1]
+    two = states(alone / "two")
+    for law in ("linear", "sticky"):
+        assert two["particles/x"].tobytes() != states(alone / law)["particles/x"].tobytes()
+    assert set(np.unique(two["pairs/memory0"] % 1.0).tolist()) == {0.0, 1.0 / 64.0}
+
+
 @pytest.mark.mpi
-@pytest.mark.parametrize("law", ["sticky", pytest.param("linear", marks=SLOW)])
+@pytest.mark.parametrize("law", ["two", pytest.param("sticky", marks=SLOW), pytest.param("linear", marks=SLOW)])
 @pytest.mark.parametrize("ranks, threads", [(2, 1), pytest.param(4, 1, marks=SLOW), pytest.param(1, 2, marks=SLOW)])
 def test_ranks_and_threads_do_not_change_a_bit(alone, launch, tmp_path, law, ranks, threads):
     run(launch, tmp_path, law, ranks, "-j", str(threads))
@@ -79,13 +93,13 @@ def test_ranks_and_threads_do_not_change_a_bit(alone, launch, tmp_path, law, ran
 @pytest.mark.parametrize("ranks", [2, pytest.param(4, marks=SLOW)])
 def test_a_restart_does_not_change_a_bit(alone, launch, tmp_path, ranks):
     """From step 1000, in the middle of the first CYC."""
-    shutil.copytree(alone / "sticky", tmp_path / "run")
+    shutil.copytree(alone / "two", tmp_path / "run")
     data = tmp_path / "run" / "data"
     for path in [*data.glob("*.sav")]:
         if int(path.stem.rpartition("_")[2]) > 1000:
             path.unlink()
-    run(launch, tmp_path / "run", "sticky", ranks, "--resume")
-    assert_same_files(alone / "sticky" / "data", data)
+    run(launch, tmp_path / "run", "two", ranks, "--resume")
+    assert_same_files(alone / "two" / "data", data)
 
 
 def test_another_text_does_not_go_on(alone, launch, tmp_path):
@@ -120,5 +134,5 @@ def test_a_wrong_law_stops_before_the_first_line(launch, tmp_path):
     (tmp_path / "push.py").write_text(PUSH.replace("LAW", WORDS["linear"]))
     done = launch(1, "push.py", "--no-figure", cwd=tmp_path)
     assert done.returncode != 0
-    assert "push.py:5: PROP: pairs.py:6: the law must return 2 numbers (fn, fs), it returns float64" in done.stderr
+    assert "push.py:5: PROP: pairs.py:10: the law must return 2 numbers (fn, fs), it returns float64" in done.stderr
     assert not (tmp_path / "data").exists() or not list((tmp_path / "data").glob("*.vtkhdf"))

@@ -139,8 +139,8 @@ def test_the_models_use_every_word_of_the_language() -> None:
     known |= {(command.name, o.name) for command in t.COMMANDS for o in (*command.leading, *command.options)}
     # INIT is another name of PROP; what it takes is drawn there.
     known -= {("INIT", option.name) for command in t.COMMANDS if command.name == "INIT" for option in command.options}
-    # A law of the user goes with a Python file, and with neither bonds nor energies: tests/parallel/test_pair_laws.py.
-    known -= {("PROP", "law"), ("PROP", "parameter")}
+    # A law of the user goes with a Python file, and not with bonds: tests/parallel/test_pair_laws.py.
+    known -= {("PROP", "law"), ("PROP", "between"), ("PROP", "parameter")}
     assert sorted(known - used) == []
     assert {term.name for term in t.RANGE_TERMS} - terms == set()
 

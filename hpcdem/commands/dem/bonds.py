@@ -57,8 +57,8 @@ def bond(
         given["rubber"] = 1.0
         if sim.log is not None:
             sim.log.warn_once("rubber", "rubber: the mark is kept and written, it has no effect on the motion")
-    if sim.pair_law is not None:
-        raise CommandError(f"bonds are not for a model with a law of the user, {sim.pair_law.title}")
+    if sim.own_laws:
+        raise CommandError(f"bonds are not for a model with a law of the user, {sim.own_laws.titles}")
     gap = TOLERATE if tolerate is None else tolerate
     scale = 1.0 if rext is None else rext
     if scale <= 0.0:

@@ -157,17 +157,22 @@ def _described(sim: Simulation, which: np.ndarray, what: str) -> str:
 
 
 def _check_laws(sim: Simulation) -> None:
-    """Pairs in the list of which one particle is Hertz and the other linear have no law."""
+    """Pairs in the list of which the particles have different laws have none, unless one is said for the two."""
     if not np.isnan(sim.pair_laws[:, MODEL]).any():
         return
     _, iout = diagnostics.contact_rows(sim)
     p = sim.particles
-    hertz = dict(zip(p.ihot[:, 7].tolist(), sim.materials.rows["hertz"][p.ihot[:, 6]].tolist(), strict=True))
-    mixed = [(a, b) for a, b, _ in iout.tolist() if hertz[a] != hertz[b]]
+    material = dict(zip(p.ihot[:, 7].tolist(), p.ihot[:, 6].tolist(), strict=True))
+    n, lost = len(sim.materials), np.isnan(sim.pair_laws[:, MODEL])
+    mixed = [
+        (a, b, *(sim.own_laws.title_of(sim.materials.rows[material[x]]) for x in (a, b)))
+        for a, b, _ in iout.tolist()
+        if lost[material[a] * n + material[b]]
+    ]
     first = [pairs[0] for pairs in sim.comm.allgather(mixed[:1]) if pairs]
     if first:
-        a, b = first[0]
-        raise CommandError(f"particles {a} and {b} touch, but one has the Hertz law and the other the linear one")
+        a, b, one, other = first[0]
+        raise CommandError(f"particles {a} and {b} touch, but one has the law {one} and the other {other}")
 
 
 def time_step(sim: Simulation) -> float:

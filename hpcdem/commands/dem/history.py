@@ -21,8 +21,8 @@ def hist(sim: Simulation, id: int, interval: int, what: str) -> None:
     """
     if interval <= 0:
         raise CommandError(f"HIST INTERVAL must be positive, got {interval}")
-    if what == "energy" and sim.pair_law is not None:
-        raise CommandError(f"HIST energy: what the law {sim.pair_law.title} stores is not known")
+    if what == "energy" and (law := sim.own_laws.unaccounted()):
+        raise CommandError(f"HIST energy: what the law {law} stores is not known: pair_law(energy=) says it")
     sim.history_origins.pop(id, None)
     name = what.split()[0] if what.split() else ""
     if name in OF_PARTS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +13,9 @@ from hpcdem.core.selection import Chain, Group, Selection, has_expressions
 from hpcdem.physics.dem import user_laws
 from hpcdem.physics.dem.materials import OWN
 from hpcdem.physics.dem.simulation import Simulation
-from hpcdem.physics.dem.user_laws import PairLaw
+from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
 
 MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "xp", "yp")
-LINEAR = "linear"
-"""In the place of a law of the user: the built-in one."""
 NOT_NEGATIVE = ("density", "fric", "shear", "damp", "kn", "ks")
 
 
@@ -66,6 +64,7 @@ def prop(
     color: int | None = None,
     group: str | None = None,
     law: str | None = None,
+    between: Sequence[str] = (),
     parameter: Mapping[str, float] | None = None,
     folder: Path = Path(),
 ) -> None:
@@ -75,10 +74,18 @@ def prop(
     kn or ks without it the linear one. xp, yp [Pa] push each particle with pressure 2 R thickness (decision: the source
     shows the words only; published scripts press the particles of a freed side wall with them).
     law: 'file.py:function' of the user, in `folder` (physics/dem/user_laws.py), or LINEAR, which takes it back;
-    parameter: properties that it declares. Walls go on with kn and ks, or HERTZ.
+    parameter: properties that it declares. Walls go on with kn and ks, or HERTZ. between: two laws, 'file.py:function',
+    LINEAR or "hertz"; `law`, of the user or LINEAR, is then that of pairs of discs that have these, and nothing else is
+    set.
     Existing contacts use the new values from the next step. Velocities of a clump are those of its centre; its members
     follow.
     """
+    if between:
+        others = (density, fric, shear, poiss, damp, kn, ks, xp, yp, xv, yv, spin, color, group, where)
+        if law is None or hertz or any(other is not None for other in others):
+            raise CommandError("between takes a law and its parameter, and nothing else")
+        _say_between(sim, law, between, parameter or {}, folder)
+        return
     given = {
         k: v
         for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks, xp, yp), strict=True)
@@ -134,28 +141,52 @@ def _of_law(
         if parameter:
             raise CommandError(f"parameter belongs to a law of the user, not to {LINEAR}")
         return {"law": 0.0, "hertz": 0.0, **dict.fromkeys(OWN, 0.0)}
+    laws = sim.own_laws
     if law is None:
-        have = sim.materials.rows["law"][sim.particles["material"]] > 0.0
-        if sim.pair_law is None or sim.comm.any(bool((chosen(sim, where) & ~have).any())):
+        column = sim.materials.rows["law"][sim.particles["material"]]
+        numbers = {int(k) for part in sim.comm.allgather(np.unique(column[chosen(sim, where)]).tolist()) for k in part}
+        if not numbers - {0} or 0 in numbers:
             raise CommandError("parameter: there are particles without a law of the user; law 'file.py:function' first")
-        return user_laws.given(sim.pair_law, parameter, whole=False)
+        if len(numbers) > 1:
+            some = ", ".join(laws.laws[k - 1].title for k in sorted(numbers))
+            raise CommandError(f"parameter: the particles have several laws, {some}; RANGE chooses those of one")
+        return user_laws.given(laws.laws[numbers.pop() - 1], parameter, whole=False)
+    number, values = _added(sim, law, parameter, folder)
+    return {"law": float(number), **dict.fromkeys(OWN, 0.0), **values}
+
+
+def _added(sim: Simulation, law: str, parameter: Mapping[str, float], folder: Path) -> tuple[int, dict[str, float]]:
+    """The number of a law of the user that the model has from now on, and its properties. Collective."""
     new = load_law(sim, law, folder)
-    if sim.pair_law is not None and sim.pair_law.name != new.name:
-        have = sim.materials.rows["law"][sim.particles["material"]] > 0.0
-        if sim.comm.any(bool((have & ~chosen(sim, where)).any())):
-            raise CommandError(f"other particles have the law {sim.pair_law.title}; a model has one law of the user")
     if sim.bonds_left():
         raise CommandError("there are bonds, and a law of the user knows none: BOND break comes first")
-    if sim.energy is not None or sim.settings.energy:
-        raise CommandError("SET energy: what a law of the user stores and loses is not known; SET energy 0 comes first")
-    if any(what == "energy" for _, what in sim.history_wishes.values()):
-        raise CommandError("HIST energy: what a law of the user stores is not known")
+    if new.declared.energy is None:
+        unknown = f"what the law {new.title} stores is not known: pair_law(energy=) says it"
+        if sim.energy is not None or sim.settings.energy:
+            raise CommandError(f"SET energy: {unknown}, or SET energy 0 comes first")
+        if any(what == "energy" for _, what in sim.history_wishes.values()):
+            raise CommandError(f"HIST energy: {unknown}")
     values = user_laws.given(new, parameter, whole=True)
-    if sim.pair_law is None or sim.pair_law.name != new.name:
+    if not sim.own_laws.number(new.name):
         sim.open()
-        sim.hist = sim.hist.resized(0)  # nothing of the law before
-        sim.pair_law = new
-    return {"law": 1.0, **dict.fromkeys(OWN, 0.0), **values}
+    return sim.own_laws.add(new, sim), values
+
+
+def _say_between(sim: Simulation, law: str, pair: Sequence[str], parameter: Mapping[str, float], folder: Path) -> None:
+    """PROP between. Collective."""
+    if len(pair) != 2:
+        raise CommandError(f"between names two laws, got {len(pair)}")
+    first, second = sorted(sim.own_laws.named(one) for one in pair)
+    if first == second:
+        raise CommandError(f"between names two laws, both are {pair[0]}; pairs of discs with one law follow that")
+    if law == LINEAR:
+        if parameter:
+            raise CommandError(f"parameter belongs to a law of the user, not to {LINEAR}")
+        sim.own_laws.between[first, second] = 0, ()
+    else:
+        number, values = _added(sim, law, parameter, folder)
+        sim.own_laws.between[first, second] = number, tuple(values[name] for name in OWN if name in values)
+    sim.tables_changed()
 
 
 def fix(sim: Simulation, dofs: tuple[str, ...], where: Selection | None = None) -> None:

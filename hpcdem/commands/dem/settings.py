@@ -35,8 +35,8 @@ def set_option(sim: Simulation, name: str, value: Any) -> None:
         elif name == "frac":
             s.dt = 0.0
     elif name in INTERVALS:
-        if name == "energy" and value > 0 and sim.pair_law is not None:
-            raise CommandError(f"SET energy: what the law {sim.pair_law.title} stores and loses is not known")
+        if name == "energy" and value > 0 and (law := sim.own_laws.unaccounted()):
+            raise CommandError(f"SET energy: what the law {law} stores is not known: pair_law(energy=) says it")
         setattr(s, name, max(int(value), 0))
         if name == "stepbar" and sim.log is not None:
             sim.log.set_interval(explicit=s.stepbar > 0)

@@ -417,6 +417,9 @@ class _LineParser:
             self.at += 1
         return tuple(piece.word for piece in self.either(kind, name, kind.number))
 
+    def laws(self, kind: t.Laws, name: str) -> tuple[str, ...]:
+        return tuple(piece.text for piece in self.either(kind, name, 2))
+
     def wall_ids(self, kind: t.WallIds, name: str) -> tuple[int, ...]:
         token = self.peek()
         if kind.optional and (token is None or not (token.word in ("wall", "id") or lexer.number(token) is not None)):
@@ -460,6 +463,7 @@ _READERS: dict[type, Callable[[_LineParser, Any, str], Any]] = {
     t.Values: _LineParser.values,
     t.Choice: _LineParser.choice,
     t.Groups: _LineParser.groups,
+    t.Laws: _LineParser.laws,
     t.WallIds: _LineParser.wall_ids,
 }
 

@@ -95,6 +95,13 @@ def _clump(s: Statement) -> None:
 def _prop(s: Statement) -> None:
     if not s.arguments:
         raise s.error("nothing to set before RANGE" if s.selection else "nothing to set")
+    if "between" in s.arguments:
+        strange = [key for key in s.arguments if key not in ("law", "between", "parameter")]
+        if "law" not in s.arguments or strange or s.selection:
+            raise s.error(
+                "between says the law of all pairs of discs with these two laws; only law and parameter go with it"
+                + (f", not {strange[0]}" if strange else ", no RANGE" if s.selection else "")
+            )
     first = [key for key in BOND_MODEL_1 if key in s.arguments]
     second = [key for key in BOND_MODEL_2 if key in s.arguments]
     if "rubber" in s.arguments and not first and not second:

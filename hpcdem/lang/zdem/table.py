@@ -145,6 +145,11 @@ class Groups(Kind):
 
 
 @dataclass(frozen=True)
+class Laws(Kind):
+    """Two laws with | between them; case is kept."""
+
+
+@dataclass(frozen=True)
 class WallIds(Kind):
     """The words ``wall`` and ``id``, which may be left out, and as many ids as `number`, with | between them; nothing
     at all where `optional`."""
@@ -190,6 +195,7 @@ THIS_WALL = WallIds("[[wall] [id] <int>]", "the id of a wall", optional=True)
 OF_WALLS = WallIds("[wall] [id] <int>|<int>", "the ids of two walls with | between them", number=2)
 FILE = File("<file>", "a file name")
 LAW = File("<file.py:function>", "'file.py:function', or linear")
+OF_LAWS = Laws("<law>|<law>", "two laws with | between them, 'file.py:function', linear or hertz")
 VALUES = Values("<name> <float> ...", "names with a number each")
 
 
@@ -347,6 +353,8 @@ _PROPERTIES = (
     Option("ks", "shear stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
     Option("law", "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a "
            "built-in one again", kind=LAW, source="X"),
+    Option("between", "this law is that of pairs of discs that have these two laws, instead of a law of particles",
+           kind=OF_LAWS, source="X"),
     Option("parameter", "properties that this law declares", kind=VALUES, source="X"),
     Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
     Option("yv", "velocity in y", kind=FLOAT, unit="m/s"),
@@ -579,6 +587,7 @@ COMMANDS = (
             "PROP ebmod 2e8 gbmod 2e8 tstrength 2e7 sstrength 4e7 fric 0.3 RANGE x (1.0 10.0) y (1.0 10.0)",
             "PROP tolerate rext 0.4 n_bond 1e4 s_bond 1e4 RANGE group base",
             "PROP kn 1e7 ks 1e7 fric 0.5 law sticky.py:sticky parameter pull 2e3",
+            "PROP law glue.py:glue between sticky.py:sticky|linear parameter pull 50.0",
         ),
     ),
     Command("INIT", "The same as PROP.", options=_PROPERTIES, ranged=True, same_as="PROP",

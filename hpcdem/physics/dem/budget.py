@@ -58,6 +58,7 @@ class Energy:
     loss_bonds: float
     loss_opened: float
     loss_stiffness: float
+    loss_laws: float
     commands: float
     box: float
     work_blocks: float
@@ -66,7 +67,7 @@ class Energy:
 
 
 NAMES = tuple(f.name for f in fields(Energy))
-SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, 1, 1, 1)
+SIGNS = (1, 1, 1, -1, -1, -1, -1, -1, -1, -1, 1, 1, 1)
 """Whether an account raises what is stored."""
 
 
@@ -88,6 +89,7 @@ class Budget:
         self._at_rebuild: tuple[int, list[int]] | None = None
         self._shear, self._bonds = np.empty(0), np.empty(0, np.int32)
         self._wall_shear, self._wall_side = np.empty(0), np.empty(0)
+        self._normal, self._memory = np.empty(0), np.empty((0, 0))
 
     # ---- called by the step ----------------------------------------------------------------------------------------
 
@@ -115,6 +117,8 @@ class Budget:
         self._wall_shear = _copied(lists.slot_fs, self._wall_shear)
         self._wall_side = _copied(lists.slot_side, self._wall_side)
         self._bonds = _copied(lists.bond, self._bonds) if sim.bonds else lists.bond
+        if sim.own_laws:
+            self._normal, self._memory = _copied(lists.u_made, self._normal), _copied(lists.memory, self._memory)
 
     def after_forces(self, sim: Simulation) -> None:
         """Book what contacts and bonds lost in this step."""
@@ -128,6 +132,10 @@ class Budget:
                     lists.u_made, self._shear, self._bonds, sim.pair_laws, sim.bond_laws, n_mat, dt, spheres,
                     self._bins,
                 )  # fmt: skip
+            if sim.own_laws.loops is not None:
+                sim.own_laws.loops.lost(
+                    *_own_pairs(sim), self._bins, lists.u_made, self._shear, self._normal, self._memory, dt
+                )
             _wall_losses(*_wall_slots(sim), self._wall_shear, self._wall_side, sim.wall_laws, n_mat, dt, self._bins)
 
     # ---- called by the commands ------------------------------------------------------------------------------------
@@ -197,8 +205,11 @@ class Budget:
         def share(numbers: list[str]) -> list[int]:
             return [int(v, 16) if first else 0 for v in numbers]
 
-        missing = ["0x0"] * (ACCOUNTS - len(state["accounts"]))  # in files of earlier versions
-        budget.accounts, budget.left = share([*state["accounts"], *missing]), share(state["left"])
+        accounts = list(state["accounts"])
+        if len(accounts) < ACCOUNTS:  # in files of earlier versions
+            accounts.insert(energy.LAWS, "0x0")
+            accounts += ["0x0"] * (ACCOUNTS - len(accounts))
+        budget.accounts, budget.left = share(accounts), share(state["left"])
         budget.start = None if state["start"] is None else share(state["start"])
         budget.running, budget.finite = state["running"], state["finite"]
         return budget
@@ -244,8 +255,19 @@ def _stored_bins(sim: Simulation, whole_step: bool = True) -> np.ndarray:
     if sim.clumps:
         c = sim.clumps.bodies
         energy.kinetic(0, c.hot, 0, *c.mine_as_block(), c.force, c.body, s.gx, s.gy, s.lsm, whole_step, bins)
+    if sim.own_laws.loops is not None:
+        sim.own_laws.loops.stored(*_own_pairs(sim), bins)
     _wall_energy(*_wall_slots(sim), sim.wall_laws, n_mat, bins)
     return bins
+
+
+def _own_pairs(sim: Simulation) -> tuple[Any, ...]:
+    """Pairs and laws of the user, for their sums of energy."""
+    lists, p = sim.lists, sim.particles
+    return (
+        lists.n_blocks, p.hot, p.ihot, *lists.blocks, lists.ptr, lists.partner, lists.fs, sim.pair_laws,
+        len(sim.materials), sim.own_table, lists.memory, sim.own_laws.initial, float(sim.stamp),
+    )  # fmt: skip
 
 
 def _kicks(sim: Simulation, whole: bool, sign: float, bins: np.ndarray) -> None:
@@ -270,7 +292,7 @@ def _wall_slots(sim: Simulation) -> Any:
 
 
 def _copied(values: np.ndarray, into: np.ndarray) -> np.ndarray:
-    if len(into) != len(values) or into is values:
+    if into.shape != values.shape or into is values:
         return values.copy()
     np.copyto(into, values)
     return into

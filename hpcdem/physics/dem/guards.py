@@ -62,7 +62,7 @@ def stop_on_runaway(
     what = "a number is not finite" if broken else "a particle moves over half its radius per step"
     guess = f"the time step {dt:g} s is probably too large, or particles were made overlapping"
     if broken and mixed_laws:
-        guess = "there are particles of the Hertz law and of the linear one, and a pair of both has no law"
+        guess = "there are particles of different laws, and a pair of both has no law"
     named = "\n".join(
         f"  particle {g} at ({x:g}, {y:g}), velocity ({vx:g}, {vy:g}), rank {rank}" for g, x, y, vx, vy, rank in rows
     )

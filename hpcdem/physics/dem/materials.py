@@ -12,6 +12,8 @@ from hpcdem.core.errors import CommandError
 
 OWN = tuple(f"own{k}" for k in range(8))
 """Columns for the properties that a law of the user declares, in their order."""
+MOST_LAWS = 64
+"""Laws of the user in a model."""
 MATERIAL = np.dtype(
     [
         ("density", "f8"),
@@ -29,8 +31,8 @@ MATERIAL = np.dtype(
     ]
 )
 """Density [kg/m^3, or kg/m^2 for disks], friction, shear modulus [Pa], Poisson's ratio, local damping, linear normal
-and shear stiffness [N/m], 1 for the Hertz-Mindlin law, pressure along x and y [Pa], 1 for the law of the user
-(user_laws.py), its properties. New columns are added at the end: older checkpoints have the first ones."""
+and shear stiffness [N/m], 1 for the Hertz-Mindlin law, pressure along x and y [Pa], number of the law of the
+user (user_laws.py), its properties. New columns are added at the end: older checkpoints have the first ones."""
 
 BOND_TYPE = np.dtype(
     [("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8"), ("rubber", "f8")]

@@ -66,7 +66,7 @@ class Dashpots:
 def _refuse(sim: Any) -> None:
     others = {
         "clumps, whose discs have no mass of their own": bool(sim.clumps),
-        "a law of the user, whose stiffness is not known": sim.pair_law is not None,
+        "a law of the user, whose stiffness is not known": bool(sim.own_laws),
         "contacts with blocks, which have laws of their own": sim.coupled,
         "SET energy, whose account does not know what dashpots take": sim.settings.energy > 0 or sim.energy is not None,
     }

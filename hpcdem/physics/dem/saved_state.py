@@ -88,7 +88,7 @@ def state_of(sim: Simulation) -> dict[str, Any]:
         "lost": sim.lost,
         "rows": sim.rows,
         "energy": sim.energy.state(sim) if sim.energy is not None else None,
-        "pair_law": sim.pair_law.name if sim.pair_law is not None else None,
+        "pair_laws": sim.own_laws.state(),
         "stamp": sim.stamp,
         "physics": [[physics.name, physics.parameters()] for physics in sim.physics],
         "rebuilds": sim.rebuilds,
@@ -239,9 +239,9 @@ def restore_newest(sim: Simulation, folders: list[Path], before: float = math.in
 def apply_state(sim: Simulation, state: dict[str, Any], tables: checkpoint.Tables) -> None:
     """Take a state that was read; tables: this rank's slabs, which are let go of. UnknownLaw if it has a law of the
     user that was not named. Collective."""
-    law = user_laws.restored(state.get("pair_law"))
+    laws = user_laws.ModelLaws.restored(state, sim)
     sim.clear()
-    sim.pair_law, sim.stamp = law, state.get("stamp", 1)
+    sim.own_laws, sim.stamp = laws, state.get("stamp", 1)
     sim.clock = Clock(**state["clock"])
     sim.settings = Settings(**state["settings"])
     sim.rebuild_state = ListState(**state["lattice"])

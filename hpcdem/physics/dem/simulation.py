@@ -34,7 +34,7 @@ from hpcdem.physics.dem.kernels.neighbours import NO_ROWS, Histories
 from hpcdem.physics.dem.materials import BOND_TYPE, MATERIAL, PropertyTable
 from hpcdem.physics.dem.particles import Particles
 from hpcdem.physics.dem.settings import Settings
-from hpcdem.physics.dem.user_laws import PairLaw
+from hpcdem.physics.dem.user_laws import ModelLaws
 from hpcdem.physics.dem.walls import Walls
 from hpcdem.physics.model import Model
 from hpcdem.runtime.run_folder import Retention
@@ -152,8 +152,9 @@ class Simulation(Model):
         self._named: set[int] = set()
         self.energy: Any = None
         self.dashpots: Any = None  # restitution.Dashpots, while SET restitution is below 1
-        self.pair_law: PairLaw | None = None  # of the user; materials say which discs have it
-        self.stamp = 1  # evaluations of forces, for the memory of that law
+        self.own_laws = ModelLaws()  # of the user; materials say which discs have them
+        self.own_table: np.ndarray | None = None
+        self.stamp = 1  # evaluations of forces, for the memory of these laws
         self.history_wishes: dict[int, tuple[int, str]] = {}
         self.history_origins: dict[int, tuple[int, float]] = {}  # axis and distance of strains
         self.plots: list[tuple[int, int]] = []
@@ -229,7 +230,7 @@ class Simulation(Model):
     def _forces(self) -> None:
         """Contact, bond and wall forces at the present positions."""
         lists = self.lists
-        if self.pair_law is None:
+        if not self.own_laws:
             self._pair_forces(lists.n_blocks, *self._pair_args)
         else:
             self.stamp += 1
@@ -421,7 +422,7 @@ class Simulation(Model):
             outside = self._choose_reach(frozen, least_skin, box)
             if outside and box is not None:
                 self._drop_outside(box)
-        self.hist = self.hist.resized(0 if self.pair_law is None else self.pair_law.memory)
+        self.hist = self.hist.resized(self.own_laws.memory)
         cell = self._share_out()
         p, rebuild_state, borders = self.particles, self.rebuild_state, self.ownership.borders
         with self.timers("neighbour"):
@@ -582,7 +583,7 @@ class Simulation(Model):
 
     def _mixed_laws(self) -> bool:
         """Whether there are pairs of materials without a common law."""
-        return bool(np.isnan(contacts.pair_table(self.materials.rows)[:, contacts.MODEL]).any())
+        return bool(np.isnan(self.own_laws.which(self.materials.rows)).any())
 
     def remove(self, which: np.ndarray) -> int:
         """Delete the flagged owned particles (n_own,) bool, clumps as a whole, and all memory of them. The model must
@@ -676,8 +677,8 @@ class Simulation(Model):
         )  # fmt: skip
         if self.clumps:
             self.clumps.fill(p, rows["density"].copy(), rows["damp"].copy(), dt, self.body)
-        table, bounds = (None, None) if self.pair_law is None else self.pair_law.tables(rows)
-        self.pair_laws = contacts.pair_table(rows, bounds)
+        self.own_table, bounds = self.own_laws.tables(rows) if self.own_laws else (None, None)
+        self.pair_laws = contacts.pair_table(rows, self.own_laws.which(rows), bounds)
         self.wall_laws = wall_kernels.wall_table(rows, self.walls.kn, self.walls.ks, self.walls.fric)
         self.bond_laws = self.bond_types.as_floats()
         self._pushed, self._push = self._pressures()
@@ -694,9 +695,9 @@ class Simulation(Model):
             p.hot, p.ihot, *b, lists.ptr, lists.row, lists.partner, lists.fs, lists.bond, lists.u_made, lists.force,
             self.pair_laws, contacts.bond_table(self.bond_laws), n_mat, dt, mass.SPHERES[s.disk], lists.tally,
         )  # fmt: skip
-        if self.pair_law is not None:
-            self._pair_forces = self.pair_law.loop_threaded if threaded else self.pair_law.loop
-            self._pair_args += table, lists.memory, self.pair_law.initial
+        if self.own_laws.loops is not None:
+            self._pair_forces = self.own_laws.loops.several if threaded else self.own_laws.loops.one
+            self._pair_args += self.own_table, lists.memory, self.own_laws.initial
         self._wall_args = (
             p.hot, p.ihot, b.lo, b.foff, lists.force, lists.wptr, self._wall_table, lists.slot_row, lists.slot_wall,
             lists.slot_fs, lists.slot_side, lists.new_side, self.wall_laws, n_mat, dt,

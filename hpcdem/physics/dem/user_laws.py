@@ -20,11 +20,17 @@ arguments are numbers by these names:
   smaller fric, the mean of shear and poiss, its own as they say.
 
 `stiffness`, a number [N/m] or a function of these properties, is what dFn/du and dFs/ds are never above; without it the
-kn and ks of the pair. The time step follows from it.
+kn and ks of the pair. The time step follows from it. `energy`, a function of u, fs, two_rt, state variables and
+properties, returns what a contact stores [J] in its normal and in its shear direction; without it no account of energy
+can be kept.
+
+A model may have several laws (`ModelLaws`): pairs of discs with the same one follow it, and what discs with two of them
+do is said for these two.
 """
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +40,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.dem.materials import OWN
+from hpcdem.physics.dem.materials import MOST_LAWS, OWN
 from hpcdem.physics.user_files import (
     MARK,
     Declared,
@@ -44,6 +50,7 @@ from hpcdem.physics.user_files import (
     agreed,
     check_what_returns,
     checked,
+    in_turn,
     law_of,
     made_of,
     numba_message,
@@ -52,9 +59,18 @@ from hpcdem.physics.user_files import (
 from hpcdem.runtime import kept
 
 if TYPE_CHECKING:
+    from hpcdem.physics.dem.kernels import user_pairs
     from hpcdem.physics.model import Model
 
 FORCES = ("fn", "fs")
+STORES = ("normal", "shear")
+"""What an energy function returns."""
+STORING = ("u", "fs", "two_rt")
+"""Its arguments, besides state variables and properties."""
+LINEAR, HERTZ = "linear", "hertz"
+"""Built-in laws, by name."""
+BUILT_IN = {LINEAR: 0, HERTZ: -1}
+"""Their numbers; those of the user are 1, 2, ..."""
 OVERLAP = 1e-9
 """Of 2 Rt, for the slope of a law where discs begin to touch."""
 
@@ -90,23 +106,25 @@ class PairProperty:
     mix: str = "mean"
 
 
+@dataclass(frozen=True)
 class _Declared(Declared):
-    """A law of pairs."""
+    """A law of pairs; energy: what a contact stores."""
+
+    energy: Callable[..., Any] | None = None
 
 
 @dataclass(frozen=True)
 class PairLaw:
-    """A law of a file. name: FILE:FUNCTION and a digest of its text; place: its file and line, for messages; columns:
-    of the table of properties; kernel, loop, loop_threaded: compiled, see kernels/user_pairs.py."""
+    """A law of a file. name: FILE:FUNCTION and a digest of its text; place: its file and line, for messages; kept:
+    what names the folder of what is made of it, None if that must not be kept; kernel: compiled, and what it takes;
+    loops: see kernels/user_pairs.py."""
 
     name: str
     place: str
-    declared: Declared
-    arguments: tuple[str, ...]
-    columns: tuple[str, ...]
-    kernel: Any
-    loop: Any
-    loop_threaded: Any
+    declared: _Declared
+    kept: tuple[str, ...] | None
+    kernel: user_pairs.Kernel
+    loops: user_pairs.Loops
 
     @property
     def title(self) -> str:
@@ -119,44 +137,30 @@ class PairLaw:
         return self.declared.properties
 
     @property
-    def memory(self) -> int:
-        """Columns of what a contact remembers."""
-        return 1 + len(self.declared.state)
-
-    @property
-    def initial(self) -> np.ndarray:
+    def initial(self) -> list[float]:
         """State variables of a contact that begins."""
-        return np.array([state.initial for state in self.declared.state])
+        return [state.initial for state in self.declared.state]
 
-    def tables(self, materials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of all pairs of materials: properties (n*n, columns), and bounds (n, n, 2) of dFn/du and dFs/ds [N/m].
-        CommandError if the law makes no sense with them."""
-        n = len(materials)
-        own = {p.name: (OWN[k], p.mix) for k, p in enumerate(self.properties)}
-        columns = {name: (name, mix) for name, mix in BASE.items()} | own
-        mixed = {
-            name: MIXES[mix](materials[column][:, None], materials[column][None, :]).reshape(-1)
-            for name, (column, mix) in columns.items()
-        }
-        both = np.flatnonzero((materials["law"][:, None] > 0.0) & (materials["law"][None, :] > 0.0))
+    def of_pairs(self, mixed: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Of pairs of materials with these properties (m,) each: the table (m, columns) of the kernel, and bounds (m,
+        2) of dFn/du and dFs/ds [N/m]. CommandError if the law makes no sense with them."""
         bounds = np.stack([mixed["kn"], mixed["ks"]], axis=1)
-        if len(both):
-            stiff = stiffness_of(self.declared, self.place, {k: value[both] for k, value in mixed.items()}, "N/m")
-            if stiff is not None:
-                bounds[both] = stiff[:, None]
-        self._look(mixed, bounds, both)
-        return np.ascontiguousarray(np.array([mixed[name] for name in self.columns]).T), bounds.reshape(n, n, 2)
+        stiff = stiffness_of(self.declared, self.place, mixed, "N/m")
+        if stiff is not None:
+            bounds[:] = stiff[:, None]
+        self._look(mixed, bounds)
+        return np.array([mixed[name] for name in self.kernel.columns]).T, bounds
 
-    def _look(self, mixed: Mapping[str, np.ndarray], bounds: np.ndarray, which: np.ndarray) -> None:
-        """CommandError unless the law is finite where discs begin to touch, and no stiffer than it says. which: rows of
-        the tables that have it."""
+    def _look(self, mixed: Mapping[str, np.ndarray], bounds: np.ndarray) -> None:
+        """CommandError unless the law is finite where discs begin to touch, and no stiffer than it says."""
         states = {state.name: state.initial for state in self.declared.state}
-        for q in which:
+        names = self.kernel.arguments
+        for q in range(len(bounds)):
             values = {name: float(value[q]) for name, value in mixed.items()} | states
             values |= {"fs": 0.0, "two_rt": 1.0, "sliding": 0.0, "approach": 0.0, "dt": 0.0}
-            told = ", ".join(f"{name} {values[name]:g}" for name in self.arguments if name in mixed) or "no properties"
+            told = ", ".join(f"{name} {values[name]:g}" for name in names if name in mixed) or "no properties"
             found = [
-                self.kernel(*(overlap if name == "u" else values[name] for name in self.arguments))
+                self.kernel.law(*(overlap if name == "u" else values[name] for name in names))
                 for overlap in (0.0, OVERLAP)
             ]
             for name, value in zip((*FORCES, *states), found[0]):
@@ -170,29 +174,169 @@ class PairLaw:
                 )
 
 
+class ModelLaws:
+    """The laws of the user in a model. Their numbers, in the column law of materials, are 1, 2, ... in the order in
+    which they were given to discs, and never change their meaning.
+
+    between: for two numbers, the lower first, of discs that touch: the number of the law of such pairs, and values of
+    the properties that it declares.
+    """
+
+    def __init__(self) -> None:
+        self.laws: tuple[PairLaw, ...] = ()
+        self.between: dict[tuple[int, int], tuple[int, tuple[float, ...]]] = {}
+        self.loops: user_pairs.Loops | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.laws)
+
+    @property
+    def titles(self) -> str:
+        """Of all laws, for messages."""
+        return ", ".join(law.title for law in self.laws)
+
+    def unaccounted(self) -> str:
+        """The first law of which it is not known what it stores; empty if there is none."""
+        return next((law.title for law in self.laws if law.declared.energy is None), "")
+
+    def number(self, name: str) -> int:
+        """Of the law with a full name; 0 if the model does not have it."""
+        return next((k for k, law in enumerate(self.laws, 1) if law.name == name), 0)
+
+    def named(self, title: str) -> int:
+        """The number of a law, or built-in one, FILE:FUNCTION. CommandError if the model does not have it."""
+        if title in BUILT_IN:
+            return BUILT_IN[title]
+        short = f"{Path(title.rpartition(':')[0]).name}:{title.rpartition(':')[2]}"
+        found = [k for k, law in enumerate(self.laws, 1) if law.title == short]
+        if found:
+            return found[-1]
+        known = ", ".join((*BUILT_IN, *(one.title for one in self.laws)))
+        raise CommandError(f"no disc was given the law {title}; there is {known}")
+
+    def title_of(self, material: Any) -> str:
+        """The law of discs of a row of materials."""
+        if material["law"] > 0.0:
+            return self.laws[int(material["law"]) - 1].title
+        return HERTZ if material["hertz"] else LINEAR
+
+    def add(self, law: PairLaw, sim: Model) -> int:
+        """Its number, which is a new one if need be. Collective."""
+        if not self.number(law.name):
+            if len(self.laws) == MOST_LAWS:
+                raise CommandError(f"a model can have {MOST_LAWS} laws of the user, it has that many")
+            self.take((*self.laws, law), sim)
+        return self.number(law.name)
+
+    def take(self, laws: tuple[PairLaw, ...], sim: Model) -> None:
+        """These laws, whose loops are compiled. Collective."""
+        self.laws, self.loops = laws, _loops_of(laws, sim) if laws else None
+
+    @property
+    def memory(self) -> int:
+        """Columns of what a contact remembers."""
+        return 1 + max(len(law.declared.state) for law in self.laws) if self.laws else 0
+
+    @property
+    def initial(self) -> np.ndarray:
+        """State variables of contacts that begin (laws, states)."""
+        out = np.zeros((len(self.laws), self.memory - 1))
+        for row, law in zip(out, self.laws):
+            row[: len(law.initial)] = law.initial
+        return out
+
+    def which(self, materials: np.ndarray) -> np.ndarray:
+        """Numbers (n, n) of the laws of all pairs of materials; NaN if they have none in common."""
+        own = np.where(materials["law"] > 0.0, materials["law"], -materials["hertz"])
+        out = np.where(own[:, None] == own[None, :], own[:, None], math.nan)
+        for (a, b), (number, _) in self.between.items():
+            for first, second in ((a, b), (b, a)):
+                out[np.ix_(own == first, own == second)] = number
+        return out
+
+    def tables(self, materials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Of all pairs of materials: properties (n*n, columns), of its law each, and bounds (n, n, 2) of dFn/du and
+        dFs/ds [N/m]. CommandError if a law makes no sense with them."""
+        n, which = len(materials), self.which(materials).reshape(-1)
+        table = np.zeros((n * n, max(len(law.kernel.columns) for law in self.laws)))
+        bounds = np.zeros((n * n, 2))
+        own = materials["law"]
+        same = (own[:, None] == own[None, :]).reshape(-1)
+        base = {name: _mixed(materials, name, mix) for name, mix in BASE.items()}
+        for k, law in enumerate(self.laws, 1):
+            sets = [(same, {p.name: _mixed(materials, OWN[c], p.mix) for c, p in enumerate(law.properties)})]
+            for (a, b), (number, values) in self.between.items():
+                if number == k:
+                    given = {p.name: np.full(n * n, value) for p, value in zip(law.properties, values)}
+                    sets.append((self._meet(materials, a, b), given))
+            for rows, of_law in sets:
+                at = np.flatnonzero(rows & (which == k))
+                if len(at):
+                    mixed = {name: value[at] for name, value in (base | of_law).items()}
+                    table[at, : len(law.kernel.columns)], bounds[at] = law.of_pairs(mixed)
+        return table, bounds.reshape(n, n, 2)
+
+    @staticmethod
+    def _meet(materials: np.ndarray, a: int, b: int) -> np.ndarray:
+        """Flags (n*n,) of pairs of materials with the laws a and b."""
+        own = np.where(materials["law"] > 0.0, materials["law"], -materials["hertz"])
+        one = (own[:, None] == a) & (own[None, :] == b)
+        return (one | one.T).reshape(-1)
+
+    def state(self) -> dict[str, Any]:
+        """As JSON values."""
+        between = [[*pair, number, list(values)] for pair, (number, values) in self.between.items()]
+        return {"names": [law.name for law in self.laws], "between": between}
+
+    @staticmethod
+    def restored(state: dict[str, Any], sim: Model) -> ModelLaws:
+        """From the state of a checkpoint. UnknownLaw unless its laws were named in this run. Collective."""
+        found = state.get("pair_laws") or {"names": [state["pair_law"]] if state.get("pair_law") else []}
+        out = ModelLaws()
+        out.take(tuple(_known(name) for name in found["names"]), sim)
+        for a, b, number, values in found.get("between", ()):
+            out.between[a, b] = number, tuple(values)
+        return out
+
+
+def _mixed(materials: np.ndarray, column: str, mix: str) -> np.ndarray:
+    """A property of all pairs of materials (n*n,)."""
+    return MIXES[mix](materials[column][:, None], materials[column][None, :]).reshape(-1)
+
+
 LAWS: dict[str, PairLaw] = {}
 """Those that were named in this process."""
+TOGETHER: dict[tuple[str, ...], user_pairs.Loops] = {}
+"""The loops of several laws, by their names."""
 
 
 def pair_law(
     properties: Sequence[PairProperty] = (),
     state: Sequence[StateVariable] = (),
     stiffness: float | Callable[..., float] | None = None,
+    energy: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[..., Any]], Declared]:
-    """Declares a function as law of pairs of discs: properties of its own, state variables of contacts, and what it is
-    never stiffer than [N/m], a number or a function of properties (by their names)."""
+    """Declares a function as law of pairs of discs: properties of its own, state variables of contacts, what it is
+    never stiffer than [N/m], a number or a function of properties (by their names), and a function of what a contact
+    stores [J]."""
     return lambda function: _Declared(
-        getattr(function, "py_func", function), tuple(properties), tuple(state), stiffness
-    )
+        getattr(function, "py_func", function), tuple(properties), tuple(state), stiffness,
+        getattr(energy, "py_func", energy),
+    )  # fmt: skip
 
 
 def load(sim: Model, path: Path, law: str) -> PairLaw:
     """The law 'file.py:function' of a file, checked and compiled for the threads of this run, on all ranks from the
     text that rank 0 reads. CommandError with file and line. Collective."""
 
+    from numba.core.errors import NumbaError
+
     def take(text: str, path: str, name: str, function: str) -> PairLaw:
         found = LAWS.get(name) or _made(text, path, name, function)
-        _compile(found, sim.threads)
+        try:
+            _compile(found.loops, sim.threads)
+        except NumbaError as error:
+            raise Wrong(found.declared.line, numba_message(error)) from None
         LAWS[name] = found
         return found
 
@@ -215,41 +359,87 @@ def _made(text: str, path: str, name: str, function: str) -> PairLaw:
             raise Wrong(line, f"property '{one.name}': mix is '{one.mix}', expected {', '.join(MIXES)}")
         if one.default is not None and not one.low <= one.default <= one.high:
             raise Wrong(line, f"property '{one.name}': its default {one.default:g} is out of its bounds")
-    kernel = njit(error_model="numpy", nogil=True)(declared.function)
-    states = [state.name for state in declared.state]
+    states = tuple(state.name for state in declared.state)
     columns = [name for name in (*BASE, *(p.name for p in own)) if name in arguments]
+    energy, of_energy = None, []
+    if declared.energy is not None:
+        of_energy = _of_energy(declared, columns, states)
+        energy = njit(error_model="numpy", nogil=True)(declared.energy)
+        columns += [name for name in of_energy if name not in (*columns, *states, *STORING)]
     columns += columns[:1] * (-len(columns) % 4) or ["kn"] * (4 if not columns else 0)
-    one_thread, several = user_pairs.loops(kernel, arguments, states, columns)
-    values = made_of(kernel, path)
-    if values is not None:
-        place = kept.folder(name, values, repr((arguments, states, columns)))
-        kept.keep(one_thread, place, "pairs")
-        kept.keep(several, place, "pairs_threaded")
-    check_what_returns(kernel, len(arguments), (*FORCES, *states), path, line)
-    where = f"{Path(path).name}:{line}: law '{function}'"
-    return PairLaw(name, where, declared, tuple(arguments), tuple(columns), kernel, one_thread, several)
+    law = njit(error_model="numpy", nogil=True)(declared.function)
+    kernel = user_pairs.Kernel(law, tuple(arguments), states, tuple(columns), energy, tuple(of_energy))
+    loops = user_pairs.loops([kernel])
+    values = made_of(law, path)
+    stored = made_of(energy, path) if energy is not None else ""
+    kept_as = None if values is None or stored is None else (name, values, stored, repr(kernel[1:4]), repr(of_energy))
+    _keep(loops, kept_as)
+    check_what_returns(law, len(arguments), (*FORCES, *states), path, line)
+    if energy is not None:
+        check_what_returns(energy, len(of_energy), STORES, path, _line(declared.energy), "energy")
+    return PairLaw(name, f"{Path(path).name}:{line}: law '{function}'", declared, kept_as, kernel, loops)
 
 
-def _compile(law: PairLaw, threads: int) -> None:
+def _of_energy(declared: _Declared, columns: Sequence[str], states: Sequence[str]) -> list[str]:
+    """The names of the arguments of an energy function. Wrong."""
+    function: Any = declared.energy
+    code = getattr(function, "__code__", None)
+    if code is None:
+        raise Wrong(declared.line, f"energy must be a function, got {function!r}")
+    known = (*STORING, *states, *BASE, *(p.name for p in declared.properties))
+    takes = list(inspect.signature(function).parameters)
+    for name in takes:
+        if name not in known:
+            raise Wrong(_line(function), f"'{name}' is no argument of an energy function; there is {', '.join(known)}")
+    return takes
+
+
+def _line(function: Any) -> int:
+    return int(function.__code__.co_firstlineno)
+
+
+def _keep(loops: user_pairs.Loops, made: tuple[str, ...] | None) -> None:
+    """Loops that are made of these texts are taken from the folder of what is kept, or go into it."""
+    if made is not None:
+        place = kept.folder(*made)
+        for what, kernel in loops._asdict().items():
+            kept.keep(kernel, place, f"pairs_{what}")
+
+
+def _loops_of(laws: tuple[PairLaw, ...], sim: Model) -> user_pairs.Loops:
+    """The loops of laws that stand in one model, compiled. Collective."""
+    if len(laws) == 1:
+        return laws[0].loops
+    from hpcdem.physics.dem.kernels import user_pairs
+
+    names = tuple(law.name for law in laws)
+
+    def make() -> None:
+        if names not in TOGETHER:
+            TOGETHER[names] = user_pairs.loops([law.kernel for law in laws])
+            made = [law.kept for law in laws]
+            _keep(TOGETHER[names], None if None in made else sum((m or () for m in made), ()))
+        _compile(TOGETHER[names], sim.threads)
+
+    in_turn(sim.comm, make)
+    return TOGETHER[names]
+
+
+def _compile(loops: user_pairs.Loops, threads: int) -> None:
     """The force loop, with arguments of the types that it will have."""
-    from numba.core.errors import NumbaError
-
     places, slots, rows = np.zeros(1, np.int64), np.zeros(0, np.int32), np.zeros((0, 8))
     nothing = np.zeros(0)
-    try:
-        (law.loop if threads == 1 else law.loop_threaded)(
-            0, rows, rows.view(np.int64), places, places, places, places, places, places, slots, slots, nothing, slots,
-            nothing, np.zeros((0, 4)), np.zeros((1, 4)), np.zeros((1, 4)), 1, 0.0, True, rows,
-            np.zeros((1, len(law.columns))), np.zeros((0, law.memory)), law.initial, 0.0,
-        )  # fmt: skip
-    except NumbaError as error:
-        raise Wrong(law.declared.line, numba_message(error)) from None
+    (loops.one if threads == 1 else loops.several)(
+        0, rows, rows.view(np.int64), places, places, places, places, places, places, slots, slots, nothing, slots,
+        nothing, np.zeros((0, 4)), np.zeros((1, 4)), np.zeros((1, 4)), 1, 0.0, True, rows,
+        np.zeros((1, 4)), np.zeros((0, 1)), np.zeros((1, 0)), 0.0,
+    )  # fmt: skip
 
 
-def restored(name: str | None) -> PairLaw | None:
+def _known(name: str) -> PairLaw:
     """The law that a checkpoint names. UnknownLaw unless it was named in this run, with the same text."""
-    if name is None or name in LAWS:
-        return None if name is None else LAWS[name]
+    if name in LAWS:
+        return LAWS[name]
     title = name.partition(MARK)[0]
     other = any(law.title == title for law in LAWS.values())
     raise UnknownLaw(

@@ -18,7 +18,8 @@ from hpcdem.physics.dem.kernels import laws
 # Columns of the pair law table (row = material_i * n_materials + material_j).
 MODEL, A, B, MU = range(4)
 USER = 2.0
-"""MODEL of pairs with a law of the user: A and B are what its stiffnesses are never above, MU is not used."""
+"""MODEL of pairs with the first law of the user, the second has one more: A and B are what its stiffnesses are never
+above, MU is not used."""
 # Columns of the bond type table; row 0 is "no bond".
 KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
 # Columns of a block's tally (float64): longest bonded distance squared, breaks in tension, breaks in shear.
@@ -28,9 +29,10 @@ LONGEST2, TENSION_BREAKS, SHEAR_BREAKS = range(3)
 @njit(cache=True, error_model="numpy", forceinline=True)
 def pair_law(i, j, row, u_made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u):
     """laws.pair_state of the particles in storage rows i and j with a bond of table row `row` (0: none), at overlap
-    u [m]: (Fn, ks, kn, energy of Fn). u_made: of a law of the user its normal force, and no energy is known."""
+    u [m]: (Fn, ks, kn, energy of Fn). u_made: of a law of the user its normal force; of its energy knows user_pairs.py.
+    """
     q = ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL]
-    if pairs[q, MODEL] == USER:
+    if pairs[q, MODEL] >= USER:
         return u_made, pairs[q, B], pairs[q, A], math.nan
     return laws.pair_state(
         bonds[row, KIND], pairs[q, MODEL], pairs[q, A], pairs[q, B], bonds[row, E_MOD], bonds[row, G_MOD], two_rt,
@@ -179,11 +181,11 @@ def bond_table(bonds: np.ndarray) -> np.ndarray:
     return table
 
 
-def pair_table(materials: np.ndarray, bounds: np.ndarray | None = None) -> np.ndarray:
+def pair_table(materials: np.ndarray, which: np.ndarray, bounds: np.ndarray | None = None) -> np.ndarray:
     """Pair laws of all material pairs: (n*n, 4) f8 [MODEL, A, B, MU].
 
-    materials: structured columns as a dict-like record array with hertz, kn, ks, shear, poiss, fric, law; bounds (n, n,
-    2): stiffnesses [N/m] of pairs with a law of the user.
+    materials: structured columns as a dict-like record array with kn, ks, shear, poiss, fric; which (n, n): see
+    user_laws.ModelLaws; bounds (n, n, 2): stiffnesses [N/m] of pairs with a law of the user.
     Hertz pairs use mean moduli, linear pairs springs in series, friction is the smaller of the two (PFC).
     A mixed pair gets NaN: the caller refuses it when it can occur.
     """
@@ -193,14 +195,12 @@ def pair_table(materials: np.ndarray, bounds: np.ndarray | None = None) -> np.nd
         for j in range(n):
             a, b = materials[i], materials[j]
             mu = min(a["fric"], b["fric"])
-            if a["law"] or b["law"]:
-                if a["law"] and b["law"]:
-                    kn, ks = (0.0, 0.0) if bounds is None else bounds[i, j]
-                    table[i, j] = USER, kn, ks, mu
-            elif a["hertz"] and b["hertz"]:
+            if which[i, j] > 0.0 and bounds is not None:
+                table[i, j] = USER + which[i, j] - 1.0, *bounds[i, j], mu
+            elif which[i, j] < 0.0:
                 g, nu = 0.5 * (a["shear"] + b["shear"]), 0.5 * (a["poiss"] + b["poiss"])
                 table[i, j] = laws.HERTZ, laws.hertz_normal_factor(g, nu), laws.mindlin_shear_factor(g, nu), mu
-            elif not a["hertz"] and not b["hertz"]:
+            elif which[i, j] == 0.0:
                 kn, ks = laws.series_stiffness(a["kn"], b["kn"]), laws.series_stiffness(a["ks"], b["ks"])
                 table[i, j] = laws.LINEAR, kn, ks, mu
     return table.reshape(n * n, 4)

@@ -20,20 +20,21 @@ from hpcdem.core.fields import MATERIAL, RADIUS, SPIN, VX, VY, X, Y
 from hpcdem.numerics.exact_sum import add_to_bins
 from hpcdem.numerics.lanes import as_bits
 from hpcdem.physics.dem.kernels import laws
-from hpcdem.physics.dem.kernels.contacts import MODEL, A, B, pair_law, pair_state
+from hpcdem.physics.dem.kernels.contacts import MODEL, USER, A, B, pair_law, pair_state
 from hpcdem.physics.dem.kernels.motion import ALPHA, CLUMPED, INERTIA, KICK_SPIN, KICK_X, KICK_Y, MASS
 from hpcdem.physics.dem.kernels.walls import NONE, P1X, P1Y, P2X, P2Y, WVX, WVY, end_of_slots, meeting, wall_state
 
-# Flows [J], the rows of bins (9, 2, 2112): work done on the model, then what it loses.
-GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS = range(9)
-FLOWS = 9
+# Flows [J], the rows of bins (10, 2, 2112): work done on the model, then what it loses; LAWS: in pairs with a law of
+# the user (user_pairs.py).
+GRAVITY, WALLS, DRIVEN, FRICTION, LOCAL, LATTICE, BONDS, OPENED, STIFFNESS, LAWS = range(10)
+FLOWS = 10
 # What is stored [J], rows of bins (5, 2, 2112).
 TRANSLATION, ROTATION, NORMAL, SHEAR, BONDED = range(5)
 STORED = 5
 
 
 @njit(cache=True, error_model="numpy")
-def _book(bins, row, value):
+def book(bins, row, value):
     if value != 0.0:
         add_to_bins(bins[row], as_bits(value))
 
@@ -76,10 +77,10 @@ def kicks(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, dt, whole, si
         else:
             kept = laws.damped(f, w, alpha)
             local += (f - kept) * (w + to_mean * (kept * kick))
-        _book(bins, GRAVITY, gravity * span)
-        _book(bins, DRIVEN, driven * span)
-        _book(bins, LATTICE, lattice * span)
-        _book(bins, LOCAL, local * span)
+        book(bins, GRAVITY, gravity * span)
+        book(bins, DRIVEN, driven * span)
+        book(bins, LATTICE, lattice * span)
+        book(bins, LOCAL, local * span)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -98,8 +99,8 @@ def kinetic(t, hot, n_left, cut, lo, foff, force, body, gx, gy, eta, whole_step,
             next_vx += laws.damped(force[r, 0] + m * gx - eta * vx, vx, alpha) * body[c, KICK_X]
             next_vy += laws.damped(force[r, 1] + m * gy - eta * vy, vy, alpha) * body[c, KICK_Y]
             next_w += laws.damped(force[r, 2], w, alpha) * body[c, KICK_SPIN]
-        _book(stored, TRANSLATION, 0.5 * m * (vx * next_vx + vy * next_vy))
-        _book(stored, ROTATION, 0.5 * body[c, INERTIA] * w * next_w)
+        book(stored, TRANSLATION, 0.5 * m * (vx * next_vx + vy * next_vy))
+        book(stored, ROTATION, 0.5 * body[c, INERTIA] * w * next_w)
 
 
 # ---- pairs ---------------------------------------------------------------------------------------------------------
@@ -129,6 +130,8 @@ def pair_losses(
             if before == 0.0 and now == 0.0 and tied == bond[k]:
                 continue
             j = partner[k]
+            if pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL], MODEL] >= USER:
+                continue
             dx, dy = hot[j, X] - hot[i, X], hot[j, Y] - hot[i, Y]
             dvx, dvy = hot[j, VX] - hot[i, VX], hot[j, VY] - hot[i, VY]
             ri, rj, made = hot[i, RADIUS], hot[j, RADIUS], u_made[k]
@@ -138,7 +141,7 @@ def pair_losses(
             _, _, _, u_before, _ = laws.pair_geometry(dx - dvx * dt, dy - dvy * dt, ri, rj)
             _, ks_before, _, _ = pair_law(i, j, tied, made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u_before)
             if tied == 0 and d2 > (ri + rj) * (ri + rj):
-                _book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
+                book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
                 continue
             fn, ks, _, energy = pair_law(i, j, tied, made, hot, ihot, pairs, bonds, n_mat, spheres, two_rt, u)
             if tied == 0 or bond[k] == 0:  # a bond that holds does not slip
@@ -146,28 +149,29 @@ def pair_losses(
                 loss = 0.5 * (before + now) * slip
                 if tied != 0 and u < 0.0:  # strained up to now; its force has not pulled in the rest of the last step
                     loss += energy - 0.5 * fn * (u - u_before)
-                _book(bins, FRICTION if tied == 0 else BONDS, loss)
-            _book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
+                book(bins, FRICTION if tied == 0 else BONDS, loss)
+            book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def pair_energy(
     t, hot, ihot, cut, lo, poff, ptr, partner, fs, bond, u_made, pairs, bonds, n_mat, spheres, stored
 ):  # fmt: skip
-    """Elastic energy of the pairs of block t: NORMAL and SHEAR where they touch, BONDED where a bond is open."""
+    """Elastic energy of the pairs of block t with a built-in law: NORMAL and SHEAR where they touch, BONDED where a
+    bond is open."""
     p = poff[t] - lo[t]
     for i in range(cut[t], cut[t + 1]):
         for k in range(ptr[p + i], ptr[p + i + 1]):
             j = partner[k]
             at = pair_state(i, j, bond[k], u_made[k], hot, ihot, pairs, bonds, n_mat, spheres)
-            if not at.active:
+            if not at.active or pairs[ihot[i, MATERIAL] * n_mat + ihot[j, MATERIAL], MODEL] >= USER:
                 continue
             shear = laws.shear_energy(fs[k], at.ks)
             if at.u >= 0.0:
-                _book(stored, NORMAL, at.energy)
-                _book(stored, SHEAR, shear)
+                book(stored, NORMAL, at.energy)
+                book(stored, SHEAR, shear)
             else:
-                _book(stored, BONDED, at.energy + shear)
+                book(stored, BONDED, at.energy + shear)
 
 
 # ---- walls ---------------------------------------------------------------------------------------------------------
@@ -186,7 +190,7 @@ def wall_work(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_ta
             at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
             if at.where != NONE:
                 fx, fy = slot_fs[k] * -at.ny - at.fn * at.nx, slot_fs[k] * at.nx - at.fn * at.ny
-                _book(bins, WALLS, (fx * wall[WVX] + fy * wall[WVY]) * span)
+                book(bins, WALLS, (fx * wall[WVX] + fy * wall[WVY]) * span)
         first = last
 
 
@@ -234,19 +238,19 @@ def wall_losses(
             if was == NONE and where == NONE:
                 continue
             way, way_before = (nx * vx + ny * vy) * dt, (mx * vx + my * vy) * dt
-            _book(bins, OPENED, _jump(where, u, way, law, 2.0 * r, was, u_before, way_before))
+            book(bins, OPENED, _jump(where, u, way, law, 2.0 * r, was, u_before, way_before))
             if before == 0.0 and now == 0.0:
                 continue
             ks_before = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u_before)[1] if was != NONE else 0.0
             if where == NONE:
                 sliding = my * vx - mx * vy - hot[i, SPIN] * r
-                _book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
+                book(bins, OPENED, laws.shear_energy(before, ks_before) + 0.5 * before * sliding * dt)
                 continue
             _, ks = laws.contact(law[MODEL], law[A], law[B], 2.0 * r, u)
             sliding = ny * vx - nx * vy - hot[i, SPIN] * (r - 0.5 * u)
             slip = (before + ks * sliding * dt - now) / ks if ks > 0.0 else sliding * dt
-            _book(bins, FRICTION, 0.5 * (before + now) * slip)
-            _book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
+            book(bins, FRICTION, 0.5 * (before + now) * slip)
+            book(bins, STIFFNESS, laws.shear_energy(before, ks_before) - laws.shear_energy(before, ks))
         first = last
 
 
@@ -259,6 +263,6 @@ def wall_energy(hot, ihot, walls, slot_row, slot_wall, slot_fs, slot_side, laws_
         for k in range(first, last):
             at = wall_state(k, first, last, hot, ihot, walls, slot_row, slot_wall, slot_side, laws_table, n_mat)
             if at.where != NONE:
-                _book(stored, NORMAL, at.energy)
-                _book(stored, SHEAR, laws.shear_energy(slot_fs[k], at.ks))
+                book(stored, NORMAL, at.energy)
+                book(stored, SHEAR, laws.shear_energy(slot_fs[k], at.ks))
         first = last

@@ -137,7 +137,7 @@ def _take(order, ptr, rows, new_ptr, new_rows):
 
 def taken_out(lists: Any, ihot: np.ndarray, stamp: float) -> Histories:
     """What the contacts of the owned particles remember. lists: neighbours.ContactLists; ihot (n, 8): their storage;
-    stamp: what the memory of contacts that touch begins with (user_pairs.py)."""
+    stamp: what the memory of contacts that touch is not below of (user_pairs.py)."""
     b, n_blocks, threaded = lists.blocks, lists.n_blocks, lists.n_blocks > 1
     totals, found = np.zeros(n_blocks, np.int64), np.zeros(n_blocks, np.int64)
     alive, count = np.empty(len(lists.partner), np.int32), np.empty(lists.n_own, np.int64)
@@ -176,7 +176,7 @@ def _count(
     if memory.shape[1] > 0:
         for k in range(U(begin), U(end)):
             alive[n] = k
-            n += U((fs[k] != 0.0) | (bond[k] != 0) | (memory[k, 0] == stamp))
+            n += U((fs[k] != 0.0) | (bond[k] != 0) | (memory[k, 0] >= stamp))
     else:
         for k in range(U(begin), U(end)):
             alive[n] = k
@@ -218,7 +218,7 @@ def _hand_out(
         i, j = np.int64(row[k]), np.int64(partner[k])
         lasts = bond[k] != 0  # nothing of broken ones
         if wide:
-            lasts |= memory[k, 0] == stamp
+            lasts |= memory[k, 0] >= stamp
         if i >= a:
             q = U(at[U(i - n_left)])
             at[U(i - n_left)] = q + U(1)
@@ -226,7 +226,7 @@ def _hand_out(
             rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k] if lasts else 0.0
             if wide:
                 for c in range(memory.shape[1]):
-                    rows[q, WIDTH + c] = memory[k, c] if memory[k, 0] == stamp else 0.0
+                    rows[q, WIDTH + c] = memory[k, c] if memory[k, 0] >= stamp else 0.0
         if a <= j < b:
             q = U(at[U(j - n_left)])
             at[U(j - n_left)] = q + U(1)
@@ -234,7 +234,7 @@ def _hand_out(
             rows[q, SHEAR], rows[q, EXTRA] = fs[k], u_made[k] if lasts else 0.0
             if wide:
                 for c in range(memory.shape[1]):
-                    rows[q, WIDTH + c] = memory[k, c] if memory[k, 0] == stamp else 0.0
+                    rows[q, WIDTH + c] = memory[k, c] if memory[k, 0] >= stamp else 0.0
     for k in range(wptr[t], wptr[t + 1]):
         if slot_fs[k] != 0.0 or slot_side[k] != 0.0:
             q = at[slot_row[k] - n_left]
