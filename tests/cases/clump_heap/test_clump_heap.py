@@ -54,7 +54,14 @@ def test_the_budget_closes(tmp_path):
     particles.delete(sim, Interval("x", 200.0, 300.0))
     cycles.cycle(sim, 3000)
     seen = sim.energy.look(sim)
-    absent = ("box", "work_blocks", "elastic_bonds", "loss_stiffness", "closing")  # stiffness is constant (linear law)
+    absent = (
+        "box",
+        "work_blocks",
+        "loss_laws",
+        "elastic_bonds",
+        "loss_stiffness",
+        "closing",
+    )  # stiffness is constant (linear law)
     for name in NAMES[:-1]:
         if name not in absent:
             assert getattr(seen, name) != 0.0, name
