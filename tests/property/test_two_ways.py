@@ -53,7 +53,7 @@ def test_two_ways_have_one_end(kind: str, tmp_path: Path) -> None:
     if kind != PARTICLES:
         assert any(end["joints"][1:].any() for end in done) and any("history v" in end for end in done)
     if kind == BLOCKS:
-        for what in ("creep", "plastic", "axial force", "slip", "pressure", "injected", "temperature"):
+        for what in ("creep", "plastic", "axial force", "slip", "pressure", "injected", "temperature", "quiet", "side"):
             assert sum(bool(np.nansum(np.abs(end.get(what, 0.0)))) for end in done) > 3, what
     if kind != BLOCKS:
         assert sum(np.abs(end["disc vy"]).max() > 0.01 for end in done) > 0.7 * len(done)

@@ -27,6 +27,7 @@ from hpcdem.halo.comm import SerialComm
 from hpcdem.lang.pcdc.execute import Interpreter
 from hpcdem.physics.bolts.model import Bolts
 from hpcdem.physics.fdem import diagnostics
+from hpcdem.physics.fdem.free_field import FreeField
 from hpcdem.physics.flow.model import Flow
 from hpcdem.physics.heat.model import Heat
 from hpcdem.physics.liners.model import Liners
@@ -360,6 +361,11 @@ class Writer:
                 states.append([f"pcdc element initial stress-xx {s!r} stress-yy {s!r}"])
         for lines in states:
             self.add(*lines)
+        if self.kind == BLOCKS and not self.static:
+            if self.rng("quiet").random() < 0.25:
+                self._quiet()
+            if self.rng("sides").random() < 0.2:
+                self.add(f"pcdc element-face boundary free-field range boundary x {x0!r} {x0!r}")
         if draw.random() < 0.5:
             self.add(
                 "pcdc history create 'v' node value velocity-y id 1 every 2",
@@ -509,6 +515,13 @@ class Writer:
             return repr(value)
         self.add(f"pcdc table create '{name}' values (0,{value!r}) ({self.units.time(100.0)!r},{value!r})")
         return f"table '{name}'"
+
+    def _quiet(self) -> None:
+        """The top of the lower body, through which a wave may come in."""
+        u, rng = self.units, self.rng("wave")
+        range_ = f"range boundary y {u.length(self.high)!r} {u.length(self.high)!r}"
+        wave = f" incoming-x {self._steady('wave', u.speed(rng.choice((0.0, 0.25))))}"
+        self.add(f"pcdc element-face boundary mech-stress-b-c property quiet on{wave} {range_}")
 
     def _surfaces(self) -> None:
         u = self.units
@@ -696,6 +709,11 @@ def end(one: Session, units: Units) -> dict[str, np.ndarray]:
             found["creep time"] = np.array([blocks.creep.time / u.t])
         if blocks.yielding().any():
             found["plastic"] = diagnostics.values(blocks, "plastic_shear_strain")
+        if blocks.quiet_faces().any():
+            found["quiet"] = blocks.quiet_faces().astype(float)
+        side = FreeField.there(blocks)
+        if side is not None:
+            found["side"], found["side v"] = side.nodes["u"] / u.l, side.nodes["v"] * u.t / u.l
         bolts = Bolts.there(blocks)
         if bolts is not None:
             found["axial force"] = bolts.values("bolt-element", "axial_force") / u.force(1.0)
