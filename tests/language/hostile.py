@@ -358,7 +358,7 @@ RUNS = [
     (BEGIN + BALL + "CYC 10", "CYC: 1 particles that are free to move have no density"),
     (
         BEGIN + TWO + "PROP shear 1e9 poiss 0.2 hertz RANGE id 1\nCYC 1",
-        "CYC: particles 1 and 2 touch, but one has the Hertz",
+        "CYC: particles 1 and 2 touch, but one has the law",
     ),
     (BEGIN + TWO + "GEN num 9 rad discrete 1 x 10 30 y 0 9\nCYC 1", "particles that are free to move have no density"),
     (BEGIN + BALL + BALL, "BALL: there is a particle with id 1 already"),
