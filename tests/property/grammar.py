@@ -223,6 +223,9 @@ class Maker:
         for ident, what in ((1, "kinetic"), (2, "step"), (3, "energy")):
             if self.chance(40 if ident < 3 else 15):
                 self.add(f"HIST id {ident} interval {self.whole(5, 40)}, {what}")
+        if self.chance(25):
+            what = self.pick("time", "unbalanced", "contacts", "bonds")
+            self.add(f"HIST id 9 interval {self.whole(5, 40)}, {what}")
         if all(any(line.startswith(f"HIST id {n}") for line in self.lines) for n in (1, 2)):
             self.add("PLOT hist 2 1")
 
