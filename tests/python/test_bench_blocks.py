@@ -39,11 +39,15 @@ def test_workloads_are_what_they_say():
     quads = made("quads")
     assert len(quads.mesh.cells) == 64 and (quads.mesh.cells[:, 3] >= 0).all()
     assert np.abs(diagnostics.values(quads, "stress_xx")).max() > 1e3
-    for kind in ("intact", "quads"):
-        own = made(kind.replace("intact", "own").replace("quads", "own-quads"))
-        assert blocks.digest(own) == blocks.digest(made(kind)) and user_laws.in_use(own)
     for work in blocks.WORKLOADS.values():
         assert work.kind in blocks.RATES and work.kind in blocks.MAKERS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "own"), [("intact", "own"), ("quads", "own-quads")])
+def test_workloads_with_a_law_of_the_user_do_the_same(kind, own):
+    obeys = made(own)
+    assert blocks.digest(obeys) == blocks.digest(made(kind)) and user_laws.in_use(obeys)
 
 
 @pytest.mark.mpi
