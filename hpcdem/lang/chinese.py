@@ -1,5 +1,6 @@
 """What commands and models of both languages do, in Chinese, a line each: for the Chinese reference pages
-(docs/zdem_reference.zh.md, docs/pcdc_reference.zh.md). Keywords of PCDC have their meaning in English only."""
+(docs/zdem_reference.zh.md, docs/pcdc_reference.zh.md), and what their keywords mean, by their English: where that
+changes, or is new, the pages have the English."""
 
 from __future__ import annotations
 
@@ -309,3 +310,502 @@ ZDEM_KEYWORDS = {
     "either": "满足其一",
 }  # fmt: skip
 """Meanings of keywords of ZDEM by their English."""
+
+PCDC_KEYWORDS = {
+    "dimensions of space; in three not everything is there, see the end of the reference":
+    "空间维数;三维中并非全部功能都有,见页末的“三维”",
+    "name of the file, beside the script": "文件名,位于脚本旁",
+    "name of the file": "文件名",
+    "acceleration": "加速度",
+    "SI, mm-MPa-s, km-MPa-s": "SI、mm-MPa-s 或 km-MPa-s",
+    "true motion in time; off: static, towards equilibrium": "随真实时间的动力计算;off:静力计算,趋于平衡",
+    "contact of surfaces": "表面之间的接触",
+    "of bodies that overlap before the first step: refuse it, with the places; let a static stage move them apart; "
+    "or start as they are":
+    "第一步之前物体已重叠时:refuse 拒绝并报出位置;relax 由静力计算阶段使其分开;keep 照原样开始",
+    "what contact presses with: the distance to the nearest side of an element over the usual altitude in its body, "
+    "or four times the smallest of its barycentric coordinates":
+    "接触的势函数:到单元最近一边的距离与其物体中单元典型高之比,或最小面积坐标的 4 倍",
+    "motion of blocks; off: they stand still while fluid or heat flows":
+    "块体的运动;off:块体不动,只计算渗流或传热",
+    "rotations of elements are taken into account": "考虑单元的转动",
+    "keep the energy budget from here on, in dynamic runs: `pcdc.energies`, histories of the model, a table at the "
+    "end":
+    "动力计算中从此统计能量平衡:`pcdc.energies`、模型的监测量和结束时的平衡表",
+    "flow of fluid in joints that have a hydraulic model": "流体在有渗流模型的节理中流动",
+    "fluid follows the blocks, but does not push on them": "单向耦合:流体随块体变化,但不对块体施加压力",
+    "heat flows in elements that have a thermal model; off: temperatures, and the stress that they bring, stay as "
+    "they are":
+    "热在有热模型的单元中传导;off:温度及其引起的应力保持不变",
+    "grains move in the fluid of channels that carry them; off: they stay where they are":
+    "支撑剂颗粒随通道中的流体运移;off:颗粒停在原处",
+    "the time step itself; 0: estimated again": "时间步的值;0:重新估算",
+    "on: estimated again every 100 steps; off: at the first step and after changes of the model only; a value stays":
+    "on:每 100 步重新估算;off:只在第一步和模型改变后估算;已给定的值不变",
+    "part of the stability limit that is taken, by estimates and mass-scaling":
+    "估算和质量缩放所取的稳定极限的比例(安全系数)",
+    "nodes get as much mass as this time step needs; 0: none, and the step is estimated again":
+    "质量缩放:增大节点质量,使此时间步稳定;0:不缩放,并重新估算时间步",
+    "sub-step of flow, which then has a clock of its own; 0: those of a cycle take the time of the steps of the "
+    "blocks, or without motion half of what is stable":
+    "渗流的子步长,此时渗流单独计时;0:一个循环的子步合计等于块体各步的时间,块体不动时取稳定步长的一半",
+    "sub-step of heat, which then has a clock of its own; 0: those of a cycle take the time of the steps of the "
+    "blocks, or without motion 0.9 of what is stable":
+    "传热的子步长,此时传热单独计时;0:一个循环的子步合计等于块体各步的时间,块体不动时取稳定步长的 0.9",
+    "number of steps": "步数",
+    "unbalanced over all forces of the nodes; with elastic: 1e-8, and as far below as rounding allows":
+    "节点不平衡力与全部节点力之比;elastic 时为 1e-8,并尽量降到舍入误差所允许的程度",
+    "steps; with elastic: units of time (1) for which prescribed velocities act":
+    "步数;elastic 时:给定速度作用多少个单位时间(1)",
+    "time that passes; in static runs creep time, each creep step to its ratio (1e-5), or with elastic at once":
+    "经过的时间;静力计算中为蠕变时间,每个蠕变步计算到其 ratio(1e-5),elastic 时直接求解",
+    "towards a ratio: it has failed when the least ratio has not fallen by a tenth in so many steps, nor in as many "
+    "as the progress so far took; 0: never":
+    "以 ratio 为目标时:若最小比值在这么多步内、且在与此前进展同样多的步内都没有降低十分之一,即为失败;0:从不",
+    "towards a ratio: it has failed after so many steps; 0: never": "以 ratio 为目标时:超过这么多步即为失败;0:从不",
+    "stop: with exit code 3; continue: with a warning, the script looks at pcdc.solved":
+    "失败时:stop 停止,退出码 3;continue 警告后继续,脚本自行查看 pcdc.solved",
+    "at once, without steps": "直接求解,不逐步计算",
+    "flow by implicit steps, backward Euler, for so much time or until it is steady; in static runs blocks are in "
+    "equilibrium at the end of each step, and joints may pass their peak and break; with mechanical off, flow alone":
+    "渗流按隐式步(后向 Euler)计算给定的时间或到稳态;静力计算中每步结束时块体处于平衡,节理可越过峰值并断开;"
+    "mechanical off 时只计算渗流",
+    "heat by implicit steps, backward Euler, for so much time or to its steady state at once; in static runs blocks "
+    "are in equilibrium at the end of each step, and joints may pass their peak and break; with mechanical off, "
+    "heat alone":
+    "传热按隐式步(后向 Euler)计算给定的时间,或直接求稳态;静力计算中每步结束时块体处于平衡,节理可越过峰值并断开;"
+    "mechanical off 时只计算传热",
+    "with hydraulic or thermal: longest time step; those of flow are shorter where joints break or no balance is "
+    "found":
+    "用于 hydraulic 或 thermal:最大时间步;节理断开或求不到平衡时,渗流的时间步会缩短",
+    "with hydraulic and time: by explicit steps, as without the word hydraulic, where an estimate says that these "
+    "cost less, or where implicit ones are refused; the log has both estimates":
+    "用于 hydraulic 和 time:估算显式步更省时,或不能用隐式步时,改用显式步(同不写 hydraulic);日志给出两个估算",
+    "with hydraulic or thermal: until as much flows out as in; no time passes":
+    "用于 hydraulic 或 thermal:求稳态,流出等于流入;不经过时间",
+    "with elastic, hydraulic or thermal: SciPy on one rank, the same bits on any number of ranks; PETSc on all; "
+    "auto: PETSc, if it is there, from 400 000 unknowns on, in space from 20 000":
+    "用于 elastic、hydraulic 或 thermal:direct 为一个进程上的 SciPy,结果与进程数无关、逐位相同;petsc 用全部进程;"
+    "auto:未知数达 400 000(三维 20 000)且装有 PETSc 时用 PETSc",
+    "with elastic: what is new in the loads is brought on in so many equal increments, in each of which elements "
+    "flow once; one that finds no balance is halved":
+    "用于 elastic:新增的荷载分这么多等份施加,每份中单元塑性流动一次;求不到平衡的一份再减半",
+    "steps of the blocks between two cycles of flow, and of heat": "两次渗流(传热)循环之间块体的步数",
+    "sub-steps of a cycle of heat; 0: as many as are stable, and where heat is that slow, without fluid or friction, "
+    "a cycle every ten steps of blocks in motion":
+    "一个传热循环的子步数;0:稳定所需的步数;传热足够慢且没有流体和摩擦时,运动的块体每十步一个循环",
+    "sub-steps of a cycle of flow; 0: as many as are stable": "一个渗流循环的子步数;0:稳定所需的步数",
+    "part of the critical damping at the frequency; 0: none any more": "在此频率处的阻尼比(占临界阻尼的比例);0:取消",
+    "where the ratio is this; with both parts it is least there": "阻尼比取此值处的频率;两部分都用时阻尼比在此最小",
+    "both, or one of them alone": "质量和刚度两部分都用,或只用其一",
+    "whether they creep": "是否蠕变",
+    "creep step of static runs; with change the first one": "静力计算的蠕变步长;给出 change 时为第一步的步长",
+    "the creep step follows this change of stress: the largest of the deviators of elements and of their Kelvin "
+    "dashpots in a creep step, over the largest deviator of all; from one to the next it halves or doubles at most":
+    "蠕变步长按此应力变化调整:一个蠕变步内单元及其 Kelvin 黏壶偏应力变化的最大值,与全部单元最大偏应力之比;"
+    "相邻两步最多减半或加倍",
+    "with change: shortest creep step": "用于 change:最小蠕变步长",
+    "with change: longest creep step": "用于 change:最大蠕变步长",
+    "the points; or a list of vectors": "各点;或一个向量列表",
+    "name of the layer; a layer may hold several shapes": "图层名;一个图层可有多个图形",
+    "the corners": "各角点",
+    "a corner": "一个角点",
+    "the corner across": "对角点",
+    "centre": "中心",
+    "radius": "半径",
+    "first angle": "起始角",
+    "last angle": "终止角",
+    "the points": "各点",
+    "distribution and mean of the angle to x, counter-clockwise; in three dimensions fixed or fisher, and the dip":
+    "与 x 轴夹角(逆时针)的分布和平均值;三维中为 fixed 或 fisher,以及倾角",
+    "uniform: half width; normal: standard deviation [degrees]; fisher: kappa":
+    "uniform:半宽;normal:标准差 [度];fisher:kappa",
+    "dip direction, clockwise from y as seen from above": "倾向,俯视时自 y 轴顺时针",
+    "distribution of the length, and its value: the length, the mean, the mean, the exponent":
+    "长度的分布及其值:依次为长度、平均值、平均值、指数",
+    "lognormal: standard deviation": "lognormal:标准差",
+    "no shorter ones": "下限:没有更小的",
+    "no longer ones": "上限:没有更大的",
+    "the same of the radius of discs": "圆盘裂隙的半径,同上",
+    "density: fractures per length of a scan line": "密度:测线单位长度上的裂隙数",
+    "density: fractures per area": "密度:单位面积内的裂隙数",
+    "density: length of fractures per area": "密度:单位面积内的裂隙长度",
+    "density: fractures per volume": "密度:单位体积内的裂隙数",
+    "density: area of fractures per volume": "密度:单位体积内的裂隙面积",
+    "direction of the line of p10": "p10 测线的方向",
+    "p20 or p21, p30 or p32 is met as nearly as whole ones can, not in the mean":
+    "用整条裂隙尽量达到 p20 或 p21、p30 或 p32,而不只是平均达到",
+    "share of the crossings with earlier fractures at which one ends": "与先前裂隙相交时终止于该裂隙的比例",
+    "the layer that bounds them": "裂隙限于此图层之内",
+    "none inside of this layer": "此图层之内没有裂隙",
+    "shorter pieces at the rim are left out": "边缘处更短的裂隙段舍去",
+    "another seed, another network": "随机种子:种子不同,裂隙网络不同",
+    "middle of one end": "一端的中心",
+    "of the other": "另一端的中心",
+    "radius at the first end": "第一端的半径",
+    "radius at the other": "另一端的半径",
+    "normal of any length": "法向,长度任意",
+    "a point of it": "其上一点",
+    "of polygons": "多边形所在的图层",
+    "the way": "拉伸的路径",
+    "direction of the axis": "轴的方向",
+    "right-handed, up to 360": "转角,右手方向,最大 360",
+    "only this layer of the file": "只导入文件中的此图层",
+    "name of the layer": "图层名",
+    "done first": "缩放倍数,最先进行",
+    "then, counter-clockwise": "旋转角,其次进行,逆时针",
+    "centre of both": "缩放和旋转的中心",
+    "last": "平移,最后进行",
+    "its outline": "剖分区域的轮廓",
+    "length of edges": "单元边长",
+    "smaller elements near this layer": "此图层附近网格加密",
+    "length of edges there": "加密处的单元边长",
+    "over which the size grows to that of the rest": "单元边长过渡到其余部分的距离",
+    "what is inside of this layer stays empty": "此图层之内为空(孔洞)",
+    "what is inside of this layer is a group of its own": "此图层之内单独成组",
+    "its name": "组名",
+    "lines that become edges of the mesh; in three dimensions surfaces, which become faces":
+    "成为网格边的线;三维中为成为单元面的面",
+    "lines that become edges with a crack from the beginning; in three dimensions surfaces":
+    "成为网格边且一开始就是裂纹的线;三维中为面",
+    "each body of the layer is a group of its own: by its name in its file, else by the layer and its number":
+    "图层中每个物体单独成组:用文件中的名称,否则用图层名加编号",
+    "triangles or quads": "三角形或四边形",
+    "triangles in no pattern: rows of equilateral ones lead cracks": "不规则的三角形:成排的等边三角形会引导裂纹",
+    "inner points lie in the middle of their neighbours, so that joints on all edges share a uniform stress evenly; "
+    "for triangles":
+    "内部节点位于相邻节点的中心,使各边上的节理均匀分担均匀应力;用于三角形",
+    "the group that the new elements are in": "新单元所在的组",
+    "the set of the group": "组所属的集",
+    "along x and y, in three dimensions z": "沿 x、y(三维还有 z)的单元格数",
+    "tetrahedra of each box: 5, mirrored from box to box, 6 about a diagonal, or 12 about a point in the middle":
+    "每个长方体分成的四面体:5 个(相邻长方体互为镜像)、6 个(绕一条对角线)或 12 个(绕中心点)",
+    "triangles or quads, in three dimensions tetrahedra or hexahedra": "三角形或四边形,三维中为四面体或六面体",
+    "of the triangles; alternating, or both of each rectangle": "三角形的对角线方向;alternate 为交替,both 为每个矩形用两条",
+    "along x and y (and z): each rectangle or box is so many times as large as the one before":
+    "沿 x、y(和 z):每个矩形(长方体)的尺寸是前一个的多少倍",
+    "a group that all elements are put into, besides those of the file": "除文件中的组外,全部单元再放入此组",
+    "points nearer than this are one": "距离小于此值的点合并为一点",
+    "metres in a unit of the file": "文件中一个长度单位等于多少米",
+    "its lines are edges of the mesh, its surfaces faces": "图层中的线是网格的边,面是单元面",
+    "they are not: the edges that follow them best are taken, the faces between elements on either side":
+    "图层不在网格边上时:取最贴近的网格边,即两侧单元之间的面",
+    "ends of faces nearer than this are one": "面的端点距离小于此值时视为同一点",
+    "only faces between the elements of these two groups": "只用这两组单元之间的面",
+    "name of the group": "组名",
+    "density": "密度",
+    "Young's modulus E": "杨氏模量 E",
+    "Poisson's ratio": "泊松比",
+    "shear modulus, with the bulk modulus in the place of E and Poisson's ratio":
+    "剪切模量,与体积模量一起代替 E 和泊松比",
+    "bulk modulus, with the shear modulus in the place of E and Poisson's ratio":
+    "体积模量,与剪切模量一起代替 E 和泊松比",
+    "viscous damping, part of the critical 2 L sqrt(rho E); without effect in static runs":
+    "黏性阻尼,占临界值 2 L sqrt(rho E) 的比例;静力计算中不起作用",
+    "friction angle of its surfaces where they have no contact model": "表面没有接触模型时的摩擦角",
+    "contact penalty of its surfaces where they have no contact model; 0: that of its joints, or 10 E":
+    "表面没有接触模型时的接触罚参数;0:取其节理的值,或 10 E",
+    "what they did to the others dies down over this time (static runs: so many steps)":
+    "移去的单元对其余单元的作用力在此时间内(静力计算:这么多步内)逐渐释放",
+    "internal friction angle; also that of its surfaces where they have no contact model":
+    "内摩擦角;表面没有接触模型时也是其摩擦角",
+    "cohesion": "黏聚力",
+    "tensile strength; no more than cohesion / tan(friction) counts": "抗拉强度;最大取 cohesion / tan(friction)",
+    "dilation angle, at most the friction angle": "剪胀角,不大于内摩擦角",
+    "a property that the law declares, by its name, and its value": "本构所声明的参数的名称和值",
+    "bulk modulus; in the place of the one that E and Poisson's ratio give": "体积模量;代替由 E 和泊松比得出的值",
+    "shear modulus of the Kelvin unit; 0: no Kelvin unit": "Kelvin 体的剪切模量;0:没有 Kelvin 体",
+    "viscosity of the Kelvin unit; 0: no Kelvin unit": "Kelvin 体的黏度;0:没有 Kelvin 体",
+    "shear modulus of the Maxwell unit; in the place of the one that E and Poisson's ratio give":
+    "Maxwell 体的剪切模量;代替由 E 和泊松比得出的值",
+    "viscosity of the Maxwell unit; 0: no dashpot": "Maxwell 体的黏度;0:没有黏壶",
+    "strain xx of the Kelvin unit at that moment; its zz is -xx - yy": "此刻 Kelvin 体的应变 xx;其 zz 为 -xx - yy",
+    "strain yy of the Kelvin unit at that moment; its zz is -xx - yy": "此刻 Kelvin 体的应变 yy;其 zz 为 -xx - yy",
+    "strain xy of the Kelvin unit at that moment; its zz is -xx - yy": "此刻 Kelvin 体的应变 xy;其 zz 为 -xx - yy",
+    "strain zz of the Kelvin unit at that moment, to be said of all three": "此刻 Kelvin 体的应变 zz,供写明全部三个正应变时用",
+    "strain xz of the Kelvin unit at that moment": "此刻 Kelvin 体的应变 xz",
+    "strain yz of the Kelvin unit at that moment": "此刻 Kelvin 体的应变 yz",
+    "thermal conductivity": "导热系数",
+    "specific heat": "比热容",
+    "heat transfer at faces: to an environment that is prescribed on them without a coefficient of its own, and to "
+    "surfaces that they touch, with the harmonic mean of both":
+    "单元面的换热系数:用于面上给定环境温度而未给换热系数时,以及与所接触的表面换热(取两者的调和平均)",
+    "linear thermal expansion": "线膨胀系数",
+    "conductivity across the direction of conductivity-angle": "垂直于 conductivity-angle 方向的导热系数",
+    "direction of conductivity from x, counter-clockwise, in space the strike of the planes along which it is; it "
+    "turns with the element":
+    "conductivity 的方向,自 x 轴逆时针,三维中为导热面的走向;随单元转动",
+    "how much of its share of the work of friction an element takes as heat where its faces slide on others":
+    "单元面与其他面滑动时,单元所分担的摩擦功转化为热的比例",
+    "dip of these planes": "导热面的倾角",
+    "'file.py:law': the file, beside the script, and the name of the law in it; plain text":
+    "'file.py:law':脚本旁的文件及其中本构的名称;须为普通文本",
+    "friction angle of its surfaces where they have no contact model; the internal one of mechanical-mohr-coulomb":
+    "表面没有接触模型时的摩擦角;对 mechanical-mohr-coulomb 为内摩擦角",
+    "stress xx": "应力 xx",
+    "is added: its product with the position": "梯度:再加上它与坐标的乘积",
+    "stress yy": "应力 yy",
+    "stress xy": "应力 xy",
+    "stress zz": "应力 zz",
+    "stress xz": "应力 xz",
+    "stress yz": "应力 yz",
+    "friction angle": "摩擦角",
+    "normal penalty; 10 to 100 E is usual": "法向罚参数;一般为 10 到 100 E",
+    "shear penalty": "切向罚参数",
+    "largest normal stress while surfaces approach; contacts that reach it lose energy":
+    "表面接近时法向应力的上限;达到它的接触损失能量",
+    "exponent of the overlap while surfaces part; above 1 contacts lose energy":
+    "表面分离时重叠量的指数;大于 1 时接触损失能量",
+    "normal dashpot, part of the critical damping of two elements; the larger of two surfaces counts; without effect "
+    "in static runs":
+    "法向黏壶,占两单元临界阻尼的比例;取两个表面中较大的值;静力计算中不起作用",
+    "stress along the normal, which turns with the surface; negative is pressure": "沿法向的应力,法向随表面转动;负为压力",
+    "dashpots rho c_p and rho c_s, through which waves leave in dynamic runs; a stress given beside it enters as a "
+    "wave of half its size":
+    "黏性(吸收)边界:黏壶 rho c_p 和 rho c_s,动力计算中波由此传出;同时给出的应力作为其一半大小的波传入",
+    "velocity along x of a plane wave that comes in through quiet faces": "由黏性边界传入的平面波沿 x 的速度",
+    "the same along y": "沿 y,同上",
+    "the same along z": "沿 z,同上",
+    "heat that comes in": "流入的热流密度",
+    "heat transfer to the environment": "与环境的换热系数",
+    "temperature of the environment": "环境温度",
+    "cohesion; 0: friction alone": "黏聚力;0:只有摩擦",
+    "tensile strength; 0: none": "抗拉强度;0:没有",
+    "fracture energy, mode I": "I 型断裂能",
+    "fracture energy, mode II": "II 型断裂能",
+    "penalty of a closed joint": "闭合节理的罚参数",
+    "penalty of opening": "张开的罚参数",
+    "penalty of shear": "剪切的罚参数",
+    "integration points": "积分点数",
+    "density of the fluid": "流体密度",
+    "bulk modulus of the fluid": "流体的体积模量",
+    "kinematic viscosity of the fluid: the dynamic one over the density": "流体的运动黏度:动力黏度除以密度",
+    "hydraulic aperture of a joint that is not opened; of joints that are not broken a virtual one, which stands for "
+    "the permeability of the rock":
+    "未张开节理的水力开度;未断节理的是虚拟开度,代表岩石的渗透性",
+    "smallest hydraulic aperture, of joints that are pressed together": "最小水力开度,用于受压闭合的节理",
+    "largest hydraulic aperture": "最大水力开度",
+    "broken joints lose fluid to the rock after Carter": "断开的节理按 Carter 模型向岩石滤失流体",
+    "leak-off: pressure in the pores of the rock; negative: suction of rock that is not saturated":
+    "滤失:岩石的孔隙压力;负值:非饱和岩石的吸力",
+    "leak-off: permeability of the rock": "滤失:岩石的渗透率",
+    "leak-off: compressibility of the pores": "滤失:孔隙压缩系数",
+    "leak-off: porosity of the rock": "滤失:岩石的孔隙度",
+    "the aperture grows by the tangent of this angle times the mean slip of the joint":
+    "剪胀角:开度增加其正切与节理平均滑移量之积",
+    "what slip adds to the aperture at most": "滑移使开度增加的最大值",
+    "leak-off: part of the pores that was full before; below 1 a sharp front fills the rest":
+    "滤失:岩石的初始饱和度;小于 1 时其余孔隙由陡峭的湿润锋面充满",
+    "density of the grains": "支撑剂颗粒的密度",
+    "diameter of the grains": "支撑剂颗粒的直径",
+    "channels narrower than so many grains carry none: they bridge": "宽度小于这么多个粒径的通道不携带颗粒:发生桥堵",
+    "hydraulic aperture of a pack over that of the channel; 0: permeability of the pack after Kozeny and Carman":
+    "支撑剂充填层的水力开度与通道开度之比;0:充填层的渗透率按 Kozeny–Carman 公式",
+    "concentration of a pack": "充填层的浓度(极限浓度)",
+    "modulus of a pack that is pressed together; 0: it bears nothing": "受压充填层的模量;0:不承受压力",
+    "beta of the slurry, whose viscosity is that of the fluid times (1 - C / limit)^beta":
+    "携砂液黏度公式的 beta:黏度为流体黏度乘以 (1 - C / limit)^beta",
+    "settling after Stokes; else after Schiller and Naumann, for any Reynolds number":
+    "按 Stokes 公式沉降;否则按 Schiller–Naumann 公式,适用于任何雷诺数",
+    "thermal conductivity of the fluid": "流体的导热系数",
+    "specific heat of the fluid": "流体的比热容",
+    "heat transfer between fluid and each of the two sides": "流体与两壁各自之间的换热系数",
+    "advection of second order with a flux limiter: fronts stay sharper": "带通量限制器的二阶对流格式:锋面更清晰",
+    "velocity along x": "沿 x 的速度",
+    "velocity along y": "沿 y 的速度",
+    "velocity along z": "沿 z 的速度",
+    "acceleration along x": "沿 x 的加速度",
+    "acceleration along y": "沿 y 的加速度",
+    "acceleration along z": "沿 z 的加速度",
+    "force along x": "沿 x 的力",
+    "force along y": "沿 y 的力",
+    "force along z": "沿 z 的力",
+    "0 free, 1 held, 2 moves along the vector only, 3 (in three dimensions) across it only (type 0 and 1 take a "
+    "vector and do not use it)":
+    "0 自由,1 固定,2 只能沿向量运动,3(三维)只能垂直于向量运动(0 和 1 可写向量,但不用)",
+    "pressure, not negative": "压力,不为负",
+    "level of water that stands at the nodes, against gravity: hydrostatic pressure below it; above it water can "
+    "leave (seepage)":
+    "节点处的水位,沿重力反方向:水位以下为静水压力;以上水可流出(渗出面)",
+    "volume that comes in at each node; negative: is taken out, as far as there is fluid; in space m3/s":
+    "每个节点流入的流量;负值:抽出,以有流体为限;三维中单位为 m3/s",
+    "concentration of the slurry that conditions and wells bring: volume of grains over that of the slurry":
+    "边界条件和井所注入携砂液的浓度:颗粒体积与携砂液体积之比",
+    "volume of grains that comes in at each node, in the slurry that is there; in space m3/s":
+    "每个节点随该处携砂液进入的颗粒体积流量;三维中单位为 m3/s",
+    "temperature": "温度",
+    "'file.py:function', beside the script; plain text": "'file.py:function',文件在脚本旁;须为普通文本",
+    "velocity": "速度",
+    "temperature, of the fluid at them too; before, it is 0. Elements around the nodes are free of thermal stress "
+    "then":
+    "温度,该处流体也取此值;此前为 0。此时节点周围的单元没有热应力",
+    "filled, at this pressure": "充满,并处于此压力",
+    "part of the room that is filled": "饱和度:充有流体的空间的比例",
+    "of proppant in the fluid that is there": "该处流体中支撑剂的浓度",
+    "name": "名称",
+    "volume that is pumped in; negative: drawn, as far as there is fluid; in space m3/s":
+    "泵入的流量;负值:抽出,以有流体为限;三维中单位为 m3/s",
+    "pressure that is held": "保持的压力",
+    "nothing comes in or out": "关井:既不流入也不流出",
+    "time of flow that it takes": "此阶段的时间(渗流时间)",
+    "with rate: pressure above which less is pumped in": "用于 rate:压力超过此值时减少泵入量",
+    "the points, from the head on; or a list of vectors": "各点,从锚头开始;或一个向量列表",
+    "elements of each straight part": "每个直线段的单元数",
+    "of an element, at most": "单元的最大长度",
+    "from where to where along the bolt there is grout; without the rest is free":
+    "沿锚杆注浆段的起止位置;其余为自由段",
+    "the first node is tied to the rock: a face plate": "第一个节点与岩石固定:托盘",
+    "the group that its elements and nodes are put into": "其单元和节点所入的组",
+    "diameter of the bar": "杆体直径",
+    "axial force at which it yields in tension": "受拉屈服的轴力",
+    "axial force, without sign, at which it yields in compression": "受压屈服的轴力,不带符号",
+    "lengthening of an element since it was installed, over its length, at which it breaks for good":
+    "单元自安装以来的伸长率,达到时永久拉断",
+    "force of the grout per length of bolt and displacement": "浆体的剪切刚度:单位锚杆长度、单位位移的力",
+    "thickness of the grout around the bar": "杆体周围浆体的厚度",
+    "cohesion between rock and grout": "岩石与浆体之间的黏聚力",
+    "cohesion between grout and bolt": "浆体与锚杆之间的黏聚力",
+    "friction angle between rock and grout": "岩石与浆体之间的摩擦角",
+    "friction angle between grout and bolt": "浆体与锚杆之间的摩擦角",
+    "from bolt to bolt across the plane": "垂直于计算平面的锚杆间距",
+    "tension with which it is installed": "安装时的预拉力",
+    "viscous damping of the motion along the bar, part of 2 A sqrt(rho E); without effect in static runs":
+    "沿杆体运动的黏性阻尼,占 2 A sqrt(rho E) 的比例;静力计算中不起作用",
+    "Poisson's ratio: E / (1 - nu^2) counts in plane strain; 0 for steel sets":
+    "泊松比:平面应变中取 E / (1 - nu^2);钢拱架取 0",
+    "thickness of the shell; without area and inertia it gives both": "衬砌厚度;不给面积和惯性矩时由它得出两者",
+    "area of the section over the spacing of steel sets": "截面面积除以钢拱架间距",
+    "second moment of the section over the spacing of steel sets": "截面惯性矩除以钢拱架间距",
+    "strength in tension; with compressive_strength": "抗拉强度;与 compressive_strength 一起给出",
+    "strength in compression; with tensile_strength": "抗压强度;与 tensile_strength 一起给出",
+    "largest moment at the axial force that allows most": "塑性弯矩:最有利轴力下的最大弯矩",
+    "stiffness of the bond across the face": "衬砌与岩面黏结的法向刚度",
+    "stiffness of the bond along the face; 0: it slips freely": "衬砌与岩面黏结的切向刚度;0:自由滑动",
+    "tension at which the bond parts for good": "黏结永久脱开的拉应力",
+    "cohesion of the bond, until it parts": "黏结脱开之前的黏聚力",
+    "friction angle of the bond, whether it has parted or not": "黏结的摩擦角,脱开前后相同",
+    "rate of rotation, counter-clockwise": "转动速度,逆时针",
+    "moment, counter-clockwise": "弯矩,逆时针",
+    "(time or coordinate, value), the first ascending": "(时间或坐标, 值),前者递增",
+    "scale (63 % of the values are below it) and shape": "尺度参数(63 % 的值在其下)和形状参数",
+    "mean and standard deviation": "平均值和标准差",
+    "mean and standard deviation of the values themselves": "值本身的平均值和标准差",
+    "another seed, another field": "随机种子:种子不同,随机场不同",
+    "over this length neighbours are alike: the field is one of places, the same in any mesh":
+    "相关长度:此长度内的值相近;随机场按位置定义,与网格无关",
+    "exp(-r/L), or exp(-(r/L)2), which is smooth": "exp(-r/L),或光滑的 exp(-(r/L)2)",
+    "the distribution is cut below": "分布的下限",
+    "the distribution is cut above": "分布的上限",
+    "what it is a number of": "所记录的对象",
+    "the object of this number": "此编号的对象",
+    "the object nearest to this point": "距此点最近的对象",
+    "what is recorded, see below": "记录的量,见页末的“监测记录的量”",
+    "steps between two records": "两次记录之间的步数",
+    "with law-state: which state variable of laws of the user": "用于 law-state:用户本构的哪个状态变量",
+    "with object well: its name": "对象为井时:井名",
+    "of the objects of range, or of all": "对 range 选中的对象,或全部对象",
+    "only these": "只导出这些",
+    "over the diagram": "图的标题",
+    "of the axis": "坐标轴的标签",
+    "history along x; without it the time": "x 轴的监测;不给时为时间",
+    "history along y": "y 轴的监测",
+    "factor": "倍数",
+    "points (x,y)": "点 (x,y)",
+    "of the fluid as it is now, along the line that the joints of the range make, over the distance [m] from its left "
+    "end":
+    "流体此刻的量,沿 range 中节理连成的线,对距其左端的距离 [m] 绘出",
+    "in the legend": "图例中的名称",
+    "how it is drawn": "曲线的画法",
+    "name of the figure: .png, .pdf or .svg": "图的文件名:.png、.pdf 或 .svg",
+    "beside it the model as it is now, with its cracks by the way they broke":
+    "旁边画出模型现状,裂纹按断裂方式着色",
+    "beside it the model as it is now, with contours of plastic shear strain": "旁边画出模型现状及塑性剪应变云图",
+    "beside it the model as it is now, with contours of temperature, and cracks": "旁边画出模型现状及温度云图和裂纹",
+    "beside it the model as it is now, its channels coloured by that": "旁边画出模型现状,通道按此量着色",
+    "first part of the names of the files, in the folder of the results": "文件名的前一部分,位于结果目录",
+    "steps between two frames": "两帧之间的步数",
+    "no more frames of this name": "不再写此名称的帧",
+    "first part of the name, in the folder of the results; .pdf, .svg or .png at its end says what is drawn":
+    "文件名的前一部分,位于结果目录;末尾的 .pdf、.svg 或 .png 决定图的格式",
+    "what is shown, as a file *.mv says, of hpcdem view or hpcdem draw":
+    "显示的内容,由 hpcdem view 或 hpcdem draw 的 *.mv 文件给出",
+    "what colours objects; hpcdem draw --list names the fields of a frame":
+    "给对象着色的物理量;hpcdem draw --list 列出帧中的物理量",
+    "of which objects the field and the options below are": "物理量和以下选项所属的对象",
+    "values of the first and the last colour": "色标两端的值",
+    "colours by the logarithm": "按对数着色",
+    "of the field": "物理量的色标",
+    "from 0 to 1": "不透明度,0 到 1",
+    "outlines of elements": "单元的轮廓",
+    "factor on widths of lines": "线宽的倍数",
+    "arrows: displacement or velocity": "箭头:位移或速度",
+    "factor on their length": "箭头长度的倍数",
+    "only objects for which this holds, as 'stress_yy < -1e6 and x > 2'":
+    "只画满足此条件的对象,如 'stress_yy < -1e6 and x > 2'",
+    "factor on displacements": "位移的放大倍数",
+    "lower left and upper right corner of the picture, in space along it and up it":
+    "图片的左下角和右上角,三维中沿图片的水平和竖直方向",
+    "from where a body is seen: along an axis, from the right, the front and above (iso), or from a direction":
+    "视线方向:沿某一坐标轴,从右前上方(iso),或从给定方向",
+    "a plane that cuts it: 'x=1.5' takes the part towards the eye away, 'x<1.5' and 'x>1.5' say what stays, "
+    "'px,py,pz,nx,ny,nz' gives a point and the normal into what is taken away":
+    "剖切面:'x=1.5' 切去靠近视点的部分,'x<1.5' 和 'x>1.5' 指明留下的部分,"
+    "'px,py,pz,nx,ny,nz' 给出一点和指向切去部分的法向",
+    "over the picture; {step} and {time} are filled in": "图片的标题;{step} 和 {time} 会被代入",
+    "members of the group": "组的成员",
+    "members of any group of the set": "此集中任一组的成员",
+    "the number, or from first to last; numbers begin at 0, as in the output": "编号,或从首号到末号;编号从 0 开始,与输出相同",
+    "x from ... to ..., in the mesh": "网格中 x 从……到……",
+    "y from ... to ..., in the mesh": "网格中 y 从……到……",
+    "z from ... to ..., in the mesh": "网格中 z 从……到……",
+    "lies on the lines, in three dimensions on the surfaces, of the geometry layer; elements: their centre is inside "
+    "of it; in the mesh":
+    "位于几何图层的线上(三维:面上);单元:中心在图层之内;按网格中的位置",
+    "x, y and geometry (of elements) look at where things are at this moment":
+    "x、y 和(单元的)geometry 按此刻的位置判断",
+    "lies on a surface of the model": "位于模型的表面",
+    "faces, joints or nodes of the elements of the group; joints: both elements are in it":
+    "此组单元的面、节理或节点;节理:两侧单元都在组中",
+    "joints with an element of each of the two groups": "两侧单元分属这两组的节理",
+    "joints on a crack of the mesh": "网格裂纹上的节理",
+}  # fmt: skip
+"""Meanings of keywords of PCDC, and of their properties, by their English."""
+
+PCDC_DEFAULTS = {
+    "static runs: ten times as many as a wave takes there and back, at least 20 000; dynamic ones, and beside cycles "
+    "or time: 0":
+    "静力计算:波往返所需步数的十倍,至少 20 000;动力计算,或同时给出 cycles、time 时:0",
+    "static runs 1 000 000, dynamic ones 10 000 000; beside time: 0":
+    "静力计算 1 000 000,动力计算 10 000 000;同时给出 time 时:0",
+    "a hundredth of the time": "时间的百分之一",
+    "dt stays": "dt 不变",
+    "none": "无",
+    "all": "全部",
+    "ten times the size": "边长的十倍",
+    "the name of the layer": "图层名",
+    "a thousandth of the shortest edge": "最短边的千分之一",
+    "at once": "立即",
+    "the normal penalty": "同法向罚参数",
+    "never": "从不",
+    "that of the elements": "同单元",
+    "that of opening": "同张开",
+    "no limit": "无限制",
+    "needed by leak-off": "leak-off 时必需",
+    "no end": "不结束",
+    "to the edges of the elements of the mesh": "以网格单元的边分段",
+    "all of it": "全长",
+    "that in tension": "同受拉",
+    "that of a rectangle of this area and inertia": "此面积和惯性矩的矩形的厚度",
+    "the thickness": "同厚度",
+    "that of a rectangle": "矩形截面的值",
+    "never slips": "不滑动",
+    "each object by itself": "各对象独立",
+    "time": "时间",
+    "once, now": "只写一次,立即",
+    "everything": "全部内容",
+    "the first that have the field": "最先有此物理量的对象",
+    "least and greatest of what is shown": "所显示的最小值和最大值",
+    "the model": "整个模型",
+    "whole": "不剖切",
+}  # fmt: skip
+"""Defaults of PCDC that are told in words, by their English."""

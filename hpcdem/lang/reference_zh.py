@@ -22,8 +22,7 @@ _HEAD = """\
 
 本页由 `hpcdem/lang/{package}/table.py` 和 `hpcdem/lang/chinese.py` 生成,请勿直接修改
 (`python -m hpcdem.lang.reference_zh {package} > docs/{package}_reference.zh.md`)。
-{keywords}
-完整的英文说明见 [{name} commands]({package}_reference.md)。
+命令和关键字的说明是中文;完整的英文说明见 [{name} commands]({package}_reference.md)。
 """
 
 _ZDEM = """
@@ -49,10 +48,21 @@ _PCDC = """
 """
 
 
+_IN_ROWS = {
+    "| required |": "| 必需 |",
+    "; also read: ": ";也可写作 ",
+    "; may be repeated": ";可重复",
+    " (**not carried out yet**)": "(**尚不执行**)",
+    "| all |": "| 全部 |",
+    "| that of the law |": "| 由本构而定 |",
+    "; joined particles keep theirs": ";所连颗粒保持各自的值",
+}
+
+
 def zdem_page() -> str:
     """All of docs/zdem_reference.zh.md."""
     parts = [
-        _HEAD.format(name="ZDEM", package="zdem", keywords="命令和关键字的说明是中文;"),
+        _HEAD.format(name="ZDEM", package="zdem"),
         _ZDEM,
         _overview({c.name: _said(chinese.ZDEM, c.name, c.doc) for c in ZDEM.commands}),
     ]
@@ -69,12 +79,12 @@ def zdem_page() -> str:
         lines += [*zdem._syntax(command), "```", ""]
         if not command.same_as:
             if command.options:
-                lines += [_chinese(zdem._options(_meant(command.options)), all_of_it=True), ""]
+                lines += [_chinese(zdem._options(_meant(command.options))), ""]
             lines += ["例:", "", "```", *command.example, "```", ""]
         parts.append("\n".join(lines))
     parts += ["## RANGE\n\n写在行末,只对部分颗粒起作用;不写时对全部。各项用 `and`、`or` 连接,从左到右。\n"]
     parts += [
-        _chinese(zdem._options(_meant(ZDEM.range_terms)), all_of_it=True),
+        _chinese(zdem._options(_meant(ZDEM.range_terms))),
         "\n## 颜色\n",
         "| 编号 | 名称 |",
         "|---|---|",
@@ -86,7 +96,7 @@ def zdem_page() -> str:
 def pcdc_page() -> str:
     """All of docs/pcdc_reference.zh.md."""
     parts = [
-        _HEAD.format(name="PCDC", package="pcdc", keywords="命令的说明是中文,关键字的含义目前只有英文;"),
+        _HEAD.format(name="PCDC", package="pcdc"),
         _PCDC,
         _overview({c.name: _said(chinese.PCDC, c.name, c.doc) for c in PCDC.commands}),
     ]
@@ -102,18 +112,27 @@ def pcdc_page() -> str:
         ]
         lines += [*pcdc._syntax(command), "```", ""]
         if command.leading or command.options:
-            lines += [_chinese(pcdc._options(command.options, command.leading)), ""]
+            lines += [_chinese(pcdc._options(_meant_pcdc(command.options), _meant_pcdc(command.leading))), ""]
         if command.models:
             lines += ["模型:" + "、".join(f"[{m.keyword.name}](#{m.keyword.name})" for m in command.models) + "。", ""]
         lines += ["例:", "", "```", *command.example, "```", ""]
         parts.append("\n".join(lines))
     parts += ["## range\n\n写在行末,只对部分对象起作用;不写时对全部。各项必须同时满足;什么也没选中是错误。\n"]
-    parts += [_chinese(pcdc._options(PCDC.range_terms)), "\n## 模型和条件\n"]
+    parts += [_chinese(pcdc._options(_meant_pcdc(PCDC.range_terms))), "\n## 模型和条件\n"]
     for command in PCDC.commands:
         for model in command.models:
             lines = [f"### {model.keyword.name}", "", f"`{model.notation}`(`pcdc {command.name}`)", ""]
             lines += [_said(chinese.MODELS, model.keyword.name, model.doc), ""]
-            parts.append("\n".join([*lines, *([_chinese(pcdc._options(model.options)), ""] if model.options else [])]))
+            if model.one_of:
+                lines[-2] += "必需:" + ",或 ".join(" 和 ".join(names) for names in model.one_of) + "。"
+            if model.options:
+                lines += [_chinese(pcdc._options(_meant_pcdc(model.options))), ""]
+            parts.append("\n".join(lines))
+    parts += ["## 监测记录的量\n", _chinese(_last(pcdc._recorded()))]
+    parts += [
+        "\n## 三维\n\n`pcdc model new dim 3` 之后向量有三个分量,可用以下命令,除列出者外关键字都可用;其余在运行前被拒绝。\n"
+    ]
+    parts += [_chinese(_last(pcdc._dimensions(PCDC)))]
     return "\n".join(parts).rstrip("\n") + "\n"
 
 
@@ -133,19 +152,44 @@ def _meant(options: Sequence[Option]) -> list[Option]:
     return [dataclasses.replace(option, doc=chinese.ZDEM_KEYWORDS.get(option.doc, option.doc)) for option in options]
 
 
-def _chinese(table: str, all_of_it: bool = False) -> str:
-    """A table of keywords with its head in Chinese; all_of_it: so are their meanings."""
+def _meant_pcdc(options: Sequence[pcdc.Option]) -> list[pcdc.Option]:
+    """Keywords of PCDC, and those that belong to them, with their meanings and defaults in Chinese."""
+    return [
+        dataclasses.replace(
+            option,
+            doc=chinese.PCDC_KEYWORDS.get(option.doc, option.doc),
+            default=chinese.PCDC_DEFAULTS.get(option.default, option.default),
+            more=tuple(_meant_pcdc(option.more)),
+        )
+        for option in options
+    ]
+
+
+def _last(section: str) -> str:
+    """The table that ends a section."""
+    return section.rstrip("\n").rsplit("\n\n", 1)[1]
+
+
+def _chinese(table: str) -> str:
+    """A table of keywords with its head, and the words that its rows share, in Chinese."""
     head, *rows = table.split("\n")
     names = {
         "keyword": "关键字",
         "value": "值",
         "unit": "单位",
         "default": "默认",
-        "meaning": "含义" if all_of_it else "含义(英文)",
+        "meaning": "含义",
         "from": "来源",
+        "object": "对象",
+        "command": "命令",
+        "models": "模型",
+        "not there": "没有的关键字",
+        "in three dimensions only": "仅三维有的",
     }
     cells = [names[cell.strip()] for cell in head.strip("|").split("|")]
-    return "\n".join(["| " + " | ".join(cells) + " |", *(row.replace("| required |", "| 必需 |") for row in rows)])
+    for english, meant in _IN_ROWS.items():
+        rows = [row.replace(english, meant) for row in rows]
+    return "\n".join(["| " + " | ".join(cells) + " |", *rows])
 
 
 PAGES: dict[str, Callable[[], str]] = {"zdem": zdem_page, "pcdc": pcdc_page}

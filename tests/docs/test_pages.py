@@ -138,6 +138,20 @@ def test_commands_have_their_line_in_chinese() -> None:
         assert set(texts) <= names and len(texts) > 0.9 * len(names)
     options = {o.doc for c in ZDEM.commands for o in (*c.leading, *c.options)} | {o.doc for o in ZDEM.range_terms}
     assert set(chinese.ZDEM_KEYWORDS) <= options and len(chinese.ZDEM_KEYWORDS) > 0.9 * len(options)
+    shown = [*PCDC.range_terms]
+    for command in PCDC.commands:
+        shown += [*command.leading, *command.options, *(option for model in command.models for option in model.options)]
+    shown += [inner for option in shown for inner in option.more]
+    meanings = {option.doc for option in shown}
+    assert set(chinese.PCDC_KEYWORDS) <= meanings and len(chinese.PCDC_KEYWORDS) >= 0.9 * len(meanings)
+    assert set(chinese.PCDC_DEFAULTS) <= {option.default for option in shown}
+
+
+def test_a_meaning_that_nobody_wrote_in_chinese_is_told_in_english(monkeypatch: pytest.MonkeyPatch) -> None:
+    english = "tensile strength; 0: none"
+    assert english not in reference_zh.pcdc_page()
+    monkeypatch.delitem(chinese.PCDC_KEYWORDS, english)
+    assert reference_zh.pcdc_page().count(english) == 2  # of joints, by c-model and property
     for table in (chinese.ZDEM, chinese.ZDEM_KEYWORDS, chinese.PCDC, chinese.MODELS):
         for text in table.values():
             assert re.search("[\u4e00-\u9fff]", text)
