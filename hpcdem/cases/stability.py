@@ -139,7 +139,12 @@ factor = 0.5 * (stands + falls)
 print('factor of safety %.4g: stands with %.4g, comes down with %.4g' % (factor, stands, falls))
 pcdc output vtk 'stability'
 pcdc chart create 'stability' x-label 'factor' y-label 'largest displacement (m)'
-points = sorted((trial[0], trial[1]) for trial in trials)
-pcdc chart add 'stability' values [points] style points
+stood = [trial[:2] for trial in trials if trial[0] <= stands]
+fell = [trial[:2] for trial in trials if trial[0] >= falls]
+if stood:
+    pcdc chart add 'stability' values [stood] label 'stands' style points
+pcdc chart add 'stability' values [fell] label 'comes down' style points
+line = [(factor, 0.0), (factor, max(trial[1] for trial in trials))]
+pcdc chart add 'stability' values [line] label ['factor of safety %.3g' % factor]
 pcdc chart export 'stability' 'stability.png' plastic
 """

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
+from hpcdem.io.vtkhdf_mesh import read_mesh_frame
 from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state, user_laws
 from hpcdem.physics.fdem.kernels.elements import PARTS
 from hpcdem.physics.fdem.mesh import Mesh
@@ -18,6 +20,7 @@ from hpcdem.physics.fdem.simulation import Blocks
 from tests.blocks.laws import rock
 from tests.blocks.support import ROCK, jointed, model, near, rectangle, shaken
 from tests.blocks.test_yielding import deform
+from tests.pcdc.test_plastic import run
 
 LAWS = Path(__file__).with_name("laws") / "rock.py"
 STRESSES = ("stress_xx", "stress_yy", "stress_xy", "stress_zz")
@@ -149,6 +152,21 @@ def test_a_quad_follows_the_law_in_each_of_its_triangles():
             force[k] += -0.5 * d.area * d.gradients @ s
     assert found == pytest.approx(force, abs=1e-6 * np.abs(force).max())
     assert max(slips) > 0.0 and np.ptp(slips) > 0.0
+
+
+def test_states_stand_in_frames(tmp_path):
+    shutil.copy(LAWS, tmp_path)
+    text = """
+pcdc mesh structured (0,0) (1,1) cells 3 3
+pcdc element c-model user 'rock.py:tresca' property den 2000 young 1e9 poisson-ratio 0.2 parameter 'limit' 1e4
+pcdc node boundary mech-vel-b-c velocity-x 5 range y 1 1
+pcdc model step 100
+pcdc output vtk 'f'
+"""
+    pcdc = run(tmp_path, text).namespace["pcdc"]
+    frame = read_mesh_frame(tmp_path / "data" / "f_0000000100.vtkhdf")
+    for name in ("law_g11", "law_g12", "law_slip"):
+        assert np.array_equal(frame.of_elements[name], pcdc.values("element", name)) and frame.of_elements[name].any()
 
 
 def test_initial_stress_reaches_the_law():

@@ -25,8 +25,9 @@ OTHER = {
 }  # fmt: skip
 
 
-def shaken(properties: dict[str, float], **options: object) -> np.ndarray:
-    """What becomes of a bolt in a pressed block in motion: pulled at one end, pushed at the other."""
+def shaken(properties: dict[str, float], condition: dict[str, float] | None = None, **options: object) -> np.ndarray:
+    """What becomes of a bolt in a pressed block in motion: pulled at one end, pushed at the other. condition: of a node
+    in between."""
     sim = model(rectangle(8, 3, 0.8, 0.3))
     sim.option(collision=False)
     sim.initial_stress(None, yy=-1e6)
@@ -36,6 +37,8 @@ def shaken(properties: dict[str, float], **options: object) -> np.ndarray:
     bolts.assign(elements, properties)
     bolts.condition(np.array([3]), does_x=kernels.VELOCITY, at_x=-0.5)
     bolts.condition(np.array([len(bolts) - 4]), does_x=kernels.VELOCITY, at_x=-0.3)
+    if condition is not None:
+        bolts.condition(np.array([8]), **condition)
     convergence.advance(sim, 120)
     return np.concatenate([bolts.nodes["x"].ravel(), bolts.elements["force"], bolts.nodes["bond"]])
 
@@ -65,6 +68,18 @@ def test_a_property_alone_changes_the_outcome(usual, name) -> None:
 def test_an_option_alone_changes_the_outcome(usual, options) -> None:
     other = shaken(USUAL, **options)
     assert other.shape != usual.shape or not np.array_equal(other, usual)
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [{"force_x": 2e3}, {"force_y": 2e3}, {"does_x": kernels.VELOCITY}, {"does_y": kernels.VELOCITY},
+     {"does_x": kernels.ACCELERATION}, {"does_y": kernels.ACCELERATION}],
+)  # fmt: skip
+def test_a_condition_alone_changes_the_outcome(usual, condition) -> None:
+    found = shaken(USUAL, condition)
+    assert not np.array_equal(found, usual)
+    for name in [f"at_{axis}" for axis in "xy" if f"does_{axis}" in condition]:
+        assert not np.array_equal(shaken(USUAL, {**condition, name: 0.5}), found)
 
 
 def test_nothing_is_drawn_by_chance(usual) -> None:

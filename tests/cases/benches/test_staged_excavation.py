@@ -1,5 +1,5 @@
 """A slope is made by taking out four benches one after the other: relaxation, the static solve, and a finite element
-program of its own (plain_fe.py) give the same displacements."""
+program of its own (plain_fe.py) give the same displacements. Then in rock that yields."""
 
 from __future__ import annotations
 
@@ -97,3 +97,30 @@ def test_staged_excavation_of_triangles_against_another_program():
         known = ~np.isnan(found[:, 0])
         assert known.sum() == len(np.unique(triangles[there]))
         assert found[known] == pytest.approx(after[known], abs=1e-7 * np.abs(after[known]).max())
+
+
+def test_staged_excavation_of_quads_that_yield():
+    """Mohr and Coulomb: what has yielded grows with every bench, and so does what this adds to the displacement of
+    elastic rock; every stage ends at a ratio of 1e-5, and nothing is lost but the benches."""
+    mesh = box("quad", 2.5)
+    yielding, elastic = ground(mesh), ground(mesh)
+    rock = {"density": RHO, "young": YOUNG, "poisson_ratio": NU, "friction": 20.0, "cohesion": 25e3, "tensile": 10e3}
+    changes.element_model(yielding, None, "mech_mohr_coulomb", rock)
+    convergence.solve(yielding, ratio=1e-6, cycles=50000)
+    equilibrium.solve_elastic(elastic)
+    for sim in (yielding, elastic):
+        changes.reset_displacement(sim)
+    assert not diagnostics.values(yielding, "plastic_state").any()
+    out, flowed, farther = np.zeros(len(mesh.cells), bool), [0], [0.0]
+    for stage in range(STAGES):
+        out[bench(mesh, stage)] = True
+        for sim in (yielding, elastic):
+            changes.null(sim, bench(mesh, stage), relax=200)
+        equilibrium.solve_elastic(elastic)
+        convergence.advance(yielding, 200)
+        assert convergence.solve(yielding, ratio=1e-5, cycles=50000).ratio < 1e-5
+        assert np.array_equal(yielding.alive, ~out)
+        flowed.append(int((diagnostics.values(yielding, "plastic_state") > 0).sum()))
+        farther.append(float(np.nanmax(np.abs(moved(yielding) - moved(elastic)))))
+    assert (np.diff(flowed) > 0).all() and (np.diff(farther) > 0.0).all()
+    assert farther[-1] > 0.1 * np.nanmax(np.abs(moved(elastic)))
