@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from hpcdem.cli.common import HELP, PATH, run_program
+from hpcdem.core import chinese
 
 if TYPE_CHECKING:
     from hpcdem.cases.base import Case
@@ -50,12 +52,15 @@ def _known(context: click.Context, argument: click.Parameter, value: str | None)
 
 
 def show(comm: SerialComm, log: Log, options: dict[str, Any]) -> None:
-    """The list of cases."""
+    """The list of cases, in the language of the user."""
     from hpcdem.cases import CASES, find
+    from hpcdem.cli.case_chinese import TITLES
 
     if comm.rank == 0:
+        said = TITLES if chinese.wanted(encoding=getattr(sys.stdout, "encoding", None)) else {}
         for name in CASES:
-            click.echo(f"{name:12s} {find(name).title}")
+            title = find(name).title
+            click.echo(f"{name:12s} {said.get(title, title)}")
 
 
 def command(kind: type[Case]) -> click.Command:

@@ -7,6 +7,8 @@ import re
 
 import click
 
+from hpcdem.cli import case_chinese
+
 TEXTS = {
     # hpcdem SCRIPT
     "Run a SCRIPT (ZDEM commands, PCDC commands, or Python that uses hpcdem), alone or under mpiexec or srun.\n\n"
@@ -65,6 +67,9 @@ TEXTS = {
     "Strain fitted and averaged on the grid, not by the nearest neighbours of particles.":
     "应变在网格上拟合、平均,而不用颗粒的最近邻。",
     "Threads per rank [what srun -c gives, else 1].": "每个进程的线程数 [srun -c 所给,否则 1]。",
+    # hpcdem case
+    "hpcdem case NAME --help lists its parameters. From Python: docs/cases.md.":
+    "hpcdem case NAME --help 列出其参数。在 Python 中使用见 docs/cases.md。",
     # hpcdem resume
     "Go on with the run that wrote into DIR [data, or this folder], from its newest checkpoint that is whole.":
     "继续写入 DIR [data,或当前目录] 的运行,从最新的完整重启文件开始。",
@@ -364,6 +369,15 @@ LONG = {
 }
 """Of commands whose English text is long, by their names."""
 
+CASES = {
+    "Write the script of a ready-made model.": "写出现成模型的脚本。",
+    ": write its script.": ":写出其脚本。",
+}
+_PARAMETERS = {text[:1].upper() + text[1:]: meant for text, meant in case_chinese.PARAMETERS.items()} | {
+    "The script; - prints it": "脚本文件;- 表示打印出来",
+    "Replace the file if it is there": "文件已存在时替换",
+}
+
 HEADS = {
     "Usage:": "用法:", "Options:": "选项:", "Stress and strain of a finished run:": "已完成运行的应力应变:",
     "[required]": "[必需]",
@@ -377,18 +391,39 @@ def translated(command: click.Command) -> click.Command:
     english = 0
     for parameter in command.params:
         if isinstance(parameter, click.Option) and parameter.help and not parameter.hidden:
-            english += parameter.help not in TEXTS and parameter.help not in DONE  # programs share some
-            parameter.help = TEXTS.get(parameter.help, parameter.help)
+            meant = TEXTS.get(parameter.help) or _of_a_case(parameter.help)
+            english += not meant and parameter.help not in DONE  # programs share some
+            parameter.help = meant or parameter.help
     name = command.name or ""
     text = inspect.cleandoc(command.help or "")
-    english += name not in LONG and text not in TEXTS
-    command.help = LONG.get(name) or TEXTS.get(text, command.help)
+    meant = LONG.get(name) or TEXTS.get(text)
+    if not meant and (meant := _of_cases(text)):
+        english += any(line.isascii() and line.strip("\b") for line in meant.splitlines())
+    english += not meant
+    command.help = meant or command.help
     if command.epilog:
         english += command.epilog not in TEXTS
         command.epilog = TEXTS.get(command.epilog, command.epilog)
     if english:
         command.epilog = f"{command.epilog or ''}\n\n{PARTLY}".strip()
     return command
+
+
+def _of_a_case(text: str) -> str | None:
+    """A parameter of a ready-made model, `What it is [default].`"""
+    whole = re.fullmatch(r"(.+?)( \[[^\[]*\])?\.", text)
+    if whole is None or whole[1] not in _PARAMETERS:
+        return None
+    default = {" [yes]": " [是]", " [no]": " [否]"}.get(whole[2] or "", whole[2] or "")
+    return f"{_PARAMETERS[whole[1]]}{default.replace(' degrees]', ' 度]')}。"
+
+
+def _of_cases(text: str) -> str | None:
+    """What the programs of ready-made models say, with the titles of these; None of other programs."""
+    meant = text
+    for english, chinese in (case_chinese.TITLES | CASES).items():
+        meant = re.sub(rf"{re.escape(english)}(?=$|: write)", chinese, meant, flags=re.MULTILINE)
+    return None if meant == text else meant
 
 
 def help_page(command: click.Command, program: str) -> str:

@@ -11,6 +11,8 @@ from pathlib import Path
 import click
 import pytest
 
+from hpcdem.cases import CASES, find
+from hpcdem.cli import case, case_chinese
 from hpcdem.cli import chinese as helps
 from hpcdem.cli.reference import PROGRAMS
 from hpcdem.core import chinese
@@ -92,14 +94,35 @@ def test_help_and_errors_of_the_program(tmp_path: Path) -> None:
     assert usual.stderr.strip() == english and not HAN.search(usual.stderr)
 
 
-def test_help_that_is_translated_in_part_says_so() -> None:
-    page = helps.help_page(PROGRAMS["hpcdem case"], "hpcdem case")
-    assert helps.PARTLY in page and "用法:" in page
+def test_help_that_is_translated_in_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = helps.help_page(case.command(find("ucs")), "hpcdem case ucs")
+    assert helps.PARTLY not in page and "用法:" in page and "岩样单轴压缩:写出其脚本。" in page
+    assert "--friction X              节理和裂纹的摩擦角 [30 度]。" in page and "钢压板" in page and "[是]" in page
+    assert helps.PARTLY not in helps.help_page(case.listing([]), "hpcdem case")
+    monkeypatch.delitem(helps._PARAMETERS, "Density")
+    page = helps.help_page(case.command(find("ucs")), "hpcdem case ucs")
+    assert helps.PARTLY in page and "Density [2700 kg/m3]." in page
+    monkeypatch.delitem(case_chinese.TITLES, find("slope").title)
+    page = helps.help_page(case.listing([]), "hpcdem case")
+    assert helps.PARTLY in page and find("slope").title in page
+
+
+def test_nearly_all_of_the_ready_made_models_is_in_chinese() -> None:
+    """A new one may wait for its own."""
+    said = {str(field.description) for name in CASES for field in find(name).model_fields.values()}
+    for texts, there in ((case_chinese.TITLES, {find(name).title for name in CASES}), (case_chinese.PARAMETERS, said)):
+        assert set(texts) <= there and len(texts) >= 0.9 * len(there)
+        assert all(HAN.search(text) for text in texts.values())
+
+
+def test_list_of_ready_made_models() -> None:
+    assert "ucs          岩样单轴压缩\n" in program("case", LANG="zh_CN.UTF-8").stdout
+    assert "ucs          Uniaxial compression" in program("case", LANG="en_US.UTF-8").stdout
 
 
 def test_nearly_all_options_have_their_chinese() -> None:
-    """A new one may wait for its own; of ready-made models the quantities are in English only."""
-    there = {p.help for name, command in PROGRAMS.items() for p in command.params
-             if name != "hpcdem case" and isinstance(p, click.Option) and p.help and not p.hidden}  # fmt: skip
+    """A new one may wait for its own."""
+    there = {p.help for command in PROGRAMS.values() for p in command.params
+             if isinstance(p, click.Option) and p.help and not p.hidden}  # fmt: skip
     waiting = there - set(helps.TEXTS) - helps.DONE
     assert len(waiting) < 0.1 * len(there), waiting
