@@ -566,8 +566,13 @@ def test_refusals():
         creep.check(sim, 1.0)
     creep.switch(sim, True, dt=1.0)
     sim.velocity_condition([3], vy=0.1)
-    with pytest.raises(CommandError, match="node 3 has a prescribed velocity in y"):
+    with pytest.raises(CommandError, match="node 3 has a prescribed motion in y"):
         creep.check(sim, 1.0)
+    sim.velocity_condition([3], ay=0.1)
+    with pytest.raises(CommandError, match="node 3 has a prescribed motion in y"):
+        creep.check(sim, 1.0)
+    sim.velocity_condition([3], ay=0.0)
+    creep.check(sim, 1.0)
 
 
 def test_what_crept_yields_afterwards_and_what_yielded_creeps():

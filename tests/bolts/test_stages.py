@@ -8,10 +8,10 @@ import pytest
 from hpcdem.core.errors import CommandError
 from hpcdem.physics.bolts import kernels
 from hpcdem.physics.bolts.model import Bolts
-from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, equilibrium, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.structures import REMOVED
-from tests.blocks.support import model, rectangle
+from tests.blocks.support import model, near, rectangle
 from tests.bolts.support import STEEL, state
 
 
@@ -81,6 +81,42 @@ def test_pretension_presses_the_rock_and_is_given_again_by_difference() -> None:
     assert bolts.values("bolt-element", "axial_force") == pytest.approx(first + 5e3)
     bolts.assign(np.arange(18), {**STEEL, "pretension_force": 45e3})  # nothing new is said
     assert bolts.values("bolt-element", "axial_force") == pytest.approx(first + 5e3)
+
+
+def test_what_creeps_hangs_on_its_bolt_more_and_more() -> None:
+    """A column of a Maxwell rock (K, G, eta) that cannot give way aside, and a bolt that is tied to all of it, share a
+    stress P. With k = E A over spacing and width, S the deviator along the column and T = 4 G / 3:
+
+        P = (K + k) e + S,  S' = T e' - S G / eta:  S = T P / (K + k + T) exp(-r t),  r = G / eta / (1 + T / (K + k))
+    """
+    width, load, bulk, shear, viscosity, spacing = 0.1, 2e6, 2e9, 1e9, 1e14, 1.5
+    sim = model(rectangle(1, 5, width, 1.0, kind="quad"))
+    rock = {"density": 2500.0, "bulk": bulk, "maxwell_shear": shear, "maxwell_viscosity": viscosity}
+    changes.element_model(sim, None, "mech_burgers", rock)
+    sim.option(dynamic=False, collision=False, large_strain=False)
+    sim.velocity_condition(None, vx=0.0)
+    sim.velocity_condition(np.flatnonzero(sim.mesh.points[:, 1] == 0.0), vy=0.0)
+    sim.stress_condition(near(sim.mesh, 1, 1.0), yy=load)
+    tied = {"shear_stiffness_rock_bolt": 1e12, "cohesion_rock_grout": 1e12, "cohesion_grout_bolt": 1e12}
+    bolts = bolt(sim, (width / 2, 1.0), (width / 2, 0.0), segments=10, spacing=spacing, **tied)
+    bar = STEEL["young"] * np.pi / 4.0 * STEEL["diameter"] ** 2
+    both, t = bulk + bar / spacing / width, 4.0 / 3.0 * shear
+    creep.switch(sim, True, dt=2e4)
+    convergence.solve(sim, ratio=1e-5)
+    for _ in range(6):
+        rest = t * load / (both + t) * np.exp(-sim.creep.time * shear / viscosity / (1.0 + t / both))
+        assert bolts.values("bolt-element", "axial_force")[2:-2] == pytest.approx(bar * (load - rest) / both, rel=2e-3)
+        creep.begin(sim, 1e6)
+        assert convergence.solve(sim, ratio=1e-5, window=0, limit=20_000).reason == "ratio"
+        creep.finish(sim, 1e6)
+    assert rest < 0.7 * t * load / (both + t)  # creep has done something
+    creep.check(sim, 1e6)
+    for does in (kernels.VELOCITY, kernels.ACCELERATION):
+        bolts.condition(np.array([3]), does_y=does, at_y=1e-9)
+        with pytest.raises(CommandError, match="bolt-node 3 has a prescribed motion: in static runs nodes move so far"):
+            creep.check(sim, 1e6)
+    bolts.condition(np.array([3]), at_y=0.0)
+    creep.check(sim, 1e6)
 
 
 def test_excavated_hosts_let_go() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import changes, convergence, diagnostics, saved_state
+from hpcdem.physics.fdem import changes, convergence, creep, diagnostics, saved_state
 from hpcdem.physics.fdem.simulation import Blocks
 from hpcdem.physics.fdem.structures import REMOVED, VELOCITY
 from hpcdem.physics.liners import kernels
@@ -218,6 +218,18 @@ def test_mass_is_added_where_the_time_step_needs_it_and_said() -> None:
     said = [line for line in sim.log.lines if "mass scaling adds" in line]
     assert len(said) == 1 and "6 of 6 nodes" in said[0] and "rotational inertia of 6" in said[0]
     assert np.isfinite(liners.nodes["x"]).all() and np.abs(liners.nodes["v"]).max() < 1.0
+
+
+def test_creep_asks_for_nodes_that_are_not_driven() -> None:
+    sim, liners = slab()
+    rock = {"density": 2700.0, "young": 5e9, "poisson_ratio": 0.25, "maxwell_viscosity": 1e15}
+    changes.element_model(sim, None, "mech_burgers", rock)
+    creep.switch(sim, True, dt=1.0)
+    liners.condition(np.array([2]), does_x=VELOCITY, at_x=0.0, does_turn=VELOCITY, at_turn=0.1)
+    with pytest.raises(CommandError, match="liner-node 2 has a prescribed motion: in static runs nodes move so far"):
+        creep.check(sim, 1.0)
+    liners.delete(np.array([1, 2]))  # both that end there
+    creep.check(sim, 1.0)
 
 
 def test_what_makes_no_sense_is_refused_and_changes_nothing() -> None:

@@ -200,7 +200,7 @@ def test_refused_with_its_line(tmp_path, line, told):
         ("pcdc model creep on dt 1\npcdc model solve time 1 cycles 5", "time and cycles exclude each other"),
         ("pcdc model option dynamic on\npcdc model solve elastic time 1", "model option dynamic off comes first"),
         ("pcdc node boundary mech-vel-b-c velocity-x 1 range id 0\npcdc model creep on dt 1\npcdc model solve time 1",
-         "node 0 has a prescribed velocity in x"),
+         "node 0 has a prescribed motion in x"),
         ("pcdc element c-model mech-iso-e property den 1 young 1 p-r 0\npcdc model creep on dt 1\n"
          "pcdc model solve time 1", "no element can creep"),
         ("pcdc element c-model mech-iso-e property den 1 young 1 p-r 0\npcdc element reset kelvin-strain",

@@ -19,6 +19,7 @@ from hpcdem.physics.fdem.kernels import creep as kernels
 from hpcdem.physics.fdem.kernels import creep_tets as space
 from hpcdem.physics.fdem.kernels import elements
 from hpcdem.physics.fdem.kernels import nodes as moving
+from hpcdem.physics.fdem.structures import Structure
 
 if TYPE_CHECKING:
     from hpcdem.physics.fdem.simulation import Blocks
@@ -31,6 +32,7 @@ STRESS, STRAIN = (kernels.S11, kernels.S22, kernels.S12), (kernels.K11, kernels.
 """In the plane: columns of stress and of strain of the Kelvin unit, of what elements remember."""
 FULL = 1.0 - 1e-9
 """A creep step this near to the end goes there."""
+PER_STEP = ": in static runs nodes move so far per step, not in creep time; in dynamic runs they do"
 
 
 def switch(
@@ -89,12 +91,12 @@ def check(sim: Blocks, time: float) -> None:
         one = sim.conditions[row]
         for axis in "xyz"[: sim.dim]:
             does, at = getattr(one, f"does_{axis}"), getattr(one, f"at_{axis}")
-            if does == moving.VELOCITY and at != 0.0 and one.constraint != moving.FIXED:
+            if does != moving.FREE and at != 0.0 and one.constraint != moving.FIXED:
                 point = int(np.flatnonzero(sim.point_row == row)[0])
-                raise CommandError(
-                    f"node {point} has a prescribed velocity in {axis}: in static runs nodes move so far per step, "
-                    "not in creep time; in dynamic runs they do"
-                )
+                raise CommandError(f"node {point} has a prescribed motion in {axis}{PER_STEP}")
+    for load in sim.surface_loads:
+        if isinstance(load, Structure) and (node := load.driven()) is not None:
+            raise CommandError(f"{load.parts[1]} {node} has a prescribed motion{PER_STEP}")
 
 
 def begin(sim: Blocks, end: float) -> None:

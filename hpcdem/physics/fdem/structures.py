@@ -178,6 +178,15 @@ class Structure(SurfaceLoad):
         used = {self.conditions[row] for row in np.unique(self.nodes["condition"]).tolist()}
         return any(name in asdict(one).values() for one in used)
 
+    def driven(self) -> int | None:
+        """The first node that is made to move. Not collective."""
+        for node in np.flatnonzero(self.alive(self.parts[1])).tolist():
+            said = asdict(self.conditions[self.nodes["condition"][node]])
+            if any(name.startswith("does_") and does != FREE and said[f"at_{name[5:]}"] != 0.0
+                   for name, does in said.items()):  # fmt: skip
+                return node
+        return None
+
     def stop(self) -> None:
         """Velocities become zero. Not collective."""
         self.nodes["v"][:] = 0.0
