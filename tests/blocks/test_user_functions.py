@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hpcdem.core.errors import CommandError
-from hpcdem.physics.fdem import convergence, diagnostics, equilibrium, saved_state, user_functions
+from hpcdem.core.errors import CommandError, PhysicsError
+from hpcdem.physics.fdem import changes, convergence, diagnostics, equilibrium, saved_state, user_functions, user_laws
 from hpcdem.physics.fdem.simulation import Blocks
-from tests.blocks.support import model, near, rectangle, shaken
+from tests.blocks.support import ROCK, model, near, rectangle, shaken
 from tests.pcdc.test_plastic import run
 
 FILE = Path(__file__).with_name("laws") / "rock.py"
@@ -87,6 +87,20 @@ def test_what_is_wrong_is_told_by_file_and_line(case, tmp_path):
     with pytest.raises(CommandError) as caught:
         sim.velocity_condition(None, vy=user_functions.load(sim, tmp_path / "f.py", "f.py:f"))
     assert message in str(caught.value)
+
+
+def test_a_number_that_is_none_later_stops_the_run_and_names_what_is_of_the_user(tmp_path):
+    (tmp_path / "f.py").write_text("import math\n\n\ndef late(t):\n    return math.sqrt(1e-5 - t)\n")
+    sim = plate()
+    law = user_laws.load(sim, FILE, "rock.py:elastic").name
+    changes.element_model(sim, [3], law, ROCK)
+    sim.time_step(value=1e-6)
+    function(sim, "lift")  # named, but nothing follows it
+    sim.velocity_condition([0, 1], vx=user_functions.load(sim, tmp_path / "f.py", "f.py:late"))
+    with pytest.raises(
+        PhysicsError, match=r"a number is not finite .*; or it comes from f\.py:late, rock\.py:elastic\n"
+    ):
+        convergence.advance(sim, 100)
 
 
 def test_the_static_solve_refuses_it_by_name():

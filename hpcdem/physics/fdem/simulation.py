@@ -28,7 +28,7 @@ from hpcdem.decomp import strips
 from hpcdem.halo.exchange import connect
 from hpcdem.halo.migrate import Migration
 from hpcdem.halo.ownership import Ownership
-from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_laws
+from hpcdem.physics.fdem import build, by_temperature, connectivity, hexahedra, overlaps, user_functions, user_laws
 from hpcdem.physics.fdem.definition import AGAIN, COMPONENTS, DISTANCE, Numbers
 from hpcdem.physics.fdem.histories import Histories
 from hpcdem.physics.fdem.kernels import elements, joints_space, space, tets
@@ -384,10 +384,18 @@ class Blocks(State):
                 f"step {self.clock.step}: {total} elements move over half an edge per static step, such as element {e} "
                 f"at {_vector(at)} by {_vector(speed)}"
             )
-        raise PhysicsError(
-            f"step {self.clock.step}: {what} ({total} elements); the time step {self.clock.dt:g} s is probably too "
-            f"large, or loads are\n{text}"
-        )
+        guess = f"the time step {self.clock.dt:g} s is probably too large, or loads are"
+        if broken and (titles := self._of_users()):
+            guess += f"; or it comes from {', '.join(titles)}"
+        raise PhysicsError(f"step {self.clock.step}: {what} ({total} elements); {guess}\n{text}")
+
+    def _of_users(self) -> list[str]:
+        """Laws and functions of the user that act. Not collective."""
+        rows = [self.conditions[k] for k in np.unique(self.point_row)] + [
+            self.loads[k] for k in np.unique(self.load_row)
+        ]
+        functions = [one.title for row in rows for one in user_functions.used(row).values()]
+        return sorted({*functions, *(law.title for law in user_laws.in_use(self))})
 
     def _whole_speed(self, v: np.ndarray) -> np.ndarray:
         """Largest speed of a corner of elements [m/s]; the fourth corner of quads is not asked for."""
