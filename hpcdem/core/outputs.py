@@ -14,7 +14,7 @@ from dataclasses import dataclass
 class Output:
     """what: it is; files: their names, <step> has ten digits, a frame before the first step of a command ends in _ini;
     size: bytes per particle, measured on a settled and bonded bed of 1255 particles (about 2.5 contacts each);
-    sources: of the option of SET and of that of IMPLE, see `lang.zdem.words`."""
+    sources: of the option of SET and of that of IMPLE, see `lang.zdem.table`."""
 
     what: str
     files: tuple[str, ...]

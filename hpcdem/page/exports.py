@@ -75,7 +75,8 @@ def table(moment: Moment, view: ModelView, label: Any) -> bytes:
 
 
 def drawing(moment: Moment, view: ModelView) -> bytes:
-    """DXF (R12) with a layer per layer: circles, filled polygons, lines, in the nearest of its 255 colours."""
+    """DXF (R12) with a layer per layer: circles, filled polygons, lines, in the nearest of its 255 colours. Not by
+    ezdxf: the page does without packages that are extras."""
     known = _dxf_colours()
     lines = ["0", "SECTION", "2", "ENTITIES"]
     for painted in scene(moment, view).layers:

@@ -137,7 +137,7 @@ class Retention:
             return True
         if not self.period and not self.times:
             return False
-        time, later = _time_of(path), _time_of(following)
+        time, later = (_time_of(one, one.stat().st_mtime_ns) for one in (path, following))
         marks = list(self.times)
         if self.period:
             marks.append(math.ceil(time / self.period * (1.0 - ROUNDING)) * self.period)
@@ -192,8 +192,8 @@ def _step_of(path: Path) -> int:
 
 
 @cache
-def _time_of(path: Path) -> float:
-    """Model time [s] of a checkpoint of this run; looked up once."""
+def _time_of(path: Path, stamp: int) -> float:
+    """Model time [s] of a checkpoint of this run; looked up once. stamp: of the file, another one is read again."""
     from hpcdem.io import checkpoint  # not before the environment of HDF5 is settled
 
     return float(checkpoint.read_state(path)["clock"]["time"])

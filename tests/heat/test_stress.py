@@ -208,3 +208,33 @@ def test_slow_heat_waits_for_ten_steps(tmp_path, capacity: float) -> None:
     assert cycles == (11 if capacity > 1.0 else 101) and found[1][0] == 101
     assert time == pytest.approx(now, rel=1e-9) and found[1][1] == pytest.approx(now, rel=1e-9)
     assert t == pytest.approx(found[1][2], abs=1e-3 * np.ptp(found[1][2])) and np.ptp(t) > 0.0
+
+
+@pytest.mark.parametrize("change", ["time step", "sub-steps", "static"])
+def test_heat_that_waits_loses_no_time(change: str) -> None:
+    """Four steps after a cycle something else sets the pace: the time of these steps is not forgotten, and the account
+    closes."""
+    sim = Blocks()
+    sim.take_mesh(rectangle(4, 4, 1.0, 1.0))
+    changes.element_model(sim, None, "mech_iso_elastic", ROCK)
+    heat = Heat.of(sim)
+    heat.assign(None, {**GRANITE, "capacity": 800.0})
+    heat.prescribe(at(sim, x=0.0), 100.0)
+    sim.option(collision=False)
+    sim.time_step(value=1e-6)
+    for _ in range(15):
+        sim.step()
+    assert heat.time == pytest.approx(11e-6, rel=1e-9)
+    own = 0.0
+    if change == "time step":
+        sim.time_step(value=2e-6)
+    elif change == "sub-steps":
+        sim.heat_clock(steps=1)
+    else:
+        sim.option(dynamic=False)
+        sim.heat_clock(dt=1e-3)
+        own = 6e-3
+    for _ in range(6):
+        sim.step()
+    assert heat.time == pytest.approx(sim.clock.time + own, rel=1e-9)
+    assert heat.account()["relative"] < 1e-12

@@ -190,7 +190,7 @@ def test_old_ones_are_spared_by_step_and_by_time(tmp_path, monkeypatch, keep, st
     """A checkpoint each 100 steps, 1 ms a step, from step 800 on 2 ms. What stays does not depend on what is removed
     first: after each one in turn, or all at once."""
     time = {step: sum(1e-3 for _ in range(step)) + sum(1e-3 for _ in range(max(step - 800, 0))) for step in STEPS}
-    monkeypatch.setattr(run_folder, "_time_of", lambda path: time[int(path.stem)])
+    monkeypatch.setattr(run_folder, "_time_of", lambda path, stamp: time[int(path.stem)])
     all_at_once = tmp_path / "once"
     for folder in (tmp_path, all_at_once):
         folder.mkdir(exist_ok=True)
@@ -203,7 +203,7 @@ def test_old_ones_are_spared_by_step_and_by_time(tmp_path, monkeypatch, keep, st
 
 
 def test_automatic_ones_are_spared_as_well(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_folder, "_time_of", lambda path: 1e-3 * int(path.stem.removeprefix("auto_")))
+    monkeypatch.setattr(run_folder, "_time_of", lambda path, stamp: 1e-3 * int(path.stem.removeprefix("auto_")))
     enter(tmp_path)
     touch(tmp_path, *(f"auto_{step:010d}.sav" for step in (100, 250, 400, 500)), "0000000300.sav")
     run_folder.retire(tmp_path, COMM, 500, Retention(times=(0.26,)))

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hpcdem.commands.fdem import beside
+from hpcdem.commands.fdem import frame_tables
 from hpcdem.commands.fdem.project import Project
 from hpcdem.commands.fdem.values import frames_name
 from hpcdem.core.errors import CommandError
@@ -211,5 +211,5 @@ def frame(project: Project, sound: bool = True) -> MeshFrame:
         there = [found for one in supports.ALL if (found := one.there(blocks)) is not None]
         return MeshFrame(
             int(clock.step), float(blocks.told_time()), float(clock.dt), of_corners, of_elements, of_joints, names,
-            {found.name: found.columns() for found in there}, beside.tables(blocks) if sound else {},
+            {found.name: found.columns() for found in there}, frame_tables.tables(blocks) if sound else {},
         )  # fmt: skip

@@ -17,8 +17,8 @@ BOND_MODEL_1 = ("ebmod", "gbmod", "tstrength", "sstrength")
 BOND_MODEL_2 = ("n_bond", "s_bond")
 BOND_KEYS = (*BOND_MODEL_1, *BOND_MODEL_2, "tolerate", "rext", "rubber")
 
-_OF_HIST = {option.name: option for command in t.COMMANDS if command.name == "HIST" for option in command.options}
-RECORDED = tuple(name for name in _OF_HIST if name not in ("id", "interval", "wall"))
+_HIST = next(command for command in t.COMMANDS if command.name == "HIST")
+RECORDED = tuple(option.name for option in _HIST.options if option.name not in ("id", "interval", "wall"))
 """What HIST follows."""
 
 

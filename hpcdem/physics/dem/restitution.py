@@ -11,10 +11,6 @@ from hpcdem.core.errors import CommandError
 from hpcdem.physics.dem.kernels import dashpots
 from hpcdem.physics.dem.kernels.motion import KICK_X
 
-# Called with the tuples made here, which mypy cannot count.
-_of_pairs: Any = dashpots.of_pairs
-_of_walls: Any = dashpots.of_walls
-
 
 class Dashpots:
     """Of a closed model (physics.dem.simulation.Simulation), as its tables are."""
@@ -49,18 +45,14 @@ class Dashpots:
         return self._on_walls
 
     def _into(self, sim: Any, force: np.ndarray) -> None:
-        p, lists, b, n_mat = sim.particles, sim.lists, sim.lists.blocks, len(sim.materials)
-        walls = sim.walls.table()
-        more = n_mat, self.mobility, self.beta, force, self._rates
-        for t in range(lists.n_blocks):
-            _of_pairs(
-                t, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond, sim.pair_laws,
-                *more,
-            )  # fmt: skip
-            _of_walls(
-                t, p.hot, p.ihot, b.lo, b.foff, lists.wptr, walls, lists.slot_row, lists.slot_wall, lists.slot_side,
-                sim.wall_laws, *more, self._on_walls,
-            )  # fmt: skip
+        p, lists = sim.particles, sim.lists
+        b = lists.blocks
+        kernel: Any = dashpots.forces if lists.n_blocks == 1 else dashpots.forces_threaded
+        kernel(
+            lists.n_blocks, p.hot, p.ihot, b.cut, b.lo, b.poff, b.foff, lists.ptr, lists.partner, lists.bond,
+            sim.pair_laws, lists.wptr, sim.walls.table(), lists.slot_row, lists.slot_wall, lists.slot_side,
+            sim.wall_laws, len(sim.materials), self.mobility, self.beta, force, self._rates, self._on_walls,
+        )  # fmt: skip
 
 
 def _refuse(sim: Any) -> None:

@@ -122,10 +122,10 @@ class Hexes:
         hexes.stresses(which, self.place, self.sim.x, self.parts, self.h, self.remember, s0, small, stress, energy)
         return stress, energy
 
-    def memories(self, memory: np.ndarray) -> np.ndarray:
+    def histories(self, memory: np.ndarray) -> np.ndarray:
         """What each of their tetrahedra remembers (count, 10, n) in rows of owned elements, see plastic_hexes.py."""
         rows = memory[self.begin[:, None] + np.arange(PARTS)]
-        return rows.reshape(self.count, 2 * PARTS, memory.shape[1] // 2)[:, : hexes.PARTS]
+        return rows.reshape(self.count, hexes.IN_ROW * PARTS, memory.shape[1] // hexes.IN_ROW)[:, : hexes.PARTS]
 
     def shares(self) -> np.ndarray:
         """Part of the volume that each of their tetrahedra has (count, 10)."""
@@ -148,8 +148,8 @@ class Hexes:
         self, stress: np.ndarray, energy: np.ndarray, at: np.ndarray, s0: np.ndarray,
         more: Callable[[np.ndarray, np.ndarray], None],
     ) -> None:  # fmt: skip
-        """Put them into those of owned elements: the how-manieth `at` (n,), ascending or not; energies by volume, to
-        which `more` adds what it finds of some of them."""
+        """Put them into those of owned elements, `at` (n,) their indices among these, in any order; energies by volume,
+        to which `more` adds what it finds of some of them."""
         hex_of = self.numbers()
         here = np.flatnonzero(hex_of[at] >= 0)
         if not len(here):
@@ -205,7 +205,7 @@ class Hexes:
     def other_cuts(self, corner: np.ndarray, element: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Of loaded triangles: which of them (k,) are half a side of a hexahedron, and where the corners of a half of
         the same side begin that is cut the other way (k, 3); both halves have another one each. corner (m, 3): where
-        theirs begin in x; element (m,): of owned elements, the how-manieth."""
+        theirs begin in x; element (m,): indices among the owned elements."""
         hex_of = self.numbers()
         of = np.flatnonzero(hex_of[element] >= 0)
         which = hex_of[element[of]]

@@ -185,7 +185,7 @@ class LawsSpace(Local):
         of_tets = memory[self.rows[self.creeping] - self.sim.n_left, : creep_tets.MEMORY]
         found = [(of_tets, self.creep_law[self.creeping])]
         if self.hexes is not None and len(self.creeping_quads):
-            parts = self.hexes.memories(memory)[self.creeping_quads].reshape(-1, creep_tets.MEMORY)
+            parts = self.hexes.histories(memory)[self.creeping_quads].reshape(-1, creep_tets.MEMORY)
             found.append((parts, np.repeat(self.creep_law_of_hexes[self.creeping_quads], hexes.PARTS)))
         return found
 
@@ -207,7 +207,7 @@ class LawsSpace(Local):
         memory = self.flowed()[0]
         found = memory[:, : plasticity.MEMORY].copy()
         if (own := self.hexes) is not None:
-            parts = own.memories(memory)[:, :, : plasticity.MEMORY]
+            parts = own.histories(memory)[:, :, : plasticity.MEMORY]
             share = own.shares()[:, :, None]
             mean = (share * parts).sum(axis=1)
             latest = [plasticity.IN_SHEAR, plasticity.IN_TENSION]

@@ -90,8 +90,8 @@ class Heat(SurfaceLoad):
         elements."""
         self.time = blocks.clock.time
         self.cycles = self.waited = self.sub_steps = 0
-        self.every = self._steps = 1
-        """Steps of blocks in motion before the next cycle, and those that the present one stands for."""
+        self.every, self.owed = 1, 0.0
+        """Steps of blocks in motion before the next cycle, and the time [s] that has passed in those since the last."""
         self.dt = 0.0
         self.t = np.empty((0, 3))
         self._stale = True
@@ -690,7 +690,7 @@ class Heat(SurfaceLoad):
         o, clock = self.blocks.options, self.blocks.clock
         period = o.mechanical or self._beside_flow()
         return (
-            float(o.mechanical), float(o.dynamic), float(self._steps), float(o.heat_steps), o.heat_dt,
+            float(o.mechanical), float(o.dynamic), self._period(), float(o.heat_steps), o.heat_dt,
             clock.dt if period else 0.0, self._limit, self._of_fluid(),
         )  # fmt: skip
 
@@ -698,6 +698,13 @@ class Heat(SurfaceLoad):
         """Time of a cycle of flow that heat goes with [s], 0: it does not."""
         fluid = self.flowing if self.blocks.options.hydraulic else None
         return fluid.flow.sub_steps * fluid.flow.dt if fluid is not None else 0.0
+
+    def _period(self) -> float:
+        """Time of blocks in motion that a cycle stands for [s]."""
+        dt = self.blocks.clock.dt
+        if not self._may_wait:
+            return self.blocks.options.flow_every * dt
+        return self.owed if self.owed and not self.waited else self.every * dt
 
     def _find_step(self) -> None:
         """Sub-steps of a cycle and their length, from what was said and what is stable."""
@@ -707,7 +714,7 @@ class Heat(SurfaceLoad):
             return
         limit = SAFETY * self._limit
         if o.mechanical:
-            period = self._steps * blocks.clock.dt if o.dynamic else 0.0
+            period = self._period() if o.dynamic else 0.0
         else:
             period = blocks.clock.dt if self._beside_flow() else 0.0
         period = self._of_fluid() or period
@@ -820,6 +827,8 @@ class Heat(SurfaceLoad):
         if not self.on:
             return
         self.waited += 1
+        if self._may_wait:
+            self.owed += blocks.clock.dt
         if self._rubs and o.mechanical:
             self._rub()
         fluid = self.flowing
@@ -828,11 +837,13 @@ class Heat(SurfaceLoad):
                 return
         elif o.mechanical and self.waited < (self.every if self._may_wait else o.flow_every):
             return
-        self._steps, self.waited = self.waited if self._may_wait else o.flow_every, 0
+        self.waited = 0
         with blocks.timers("heat"):
             self.renew_nodes()
             if o.mechanical:
                 self.find_contacts()
+            if self.owed and not self._may_wait:
+                self._catch_up()
             if self._found_for != self._given():
                 self._find_step()
             if blocks.budget is not None and o.dynamic and (self.expands or blocks.local.warms):
@@ -841,13 +852,21 @@ class Heat(SurfaceLoad):
             if fluid is not None:
                 fluid.begin_cycle(self.sub_steps * self.dt)
             for _ in range(self.sub_steps):
-                self._sub_step()
-            self._power = None
+                self._sub_step(fluid)
+            self._power, self.owed = None, 0.0
             self.cycles += 1
             self.every = max(1, int(min(RARELY * self._limit / blocks.clock.dt, MOST))) if self._may_wait else 1
             blocks.local.follow_heat()
         if self.cycles % LOOK == 0:
             self._check_finite()
+
+    def _catch_up(self) -> None:
+        """Heat in rock flows for the time that it waited for, before something else set its pace."""
+        count = max(1, math.ceil(self.owed / (SAFETY * self._limit)))
+        self.dt, self._found_for = self.owed / count, ()
+        for _ in range(count):
+            self._sub_step()
+        self.owed = 0.0
 
     @property
     def _may_wait(self) -> bool:
@@ -903,9 +922,9 @@ class Heat(SurfaceLoad):
             self.blocks.halo.fill(self._q)  # elements of other ranks touch more than is held here
         return self._q
 
-    def _sub_step(self) -> None:
+    def _sub_step(self, fluid: FluidHeat | None = None) -> None:
         blocks, threads = self.blocks, self.blocks.threads
-        if (fluid := self.flowing) is not None:
+        if fluid is not None:
             fluid.advance(self.dt, self.held_at(self.time + self.dt))
         q = self.inflow(self.time, self.dt, fluid).reshape(-1)
         self.time += self.dt
@@ -937,6 +956,7 @@ class Heat(SurfaceLoad):
             "rows": [list(row) for row in self.rows], "prescribed": self.prescribed,
             "faces": [asdict(one) for one in self.faces], "accounts": self.accounts, "time": self.time,
             "cycles": self.cycles, "waited": self.waited, "every": self.every,
+            "owed": self.owed,
             "fluid": self.fluid.saved_state() if self.fluid is not None else None,
         }  # fmt: skip
 
@@ -960,7 +980,8 @@ class Heat(SurfaceLoad):
         made.prescribed = list(state["prescribed"])
         made.faces = [FaceCondition(**one) for one in state["faces"]]
         made.accounts, made.time = dict(state["accounts"]), state["time"]
-        made.cycles, made.waited, made.every = state["cycles"], state["waited"], state.get("every", 1)
+        made.cycles, made.waited = state["cycles"], state["waited"]
+        made.every, made.owed = state.get("every", 1), state.get("owed", 0.0)
         for name, rows in (("elements", made.row), ("points", made.held), ("faces", made.face)):
             table = tables[f"heat_{name}"]
             rows[table["number"]] = table["row"]

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from numba import njit, prange
 
 from hpcdem.core.fields import MATERIAL, RADIUS, VX, VY, X, Y
 from hpcdem.physics.dem.kernels import laws
@@ -37,12 +37,8 @@ def coefficient(law, two_rt, u, inverse_mass, beta):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates):
-    """Add the forces of the dashpots between the discs of block t.
-
-    mobility (n, 2): 1/m along x and y, 0 where a disc keeps its velocity; rates (n,): the sum of c/m of the contacts of
-    each owned particle is added [1/s].
-    """
+def _of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates):
+    """The part of `forces` between the discs of block t."""
     shift = foff[t] - lo[t]
     p = poff[t] - lo[t]
     for i in range(lo[t], cut[t + 1]):
@@ -68,12 +64,11 @@ def of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def of_walls(
+def _of_walls(
     t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, table, n_mat, mobility, beta, force, rates,
     on_walls,
 ):  # fmt: skip
-    """The same for the contacts of the owned particles of block t with walls; on_walls (slots, 2): force on the
-    particle of each slot [N]."""
+    """The same for the contacts of the owned particles of block t with walls."""
     shift = foff[t] - lo[t]
     first = wptr[t]
     while first < wptr[t + 1]:
@@ -94,3 +89,35 @@ def of_walls(
             force[shift + i, 1] -= push * ny
             rates[i] += c * of_i
         first = last
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def forces(
+    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, wptr, walls, slot_row, slot_wall, slot_side,
+    table, n_mat, mobility, beta, force, rates, on_walls,
+):  # fmt: skip
+    """Add the forces of all dashpots to force.
+
+    mobility (n, 2): 1/m along x and y, 0 where a disc keeps its velocity; rates (n,): the sum of c/m of the contacts of
+    each owned particle is added [1/s]; on_walls (slots, 2): force on the particle of each wall slot [N].
+    """
+    for t in range(n_blocks):
+        _of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates)
+        _of_walls(
+            t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, table, n_mat, mobility, beta, force,
+            rates, on_walls,
+        )  # fmt: skip
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def forces_threaded(
+    n_blocks, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, wptr, walls, slot_row, slot_wall, slot_side,
+    table, n_mat, mobility, beta, force, rates, on_walls,
+):  # fmt: skip
+    """The same, a thread for each block."""
+    for t in prange(n_blocks):
+        _of_pairs(t, hot, ihot, cut, lo, poff, foff, ptr, partner, bond, pairs, n_mat, mobility, beta, force, rates)
+        _of_walls(
+            t, hot, ihot, lo, foff, wptr, walls, slot_row, slot_wall, slot_side, table, n_mat, mobility, beta, force,
+            rates, on_walls,
+        )  # fmt: skip

@@ -11,11 +11,8 @@ from hpcdem.numerics.lanes import CAPACITY
 from hpcdem.physics.fdem.hexahedra import OVERLAYS
 from hpcdem.physics.fdem.kernels import creep_tets, hexes, tets
 from hpcdem.physics.fdem.kernels.creep_tets import CREPT, MEMORY
-from hpcdem.physics.fdem.kernels.hexes import H_LAMBDA, H_TWO_MU, PARTS, VOLUME
+from hpcdem.physics.fdem.kernels.hexes import H_LAMBDA, H_TWO_MU, IN_ROW, PARTS, VOLUME
 from hpcdem.physics.fdem.kernels.tets import STRIDE
-
-IN_ROW = 2
-"""See plastic_hexes.py."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -43,10 +40,10 @@ def _creep(t, threads, who, begin, corners, x, parts, h, base, law, table, small
         i = who[m]
         for j in range(PARTS):
             _rows(i, j, corners, x, parts, h, xyz, q)
-            m = _memory(begin[i], j, memory)
             per = 2.0 / q[VOLUME]  # each overlay counts half
             creep_tets.creep_one(
-                xyz, q, per, base[i, j], table[law[i]], small, dt, keep, m, s0[i, j], lanes, room
+                xyz, q, per, base[i, j], table[law[i]], small, dt, keep, _memory(begin[i], j, memory), s0[i, j], lanes,
+                room,
             )  # fmt: skip
 
 

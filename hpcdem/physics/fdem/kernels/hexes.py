@@ -30,6 +30,8 @@ PARTS = len(OVERLAYS)
 WORDS = 10
 """Of a tetrahedron: inverse of its reference matrix by rows, and its part of the volume of its overlay."""
 SHARE = 9
+IN_ROW = 2
+"""Tetrahedra of a hexahedron of which a row of storage remembers something."""
 VOLUME = 13
 """Column of the table of tetrahedra (tets.TET) with the volume in the mesh [m3], see `tetrahedron`."""
 HEX = 20

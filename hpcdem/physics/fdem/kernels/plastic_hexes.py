@@ -23,6 +23,7 @@ from hpcdem.physics.fdem.kernels.hexes import (
     H_LAMBDA,
     H_TWO_MU,
     H_VOLUME,
+    IN_ROW,
     PARTS,
     SH,
     SHARE,
@@ -72,8 +73,6 @@ from hpcdem.physics.fdem.kernels.plastic_tets import (
 from hpcdem.physics.fdem.kernels.tet_stiffness import gradients, lost_by_flow, strains_along, trial
 from hpcdem.physics.fdem.kernels.tets import S11, S12, S13, S22, S23, S33
 
-IN_ROW = 2
-"""Tetrahedra of a hexahedron of which a row of storage remembers something."""
 FIVE = PARTS // 2
 _LANE = np.int64(CAPACITY)
 
