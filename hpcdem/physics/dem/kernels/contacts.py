@@ -17,9 +17,9 @@ from hpcdem.physics.dem.kernels import laws
 
 # Columns of the pair law table (row = material_i * n_materials + material_j).
 MODEL, A, B, MU = range(4)
-USER = 2.0
-"""MODEL of pairs with the first law of the user, the second has one more: A and B are what its stiffnesses are never
-above, MU is not used."""
+USER = 32.0
+"""MODEL of pairs with the first law of the user, the second has one more; built-in laws are below. A and B are what its
+stiffnesses are never above, MU is not used."""
 # Columns of the bond type table; row 0 is "no bond".
 KIND, E_MOD, G_MOD, TENSILE, SHEAR = range(5)
 # Columns of a block's tally (float64): longest bonded distance squared, breaks in tension, breaks in shear.
