@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from hpcdem.api.program import place as _place
 from hpcdem.commands import dem, fdem
 from hpcdem.core.errors import CommandError, HpcdemError, ScriptError, UsageError
 from hpcdem.core.fields import FIELDS, FIX_BITS
+from hpcdem.core.material import Material
 from hpcdem.core.selection import Selection
 from hpcdem.io import checkpoint
 from hpcdem.lang.zdem.execute import Interpreter, find, look_at_units, tell_warnings
@@ -69,7 +70,8 @@ def _command(method: Method, edits: bool = True) -> Method:
             value = method(self, *values, **options)
             if self._engine is not None and self._engine.settings.units and method.__name__ in LOOKED_AT:
                 given = signature.bind(self, *values, **options).arguments
-                look_at_units(self._engine, LOOKED_AT[method.__name__], given.get("options", given))
+                given |= given.pop("options", {}) | given.pop("properties", {})
+                look_at_units(self._engine, LOOKED_AT[method.__name__], given)
             return value
 
         def done() -> Any:
@@ -330,32 +332,23 @@ class Simulation(BlockCommands):
         self,
         where: Where = None,
         *,
-        density: float | None = None,
-        fric: float | None = None,
-        shear: float | None = None,
-        poiss: float | None = None,
-        damp: float | None = None,
         hertz: bool = False,
-        kn: float | None = None,
-        ks: float | None = None,
         xv: float | None = None,
         yv: float | None = None,
         spin: float | None = None,
         color: str | int | None = None,
         group: str | None = None,
-        xp: float | None = None,
-        yp: float | None = None,
         law: str | None = None,
         between: Sequence[str] = (),
         parameter: Mapping[str, float] | None = None,
+        **properties: Unpack[Material],
     ) -> None:
-        """PROP: properties, velocities, colour and group of particles; what is left out stays. law: 'file.py:function'
-        beside the program (docs/user_laws.md), or "linear"; parameter: properties that it declares; between: the law is
-        that of pairs of discs with these two."""
+        """PROP: properties, velocities, colour and group of particles; what is left out stays. properties: density,
+        fric, shear, poiss, damp, kn, ks, xp, yp. law: 'file.py:function' beside the program (docs/user_laws.md), or
+        "linear"; parameter: properties that it declares; between: the law is that of pairs of discs with these two."""
         dem.properties.prop(
-            self.engine, _selection(where), density=density, fric=fric, shear=shear, poiss=poiss, damp=damp,
-            hertz=hertz, kn=kn, ks=ks, xp=xp, yp=yp, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
-            law=law, between=between, parameter=parameter, folder=self.directory,
+            self.engine, _selection(where), hertz=hertz, xv=xv, yv=yv, spin=spin, color=_color(color), group=group,
+            law=law, between=between, parameter=parameter, folder=self.directory, **properties,
         )  # fmt: skip
 
     @_command

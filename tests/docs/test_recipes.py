@@ -232,29 +232,10 @@ assert frame.tables["particles"].columns["speed"].tolist() == [2.0, 2.0]
     ),
     "a property of the material": Recipe(
         [
-            ("physics/dem/materials.py", '        *((name, "f8") for name in OWN),', '        ("porosity", "f8"),'),
             (
-                "commands/dem/properties.py",
-                'MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "xp", "yp")',
-                '=MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "xp", "yp", "porosity")',
-            ),
-            ("commands/dem/properties.py", "    yp: float | None = None,", "    porosity: float | None = None,"),
-            (
-                "commands/dem/properties.py",
-                "        for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, "
-                "ks, xp, yp), strict=True)",
-                "=        for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, "
-                "kn, ks, xp, yp, porosity), strict=True)",
-            ),
-            (
-                "lang/zdem/table.py",
-                '    Option("shear", "shear modulus G of the Hertz-Mindlin contact", kind=POSITIVE, unit="Pa"),',
-                '    Option("porosity", "share of voids", kind=FRACTION),',
-            ),
-            (
-                "physics/dem/diagnostics.py",
-                '    for name in ("density", "fric", "shear", "poiss", "kn", "ks", "damp"):',
-                '=    for name in ("density", "fric", "shear", "poiss", "kn", "ks", "damp", "porosity"):',
+                "core/material.py",
+                '    ks: Annotated[Value, Property("shear stiffness of the linear contact", "N/m", low=0.0)]',
+                '    porosity: Annotated[Value, Property("share of voids", low=0.0, high=1.0, default="0")]',
             ),
         ],
         SCRIPT
@@ -264,6 +245,12 @@ sim = play(*BALLS, "PROP porosity 0.3 RANGE id 1", "SET print 5", "CYC 5", "SAV 
 sim = play("CYC 5", begin=["RESTORE half.sav"])
 particles = read_frame(sorted(Path("data").glob("*.vtkhdf"))[-1]).tables["particles"].columns
 assert particles["porosity"].tolist() == [0.0, 0.3]
+try:
+    play(*BALLS, "PROP porosity 1.3")
+except Exception as error:
+    assert "a number from 0 to 1" in str(error), error
+else:
+    raise AssertionError("1.3 was taken")
 """,
     ),
     "an output": Recipe(

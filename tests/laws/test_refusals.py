@@ -51,8 +51,11 @@ def test_linear_keys_without_hertz_choose_the_linear_law(tmp_path):
 
 
 def test_no_density(tmp_path):
-    sim = two(tmp_path)
-    properties.prop(sim, only(11), density=0.0)
+    sim = model(tmp_path)
+    particles.ball(sim, 11, 0.0, 0.0, 1.0)
+    particles.ball(sim, 12, 1.9, 0.0, 1.0)
+    properties.prop(sim, kn=1e6)
+    properties.prop(sim, only(12), density=1000.0)
     with pytest.raises(CommandError, match="1 particles that are free to move have no density"):
         cycles.cycle(sim, 1)
     properties.fix(sim, ("x", "y"), only(11))
@@ -75,7 +78,17 @@ def test_no_time_step(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "keys", [{"density": -1.0}, {"fric": -0.1}, {"kn": -5.0}, {"damp": -0.4}, {"poiss": 0.6}, {"poiss": -1.0}]
+    "keys",
+    [
+        {"density": -1.0},
+        {"density": 0.0},
+        {"fric": -0.1},
+        {"kn": -5.0},
+        {"damp": -0.4},
+        {"poiss": 0.6},
+        {"poiss": -1.0},
+        {"youngs": 1.0},
+    ],
 )
 def test_properties_that_make_no_sense(tmp_path, keys):
     sim = two(tmp_path)

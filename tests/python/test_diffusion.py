@@ -130,7 +130,8 @@ def test_particles_without_mass_are_refused(tmp_path):
     from hpcdem.core.selection import Ids
 
     sim = row_of_discs(tmp_path)
-    properties.prop(sim, Ids(2, 4), density=0.0)
+    sim.particles["material"][np.isin(sim.particles["gid"], (2, 3, 4))] = sim.materials.row()
+    sim.tables_changed()
     properties.fix(sim, ("x", "y", "spin"), where=Ids(2, 4))
     with pytest.raises(CommandError, match="diffusion: 3 particles have no mass"):
         cycles.prepare(sim)

@@ -16,6 +16,7 @@ import numpy as np
 
 from hpcdem.core.errors import CommandError, HpcdemError
 from hpcdem.core.fields import BOX_IDS, FX, FY, TORQUE, sides_of_box
+from hpcdem.core.material import PROPERTIES
 from hpcdem.halo.comm import SerialComm
 from hpcdem.io.dat import read_dat
 from hpcdem.io.frame import Frame
@@ -25,7 +26,7 @@ from hpcdem.physics.dem.saved_state import histories
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.walls import OLD_SIDES
 
-PROPERTIES = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "hertz")
+WRITTEN = (*(name for name, one in PROPERTIES.items() if one.in_frames), "hertz")
 
 
 def load_frame(
@@ -173,7 +174,7 @@ def _rows(comm: SerialComm, columns: np.ndarray, row: Callable[[list[float]], in
 def _materials(sim: Simulation, p: dict[str, np.ndarray]) -> np.ndarray:
     """Row of the material table (n,) of each particle. Collective."""
     n = len(p["gid"])
-    columns = {name: np.nan_to_num(np.asarray(p.get(name, np.zeros(n)), float)) for name in PROPERTIES}
+    columns = {name: np.nan_to_num(np.asarray(p.get(name, np.zeros(n)), float)) for name in WRITTEN}
     if "density" not in p and "mass" in p:
         columns["density"] = p["mass"] / mass.volume(p["radius"], sim.settings.disk)
     for axis in "xy":

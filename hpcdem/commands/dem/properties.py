@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from hpcdem.core.errors import CommandError
 from hpcdem.core.fields import FIX_BITS
+from hpcdem.core.material import Material, checked
 from hpcdem.core.selection import Chain, Group, Selection, has_expressions
 from hpcdem.physics.dem import user_laws
 from hpcdem.physics.dem.materials import OWN
 from hpcdem.physics.dem.simulation import Simulation
 from hpcdem.physics.dem.user_laws import LINEAR, PairLaw
-
-MATERIAL_KEYS = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "xp", "yp")
-NOT_NEGATIVE = ("density", "fric", "shear", "damp", "kn", "ks")
 
 
 def chosen(sim: Simulation, where: Selection | None) -> np.ndarray:
@@ -48,16 +47,7 @@ def prop(
     sim: Simulation,
     where: Selection | None = None,
     *,
-    density: float | None = None,
-    fric: float | None = None,
-    shear: float | None = None,
-    poiss: float | None = None,
-    damp: float | None = None,
     hertz: bool = False,
-    kn: float | None = None,
-    ks: float | None = None,
-    xp: float | None = None,
-    yp: float | None = None,
     xv: float | None = None,
     yv: float | None = None,
     spin: float | None = None,
@@ -67,8 +57,9 @@ def prop(
     between: Sequence[str] = (),
     parameter: Mapping[str, float] | None = None,
     folder: Path = Path(),
+    **properties: Unpack[Material],
 ) -> None:
-    """Set properties of the particles in `where`; keys left out keep their values.
+    """Set properties of the particles in `where`; keys left out keep their values. properties: of `core.material`.
 
     SI units; density is per volume, or per area when SET disk makes disks. HERTZ chooses the Hertz-Mindlin law, giving
     kn or ks without it the linear one. xp, yp [Pa] push each particle with pressure 2 R thickness (decision: the source
@@ -81,27 +72,18 @@ def prop(
     follow.
     """
     if between:
-        others = (density, fric, shear, poiss, damp, kn, ks, xp, yp, xv, yv, spin, color, group, where)
+        others = (*properties.values(), xv, yv, spin, color, group, where)
         if law is None or hertz or any(other is not None for other in others):
             raise CommandError("between takes a law and its parameter, and nothing else")
         _say_between(sim, law, between, parameter or {}, folder)
         return
-    given = {
-        k: v
-        for k, v in zip(MATERIAL_KEYS, (density, fric, shear, poiss, damp, kn, ks, xp, yp), strict=True)
-        if v is not None
-    }
-    for name in NOT_NEGATIVE:
-        if not given.get(name, 0.0) >= 0.0:
-            raise CommandError(f"{name} must not be negative, got {given[name]:g}")
-    if not -1.0 < given.get("poiss", 0.0) <= 0.5:
-        raise CommandError(f"poiss must lie in (-1, 0.5], got {poiss:g}")
+    given = checked(properties)
     if hertz:
         given["hertz"] = 1.0
-    elif kn is not None or ks is not None:
+    elif "kn" in given or "ks" in given:
         given["hertz"] = 0.0
     given = _of_law(sim, where, law, parameter or {}, folder) | given
-    if (xp or yp) and sim.log is not None:
+    if (given.get("xp") or given.get("yp")) and sim.log is not None:
         sim.log.warn_once(
             "pressure",
             f"xp, yp: the force on each particle is pressure 2 R thickness, thickness {sim.settings.thickness:g} m "

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
+from hpcdem.core.material import PROPERTIES
 from hpcdem.core.outputs import OUTPUTS
 from hpcdem.core.units import CHOICES as UNITS
 from hpcdem.lang.zdem.nearest import hint
@@ -172,7 +173,6 @@ NOT_NEGATIVE = Number("<float>", "a number not below 0", low=0.0)
 DISTANCE = Number("<float>", "a distance other than 0", zero=False)
 FRACTION = Number("<float>", "a number from 0 to 1", low=0.0, high=1.0)
 RATIO = Number("<float>", "a number above 0, at most 1", low=0.0, high=1.0, above=True)
-POISSON = Number("<float>", "a Poisson ratio above -1, at most 0.5", low=-1.0, high=0.5, above=True)
 INT = Number("<int>", "a whole number", integer=True)
 COUNT = Number("<int>", "a whole number above 0", integer=True, low=1)
 ASKED = Number("<int>", "a whole number from 1 to 1e9", integer=True, low=1, high=1e9)
@@ -343,14 +343,12 @@ _BOX_X = Option("x", "left and right side of the rectangle", kind=INTERVAL, unit
 _BOX_Y = Option("y", "lower and upper side of the rectangle", kind=INTERVAL, unit="m", required=True)
 
 _PROPERTIES = (
-    Option("density", "density; per area unless SET disk off", kind=POSITIVE, unit="kg/m3 or kg/m2"),
-    Option("fric", "friction coefficient", longest="friction", kind=NOT_NEGATIVE, default="0"),
-    Option("shear", "shear modulus G of the Hertz-Mindlin contact", kind=POSITIVE, unit="Pa"),
-    Option("poiss", "Poisson ratio of the Hertz-Mindlin contact", longest="poisson", kind=POISSON),
-    Option("damp", "local damping: share of the force that acts against the motion", kind=FRACTION, default="0"),
+    *(
+        Option(name, one.text, unit=one.unit, longest=one.longest, default=one.default, source=one.source,
+               kind=Number("<float>", one.range, low=one.low, high=one.high, above=one.above))
+        for name, one in PROPERTIES.items()
+    ),
     Option("hertz", "the particles take the Hertz-Mindlin contact; a later kn or ks without it takes that back"),
-    Option("kn", "normal stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
-    Option("ks", "shear stiffness of the linear contact", kind=NOT_NEGATIVE, unit="N/m"),
     Option("law", "pairs of these particles follow a law in a Python file of the user (docs/user_laws.md); linear: a "
            "built-in one again", kind=LAW, source="X"),
     Option("between", "this law is that of pairs of discs that have these two laws, instead of a law of particles",
@@ -359,9 +357,6 @@ _PROPERTIES = (
     Option("xv", "velocity in x", kind=FLOAT, unit="m/s"),
     Option("yv", "velocity in y", kind=FLOAT, unit="m/s"),
     Option("spin", "angular velocity, anticlockwise", kind=FLOAT, unit="rad/s"),
-    Option("xp", "pressure that pushes each particle along x: force = pressure 2 R thickness (SET thickness), until it "
-           "is changed", kind=FLOAT, unit="Pa", default="0", source="P"),
-    Option("yp", "the same along y", kind=FLOAT, unit="Pa", default="0", source="P"),
     Option("color", "colour, by name or number", also=("colour", "coloe"), kind=COLOR, source="S"),
     Option("group", "moves the particles to this group; a particle is in one group", kind=NAME, source="S"),
     Option("ebmod", "model 1 bond: Young's modulus", kind=NOT_NEGATIVE, unit="Pa"),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hpcdem.core.fields import ANGLE, FIELDS, FIX, GID, MATERIAL, RADIUS
+from hpcdem.core.material import PROPERTIES
 from hpcdem.io.frame import Frame, Table
 from hpcdem.io.slabs import to_slabs
 from hpcdem.numerics.exact_sum import BINS_SHAPE, exact_sum, rounded_sums
@@ -409,7 +410,7 @@ def frame(sim: Simulation) -> Frame:
     columns["fx"], columns["fy"], columns["torque"] = force[:, 0], force[:, 1], force[:, 2]
     columns["mass"], columns["inertia"] = sim.body[:, 0], sim.body[:, 1]
     rows = sim.materials.rows
-    for name in ("density", "fric", "shear", "poiss", "kn", "ks", "damp"):
+    for name in (name for name, one in PROPERTIES.items() if one.in_frames):
         columns[name] = rows[name][p["material"]]
     if rows["xp"].any() or rows["yp"].any():
         columns["push_x"], columns["push_y"] = sim.pressed().T

@@ -9,30 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from hpcdem.core.errors import CommandError
+from hpcdem.core.material import PROPERTIES
 
 OWN = tuple(f"own{k}" for k in range(8))
 """Columns for the properties that a law of the user declares, in their order."""
 MOST_LAWS = 64
 """Laws of the user in a model."""
-MATERIAL = np.dtype(
-    [
-        ("density", "f8"),
-        ("fric", "f8"),
-        ("shear", "f8"),
-        ("poiss", "f8"),
-        ("damp", "f8"),
-        ("kn", "f8"),
-        ("ks", "f8"),
-        ("hertz", "f8"),
-        ("xp", "f8"),
-        ("yp", "f8"),
-        ("law", "f8"),
-        *((name, "f8") for name in OWN),
-    ]
-)
-"""Density [kg/m^3, or kg/m^2 for disks], friction, shear modulus [Pa], Poisson's ratio, local damping, linear normal
-and shear stiffness [N/m], 1 for the Hertz-Mindlin law, pressure along x and y [Pa], number of the law of the
-user (user_laws.py), its properties. New columns are added at the end: older checkpoints have the first ones."""
+_FIRST = ("density", "fric", "shear", "poiss", "damp", "kn", "ks", "hertz", "xp", "yp", "law", *OWN)
+MATERIAL = np.dtype([(name, "f8") for name in (*_FIRST, *(name for name in PROPERTIES if name not in _FIRST))])
+"""Properties of `core.material`; 1 for the Hertz-Mindlin law; number of the law of the user (user_laws.py), and its
+properties. New columns are at the end: older checkpoints have the first ones, in this order."""
 
 BOND_TYPE = np.dtype(
     [("kind", "f8"), ("ebmod", "f8"), ("gbmod", "f8"), ("tstrength", "f8"), ("sstrength", "f8"), ("rubber", "f8")]
